@@ -50,7 +50,7 @@ pub use local_mass::SoundSpeed;
 pub use node_moments::{NodeMoments, RigidAcceleration};
 pub use nodes::{DofLabel, Nodes};
 pub use raw::{RawMatrix, RawModel, RawModes, RawShapes};
-pub use rigid::{centre_and_length, extents, rigid_count, rigid_fields};
+pub use rigid::{centre_and_length, extents, rigid_count, rigid_fields, span};
 pub use rows::Rows;
 pub use separate_bodies::check_bodies;
 pub use surface::{Skin, SurfaceMesh, skin};

@@ -67,6 +67,26 @@ pub fn extents(positions: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
+/// Distance of two positions that are far from each other: from the middle to the position farthest from it, and on
+/// to the one farthest from that, until the distance grows no more. The same in all axes, and for most bodies the
+/// largest distance that there is; zero without positions.
+pub fn span(positions: &[[f64; 3]]) -> f64 {
+    let distance = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
+    let farthest =
+        |from: &[f64; 3]| positions.iter().map(|x| (distance(x, from), x)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let mut mean = [0.0; 3];
+    for x in positions {
+        (0..3).for_each(|k| mean[k] += x[k] / positions.len() as f64);
+    }
+    let mut span = 0.0;
+    let mut next = farthest(&mean).and_then(|(_, end)| farthest(end));
+    while let Some((distance, end)) = next.filter(|(distance, _)| *distance > span) {
+        span = distance;
+        next = farthest(end);
+    }
+    span
+}
+
 /// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows, with r_j the
 /// size that a field has at row j in general: values near one mean a support and values near roundoff a free
 /// body.

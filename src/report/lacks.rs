@@ -10,7 +10,7 @@ use serde::Serialize;
 pub(super) struct LackFacts {
     modes: usize,
     /// Radians; zero where the rotation is prescribed.
-    attitude: f64,
+    attitude: Option<f64>,
     deflection: Option<f64>,
     stress: Option<f64>,
     /// Nothing where no motion is prescribed.
@@ -26,8 +26,17 @@ impl LackFacts {
     pub fn new(lack: &ReferenceError) -> Self {
         let OutputErrors { attitude, deflection, stress, reaction } = lack.errors;
         let (modes, time, unknown) = (lack.modes, lack.time, lack.unknown);
-        let worst = unknown.is_none().then_some(lack.worst);
-        Self { modes, attitude, deflection, stress, reaction, worst, time, unknown }
+        let known = |value: f64| unknown.is_none().then_some(value);
+        Self {
+            modes,
+            attitude: known(attitude),
+            deflection: deflection.and_then(known),
+            stress: stress.and_then(known),
+            reaction: reaction.and_then(known),
+            worst: known(lack.worst),
+            time,
+            unknown,
+        }
     }
 
     /// `attitude 0.0012 rad, deflection 0.5 %, stress 8.6 %`, of a prescribed motion with `reaction 1.2 %`.
@@ -38,9 +47,10 @@ impl LackFacts {
         let part = |name: &str, value: Option<f64>| {
             value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
         };
-        let attitude = format!("attitude {} rad", significant(self.attitude, 2));
+        let attitude = self.attitude.filter(|angle| *angle > 0.0);
+        let attitude = attitude.map(|angle| format!("attitude {} rad", significant(angle, 2)));
         let parts = [
-            (self.attitude > 0.0).then_some(attitude),
+            attitude,
             part("deflection", self.deflection),
             part("stress", self.stress),
             part("reaction", self.reaction),

@@ -5,16 +5,13 @@ use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::{BasisChoice, Loads};
-use crate::body::flex_body::FlexBody;
+use crate::body::flex_body::{FlexBody, SOFTENING, axis_in_words};
 use crate::model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
 use faer::{Mat, MatRef, Scale};
 use nalgebra::Matrix3;
 
 /// Direction cosines up to this are rounding.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
-
-/// Rates of different axes within this part are the same.
-const ALIKE: f64 = 1e-9;
 
 /// Beyond this what follows from the entries would not be finite.
 const LARGEST: f64 = 1e290;
@@ -61,13 +58,9 @@ pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &Fle
     if given || !free.residual_vectors.contains(&Loads::Centrifugal) {
         return None;
     }
-    let axes = if model.dimension() == 2 { 2..3 } else { 0..3 };
-    let rates: Vec<(f64, usize)> = axes.filter_map(|axis| Some((body.softening_rate(axis)?, axis))).collect();
-    let lowest = rates.iter().map(|(rate, _)| *rate).reduce(f64::min)?;
-    // The first of axes that are alike but for rounding.
-    let &(rate, axis) = rates.iter().find(|(rate, _)| *rate <= (1.0 + ALIKE) * lowest)?;
-    let axis = ["x", "y", "z"][axis];
-    let hertz = model.units().frequency_of(rate * rate);
+    let (axis, part) = body.worst_spin().filter(|(_, part)| *part > 0.0)?;
+    let axis = axis_in_words(&axis);
+    let hertz = model.units().frequency_of(SOFTENING / part);
     let message = format!(
         "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about body axis {axis}"
     );

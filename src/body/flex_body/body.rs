@@ -11,7 +11,7 @@ use crate::base::units::UnitSystem;
 use crate::body::invariants::{
     BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, Turning, identities,
 };
-use crate::model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, extents};
+use crate::model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, span};
 use faer::Mat;
 
 /// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
@@ -129,17 +129,9 @@ impl FlexBody {
         self.parts.mesh.as_ref()
     }
 
-    /// Largest extent of the nodes along an axis of the body frame. Unit: length.
+    /// Largest distance of two nodes. Unit: length.
     pub fn extent(&self) -> f64 {
-        extents(&self.parts.nodes.positions).into_iter().fold(0.0, f64::max)
-    }
-
-    /// The same along an axis of the model.
-    #[cfg(feature = "hdf5")]
-    pub(crate) fn extent_in_model(&self) -> f64 {
-        let places: Vec<[f64; 3]> =
-            self.parts.nodes.positions.iter().map(|x| self.parts.frame.to_model(*x)).collect();
-        extents(&places).into_iter().fold(0.0, f64::max)
+        span(&self.parts.nodes.positions)
     }
 
     /// Largest displacement of a node by mode `j` at unit amplitude.
@@ -197,19 +189,6 @@ impl FlexBody {
             None => Some(one.matrix.clone()),
             Some(sum) => Some(sum + &one.matrix),
         })
-    }
-
-    /// Spin rate about body axis `axis` at which the centrifugal terms take 1 % of the stiffness of the motion that
-    /// they soften most, by [`Invariants::softening_rate`] with the stiffness of inertia.
-    ///
-    /// # Panics
-    /// When `axis` is not below 3.
-    pub fn softening_rate(&self, axis: usize) -> Option<f64> {
-        let spin = |one: &&GeometricStiffness<Mat<f64>>| {
-            one.load == UnitLoad { kind: LoadKind::Spin, component: axis }
-        };
-        let own = self.inertia_stiffness().and_then(|own| own.stiffness.iter().find(spin));
-        self.invariants().softening_rate(axis, own.map(|one| &one.matrix))
     }
 
     /// The motions at which the stiffness of inertia has `part` of the stiffness of some motion of the body; `None`

@@ -17,7 +17,7 @@ use crate::base::error::{Error, Result};
 use crate::model::Coupling;
 use crate::numerics::linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 use faer::Mat;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Largest part that modes may leave of the static response of the carried body before that is said.
 const RESOLVED: f64 = 0.01;
@@ -167,15 +167,13 @@ impl FlexBody {
         let (stiffness, c1, c2) =
             (self.invariants().modal_stiffness(), self.invariants().c1(), self.invariants().c2());
         let nf = self.n_modes();
-        let energy = |row: usize, modes: usize| -> f64 {
-            let load = |j: usize| if row < 3 { c1[(row, j)] } else { c2[(row - 3, j)] };
-            (0..modes).map(|j| load(j).powi(2) / stiffness[(j, j)]).sum()
+        let energy = |loads: &Mat<f64>, modes: std::ops::Range<usize>| {
+            Matrix3::from_fn(|a, b| {
+                modes.clone().map(|j| loads[(a, j)] * loads[(b, j)] / stiffness[(j, j)]).sum::<f64>()
+            })
         };
-        let missing = |row: usize| {
-            let whole = energy(row, nf);
-            if whole > 0.0 { (whole - energy(row, nf / 2)) / whole } else { 0.0 }
-        };
-        let worst = (0..6).map(missing).fold(0.0, f64::max);
+        let missing = |loads: &Mat<f64>| largest_part(&energy(loads, nf / 2..nf), &energy(loads, 0..nf));
+        let worst = missing(c1).max(missing(&c2));
         (worst > RESOLVED).then(|| {
             let message = format!(
                 "the {nf} modes resolve {carrier} badly: where it is accelerated, about {:.0} % of the elastic energy of the body that hangs from it are missing in the worst direction",
@@ -286,4 +284,18 @@ fn refused(message: String) -> Error {
 
 fn stacked(upper: &Mat<f64>, lower: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(6, upper.ncols(), |i, j| if i < 3 { upper[(i, j)] } else { lower[(i - 3, j)] })
+}
+
+/// Energy, relative to that of the direction with most, below which there is nothing in a direction.
+const NO_ENERGY: f64 = 1e-9;
+
+/// The largest b'P b / b'W b over all directions b that `whole` = W has energy in.
+fn largest_part(part: &Matrix3<f64>, whole: &Matrix3<f64>) -> f64 {
+    let eigen = whole.symmetric_eigen();
+    let most = eigen.eigenvalues.max();
+    let unit = Matrix3::from_fn(|i, k| match eigen.eigenvalues[k] {
+        energy if energy > NO_ENERGY * most => eigen.eigenvectors[(i, k)] / energy.sqrt(),
+        _ => 0.0,
+    });
+    (unit.transpose() * part * unit).symmetric_eigenvalues().max().max(0.0)
 }

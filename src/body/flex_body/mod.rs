@@ -12,6 +12,7 @@ mod model_rows;
 mod parts;
 mod reduced;
 mod rounded;
+mod softening;
 mod storage;
 mod terms;
 mod validate;
@@ -26,5 +27,6 @@ pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
     is_static,
 };
+pub(crate) use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;
 pub use terms::TermDecision;

@@ -3,9 +3,7 @@
 use super::Invariants;
 use crate::numerics::linalg::{combine, gram, symmetric_eigen};
 use faer::{Mat, MatRef};
-
-/// Part of the stiffness of a motion at which the centrifugal term counts.
-const PART: f64 = 0.01;
+use nalgebra::Vector3;
 
 /// Largest |kappa| of A v = kappa K v for symmetric A and K (nf x nf), K positive definite: by which part of
 /// its own a unit of A changes the stiffness of any motion at the most. `None` when K is not positive
@@ -27,39 +25,49 @@ pub(super) fn largest_relative_norm(all: &[MatRef<'_, f64>], k: MatRef<'_, f64>)
 
 /// K^-1/2 A K^-1/2 of every A, up to a rotation that is the same for all.
 fn relative_to(all: &[MatRef<'_, f64>], k: MatRef<'_, f64>) -> Option<Vec<Mat<f64>>> {
-    let n = k.nrows();
-    // To a unit diagonal first: stiffnesses of modes spread over many orders of magnitude.
-    let size: Vec<f64> = (0..n).map(|i| k[(i, i)].sqrt().recip()).collect();
-    let scaled = |m: MatRef<'_, f64>| Mat::from_fn(n, n, |i, j| m[(i, j)] * size[i] * size[j]);
-    let eigen = symmetric_eigen(scaled(k).as_ref())?;
-    if eigen.values.first().is_some_and(|v| *v <= 0.0) {
-        return None;
-    }
-    let root = Mat::from_fn(n, n, |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
-    let projected =
-        |a: &MatRef<'_, f64>| gram(root.as_ref(), combine(scaled(*a).as_ref(), root.as_ref()).as_ref());
+    let root = inverse_root(k)?;
+    let projected = |a: &MatRef<'_, f64>| gram(root.as_ref(), combine(*a, root.as_ref()).as_ref());
     Some(all.iter().map(projected).collect())
 }
 
+/// X with X'K X = 1; `None` when K is not positive definite.
+fn inverse_root(k: MatRef<'_, f64>) -> Option<Mat<f64>> {
+    let n = k.nrows();
+    // To a unit diagonal first: stiffnesses of modes spread over many orders of magnitude.
+    let size: Vec<f64> = (0..n).map(|i| k[(i, i)].sqrt().recip()).collect();
+    let scaled = Mat::from_fn(n, n, |i, j| k[(i, j)] * size[i] * size[j]);
+    let eigen = symmetric_eigen(scaled.as_ref())?;
+    if eigen.values.first().is_some_and(|v| *v <= 0.0) {
+        return None;
+    }
+    Some(Mat::from_fn(n, n, |i, j| size[i] * eigen.vectors[(i, j)] / eigen.values[j].sqrt()))
+}
+
 impl Invariants {
-    /// The spin rate about frame axis `axis` at which the centrifugal term w^2 (W2)_kk takes 1 % of the
-    /// stiffness K_ff of the motion that it softens most: w = sqrt(0.01 / mu), mu the largest eigenvalue of
-    /// (W2)_kk v = mu K_ff v. The stiffness of that motion is lost at ten times this rate unless geometric
-    /// stiffness makes up for it. `None` when nothing moves across the axis, when K_ff is not positive
-    /// definite, or when the body does not hold W2. Unit: 1/time.
+    /// The largest part mu that the centrifugal term takes of the stiffness of any motion at the angular velocity
+    /// w, the largest eigenvalue of (sum_ab w_a w_b (W2)_ab) v = mu K_ff v, and v with v'K_ff v = 1. `None` when K_ff is
+    /// not positive definite, or when the body does not hold W2.
+    ///
+    /// * `of_inertia`: the stiffness of inertia at this angular velocity, where the body has it: a part of the same
+    ///   term.
     ///
     /// # Panics
-    /// When `axis` is not below 3, or a matrix has another size.
-    ///
-    /// * `of_inertia`: the stiffness of inertia for spin about the axis, where the body has it: a part of the
-    ///   same term.
-    pub fn softening_rate(&self, axis: usize, of_inertia: Option<&Mat<f64>>) -> Option<f64> {
+    /// When a matrix has another size.
+    pub fn softening(&self, omega: &Vector3<f64>, of_inertia: Option<&Mat<f64>>) -> Option<(f64, Vec<f64>)> {
         let (nf, w2) = (self.n_modes(), self.w2()?);
-        let mut block = w2.as_ref().submatrix(axis * nf, axis * nf, nf, nf).to_owned();
-        if let Some(stiffness) = of_inertia {
-            block -= stiffness;
+        let mut term = of_inertia.map_or_else(|| Mat::zeros(nf, nf), |stiffness| -stiffness);
+        for a in 0..3 {
+            for b in 0..3 {
+                let block = w2.as_ref().submatrix(a * nf, b * nf, nf, nf);
+                let weight = 0.5 * omega[a] * omega[b];
+                term += Mat::from_fn(nf, nf, |i, j| weight * (block[(i, j)] + block[(j, i)]));
+            }
         }
-        let mu = relative_norm(block.as_ref(), self.0.modal_stiffness.as_ref())?;
-        (mu > 0.0).then(|| (PART / mu).sqrt())
+        let root = inverse_root(self.0.modal_stiffness.as_ref())?;
+        let projected = gram(root.as_ref(), combine(term.as_ref(), root.as_ref()).as_ref());
+        let eigen = symmetric_eigen(projected.as_ref())?;
+        let last = eigen.values.len().checked_sub(1)?;
+        let softest = combine(root.as_ref(), eigen.vectors.as_ref().subcols(last, 1));
+        Some((eigen.values[last].max(0.0), (0..nf).map(|i| softest[(i, 0)]).collect()))
     }
 }

@@ -1,6 +1,6 @@
 //! How far a motion is from that of a reference: the errors that tolerances of a scene are about.
 
-use super::lively::{LivelyNodes, along_axes, longest};
+use super::lively::{LivelyNodes, along_principal_directions, longest};
 use super::peak::Peak;
 use super::{Extremes, Tolerance, Trace};
 use crate::body::flex_body::FlexBody;
@@ -251,7 +251,7 @@ impl<'r> Measure<'r> {
     /// When the motion has another number of modes.
     pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
         assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
-        let nodes = if trace.deflections.is_empty() { along_axes(body) } else { Vec::new() };
+        let nodes = if trace.deflections.is_empty() { along_principal_directions(body) } else { Vec::new() };
         let rows = LivelyNodes::new(body, &nodes);
         let largest_deflection = Peak::of(&trace.time, trace.q.iter().map(|q| rows.longest(q))).value;
         Self { body, trace, nodes, rows, largest_deflection }

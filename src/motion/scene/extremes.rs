@@ -28,6 +28,8 @@ pub struct Extremes {
     pub spin: f64,
     /// Components |omega_k| of it along the body axes.
     pub spin_about: Vector3<f64>,
+    /// Angular velocities that are largest about axes that are apart, body axes.
+    pub spins: Vec<Vector3<f64>>,
     /// Force and torque that the prescribed motion takes; zero without.
     pub reaction: (f64, f64),
     /// How well what cannot change did not.
@@ -61,6 +63,7 @@ pub(super) struct Survey<'b> {
     internal: Peak,
     spin: Peak,
     spin_about: [Peak; 3],
+    spins: Spins,
     reaction: [Peak; 2],
     differences: Differences,
 }
@@ -79,6 +82,7 @@ impl<'b> Survey<'b> {
             internal: Peak::default(),
             spin: Peak::default(),
             spin_about: [Peak::default(); 3],
+            spins: Spins::default(),
             reaction: [Peak::default(); 2],
             differences: Differences::default(),
         }
@@ -108,6 +112,7 @@ impl<'b> Survey<'b> {
         self.internal.see(time, internal.max(0.0).sqrt());
         self.spin.see(time, omega.norm());
         self.spin_about.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
+        self.spins.see(omega);
         self.differences.see(balance);
     }
 
@@ -126,8 +131,31 @@ impl<'b> Survey<'b> {
             internal,
             spin: self.spin.value,
             spin_about: Vector3::from(self.spin_about.map(|peak| peak.value)),
+            spins: self.spins.0,
             reaction: (self.reaction[0].value, self.reaction[1].value),
             drift: self.differences.drift(internal, size, least_energy),
+        }
+    }
+}
+
+/// Angular velocities about so many axes are kept, whose angles have cosines below the other number.
+const AXES: usize = 32;
+const SAME_AXIS: f64 = 0.95;
+
+/// The largest angular velocities about axes that are apart.
+#[derive(Debug, Clone, Default)]
+struct Spins(Vec<Vector3<f64>>);
+
+impl Spins {
+    fn see(&mut self, omega: &Vector3<f64>) {
+        let size = omega.norm();
+        let is_near = |other: &Vector3<f64>| other.dot(omega).abs() >= SAME_AXIS * other.norm() * size;
+        if size == 0.0 || self.0.iter().any(|other| is_near(other) && other.norm() >= size) {
+            return;
+        }
+        self.0.retain(|other| !is_near(other));
+        if self.0.len() < AXES {
+            self.0.push(*omega);
         }
     }
 }

@@ -3,7 +3,7 @@
 use crate::body::flex_body::FlexBody;
 use crate::numerics::linalg::larger;
 use faer::MatRef;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Nodes of a body, and their rows of the modes: three per node, each of nf entries.
 #[derive(Debug, Clone)]
@@ -45,12 +45,19 @@ impl LivelyNodes {
     }
 }
 
-/// For every mode and axis the node that moves most along it, ascending, each once.
-pub(super) fn along_axes(body: &FlexBody) -> Vec<usize> {
+/// For every mode the nodes that move most along the principal directions of its displacements, the eigenvectors of
+/// sum_i psi_i psi_i', which turn with the body; ascending, each once.
+pub(super) fn along_principal_directions(body: &FlexBody) -> Vec<usize> {
     let shape = &body.modes().shape;
-    let most = |j: usize, axis: usize| largest_of(body.n_nodes(), |i| shape[(3 * i + axis, j)].abs());
-    let all = (0..body.n_modes()).flat_map(|j| (0..body.dimension()).map(move |axis| (j, axis)));
-    distinct(all.map(|(j, axis)| most(j, axis)).collect())
+    let of_mode = |j: usize| {
+        let displacement = |i: usize| Vector3::from_fn(|k, _| shape[(3 * i + k, j)]);
+        let sum = (0..body.n_nodes()).fold(Matrix3::zeros(), |sum: Matrix3<f64>, i| {
+            sum + displacement(i) * displacement(i).transpose()
+        });
+        let directions = sum.symmetric_eigen().eigenvectors;
+        [0, 1, 2].map(|k| largest_of(body.n_nodes(), |i| directions.column(k).dot(&displacement(i)).abs()))
+    };
+    distinct((0..body.n_modes()).flat_map(of_mode).collect())
 }
 
 /// The first index of the largest value.

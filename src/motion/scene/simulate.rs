@@ -7,7 +7,7 @@ use super::{Extremes, Path, Recording, Scene, Setting, Stage};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::memory::refuse_beyond;
-use crate::body::flex_body::FlexBody;
+use crate::body::flex_body::{FlexBody, SOFTENING, axis_in_words};
 use crate::model::LoadKind;
 use crate::motion::dynamics::{BodyPoint, Evaluation, Motion};
 use crate::numerics::integration::{Failure, Sight, Work};
@@ -151,20 +151,29 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
     let stiffened = scene.run.terms.geometric_stiffness
         && body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
     if scene.run.terms.w2 && !stiffened {
-        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let Some(limit) = body.softening_rate(axis) else { continue };
-            let largest = extremes.spin_about[axis];
-            if largest > limit {
-                let lost = (0.1 * largest / limit).powi(2) * 100.0;
-                let message = format!(
-                    "spin about {name} reaches {} rad/{unit}: without geometric stiffness it takes {lost:.2} % of the stiffness of some motion",
-                    rounded(largest)
-                );
-                found.push(Diagnostic::new(Code::SpinSoftens, message));
-            }
-        }
+        found.extend(softening(body, extremes));
     }
     found
+}
+
+/// A warning where spin takes more than a hundredth of the stiffness of some motion.
+fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
+    let (_, worst) = body.worst_spin()?;
+    if worst * extremes.spin.powi(2) <= SOFTENING {
+        return None;
+    }
+    let part = |omega: &Vector3<f64>| Some((body.softening(omega)?, *omega));
+    let (part, omega) = extremes.spins.iter().filter_map(part).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (part > SOFTENING).then(|| {
+        let message = format!(
+            "spin about {} reaches {} rad/{}: without geometric stiffness it takes {:.2} % of the stiffness of some motion",
+            axis_in_words(&omega),
+            rounded(omega.norm()),
+            body.units().time.name(),
+            100.0 * part
+        );
+        Diagnostic::new(Code::SpinSoftens, message)
+    })
 }
 
 /// Four digits are enough to find a place.

@@ -53,7 +53,7 @@ impl ShownMotion {
         Self {
             scene: motion.scene.clone(),
             origin_in_model: motion.origin_in_model,
-            largest: motion.largest_deflection * body.extent_in_model(),
+            largest: motion.largest_deflection * body.extent(),
             middle,
             reach,
             written,
