@@ -7,8 +7,8 @@ use crate::support::motion::{adaptive, conserving, orientation, run, velocity_ra
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::motion::dynamics::{
-    Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place,
-    Prescribed, Surroundings, Terms,
+    AlongFrame, Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation,
+    Orientation, Place, Prescribed, Surroundings, Terms,
 };
 use flexbody::numerics::integration::Method;
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -225,8 +225,8 @@ impl Surroundings for SpinUp {
         let phase = std::f64::consts::TAU * (time / self.duration).min(1.0);
         let rate = self.rate * (phase - phase.sin()) / std::f64::consts::TAU;
         let slope = self.rate / self.duration * (1.0 - phase.cos());
-        let held = self.held.then(Vector3::zeros);
-        let about = |value: f64| Prescribed { linear: held, angular: Some(Vector3::z() * value) };
+        let held = self.held.then(AlongFrame::default);
+        let about = |value: f64| Prescribed { linear: held, angular: Some(AlongFrame(Vector3::z() * value)) };
         (about(rate), about(slope))
     }
 }

@@ -18,9 +18,9 @@ use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::{Carrier, FlexBody, Frame};
 use flexbody::model::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use flexbody::motion::dynamics::{
-    Configuration, EquationsOfMotion, EulerParameters, Evaluation, NodalConfiguration, NodalEquations,
-    NodalEvaluation, NodalModes, NodalMotion, NodalPoint, Orientation, Prescribed, ReferenceConditions,
-    Terms,
+    AlongFrame, Configuration, EquationsOfMotion, EulerParameters, Evaluation, NodalConfiguration,
+    NodalEquations, NodalEvaluation, NodalModes, NodalMotion, NodalPoint, Orientation, Prescribed,
+    ReferenceConditions, Terms,
 };
 use flexbody::numerics::eigen::Wanted;
 use flexbody::numerics::integration::{Explicit, Failure, Method, integrate};
@@ -165,8 +165,8 @@ fn unbalanced(
     let rate = body.eigenvalues[0].sqrt();
     let given = |linear: Vector3<f64>, angular: Vector3<f64>| match driven {
         "nothing" => Prescribed::NOTHING,
-        "spin" => Prescribed { linear: None, angular: Some(angular) },
-        _ => Prescribed { linear: Some(linear), angular: Some(angular) },
+        "spin" => Prescribed { linear: None, angular: Some(AlongFrame(angular)) },
+        _ => Prescribed { linear: Some(AlongFrame(linear)), angular: Some(AlongFrame(angular)) },
     };
     let mut evaluation = NodalEvaluation::new(equations);
     let y = equations.state(&configuration(&body.shapes, state)).expect("a state");
@@ -181,8 +181,8 @@ fn unbalanced(
         _ => {
             let rates = given(Vector3::new(0.2, 0.1, -0.3), Vector3::new(-0.3, 0.2, 0.5) * rate);
             let rates = Prescribed {
-                linear: rates.linear.map(|v| v * rate),
-                angular: rates.angular.map(|w| w * rate),
+                linear: rates.linear.map(|v| AlongFrame(v.0 * rate)),
+                angular: rates.angular.map(|w| AlongFrame(w.0 * rate)),
             };
             evaluation.driven_accelerations(&rates, &mut udd)
         }
@@ -495,7 +495,8 @@ fn carried_apart(model: &FeModel, body: &FlexBody, node: i64, amplitude: f64) ->
     };
     let mut evaluation = NodalEvaluation::new(&equations);
     let y = equations.state(&lifting.lift(&start)).expect("a state");
-    let both = |linear, angular| Prescribed { linear: Some(linear), angular: Some(angular) };
+    let both =
+        |linear, angular| Prescribed { linear: Some(AlongFrame(linear)), angular: Some(AlongFrame(angular)) };
     evaluation.set_driven(&y, &both(Vector3::zeros(), omega)).expect("a state");
     let mut udd = vec![0.0; equations.n_rows()];
     evaluation.driven_accelerations(&both(linear, angular), &mut udd).expect("accelerations");

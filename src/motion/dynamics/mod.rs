@@ -33,6 +33,6 @@ pub use nodal::{
 };
 pub use orientation::{AngularVelocity, EulerParameters, Orientation, PlaneAngle, RotationVector};
 pub use points::BodyPoint;
-pub use prescribed::{NotPositiveDefinite, Prescribed};
+pub use prescribed::{AlongFrame, NotPositiveDefinite, Prescribed};
 pub use snapshot::{Balance, Configuration, Place, Snapshot};
 pub use terms::Terms;

@@ -2,7 +2,7 @@
 
 use super::{Carried, Scene, Spin};
 use crate::body::flex_body::Frame;
-use crate::motion::dynamics::Prescribed;
+use crate::motion::dynamics::{AlongFrame, Prescribed};
 use nalgebra::{Matrix3, Vector3};
 
 /// What a scene prescribes of the motion of the frame of its body.
@@ -38,10 +38,11 @@ impl<'a> CarriedMotion<'a> {
         let (velocity, acceleration) = (axes.tr_mul(&velocity), axes.tr_mul(&acceleration));
         let linear = omega.cross(&self.arm) + velocity;
         let rate = alpha.cross(&self.arm) + acceleration - omega.cross(&velocity);
-        (
-            Prescribed { linear: Some(linear), angular: Some(omega) },
-            Prescribed { linear: Some(rate), angular: Some(alpha) },
-        )
+        let both = |linear, angular| Prescribed {
+            linear: Some(AlongFrame(linear)),
+            angular: Some(AlongFrame(angular)),
+        };
+        (both(linear, omega), both(rate, alpha))
     }
 }
 
@@ -59,7 +60,8 @@ impl<'a> Driving<'a> {
         }
         let Some(spin) = self.spin else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
         let (omega, alpha) = spin.at(time, axes);
-        let linear = spin.hold.then(Vector3::zeros);
-        (Prescribed { linear, angular: Some(omega) }, Prescribed { linear, angular: Some(alpha) })
+        let linear = spin.hold.then(AlongFrame::default);
+        let about = |angular| Prescribed { linear, angular: Some(AlongFrame(angular)) };
+        (about(omega), about(alpha))
     }
 }

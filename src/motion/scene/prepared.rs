@@ -175,9 +175,8 @@ fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configurat
     Configuration {
         origin: initial.origin,
         attitude: attitude.into(),
-        // What is prescribed is along the axes of the frame.
-        velocity: prescribed.linear.map_or(initial.velocity, |linear| axes * linear),
-        omega: prescribed.angular.unwrap_or(initial.angular_velocity),
+        velocity: prescribed.linear.map_or(initial.velocity, |linear| linear.in_world(&axes)),
+        omega: prescribed.angular.map_or(initial.angular_velocity, |angular| angular.0),
         q,
         qd,
     }

@@ -8,7 +8,7 @@ use crate::support::motion::{adaptive, conserving, run};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::motion::dynamics::{
-    Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Place, Prescribed,
+    AlongFrame, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Place, Prescribed,
     Surroundings, Terms,
 };
 use nalgebra::{Matrix3, Vector3};
@@ -97,7 +97,7 @@ impl Surroundings for SpinUp {
 
     fn prescribed(&self, time: f64, _: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         let phase = TAU * (time / self.duration).min(1.0);
-        let about = |value: f64| Prescribed { linear: None, angular: Some(Vector3::z() * value) };
+        let about = |value: f64| Prescribed { linear: None, angular: Some(AlongFrame(Vector3::z() * value)) };
         (
             about(self.rate * (phase - phase.sin()) / TAU),
             about(self.rate / self.duration * (1.0 - phase.cos())),

@@ -6,14 +6,14 @@ use super::equations::NodalEquations;
 use super::inversion::Conditions;
 use super::inversion::Given;
 use super::motions::{add_motion, halves, joined, sums};
-use crate::motion::dynamics::Prescribed;
+use crate::motion::dynamics::{AlongFrame, Prescribed};
 use crate::numerics::integration::Failure;
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEquations<'_> {
     /// What is given of (V, omega), or of the rates of its components: model axes, zero elsewhere.
     fn given(&self, prescribed: &Prescribed) -> Vector6<f64> {
-        let or_zero = |v: Option<Vector3<f64>>| v.unwrap_or_else(Vector3::zeros);
+        let or_zero = |v: Option<AlongFrame>| v.unwrap_or_default().0;
         self.in_model(&or_zero(prescribed.linear), &or_zero(prescribed.angular))
     }
 
