@@ -27,6 +27,10 @@ const MOST_OF_INERTIA: usize = 8;
 /// Factors of a frequency at which a response is looked for: it may be a natural frequency.
 const NUDGES: [f64; 3] = [1.0, 1.0003, 0.9996];
 
+/// Root of the elastic energy that a response must have beside those that are known, relative to its own, to be a new
+/// one.
+const NEW: f64 = 1e-4;
+
 /// Displacements E that a body lacks: static responses to the forces that its motion leaves unbalanced, those to
 /// the inertia of these responses, without which all that is lacking would move with one frequency for each force, and
 /// responses at the frequencies of resonances.
@@ -86,6 +90,12 @@ impl Missed {
         let resonances = missed.resonances(grid, question);
         missed.add(&beside, of_inertia);
         for resonance in resonances {
+            eprintln!(
+                "DEBUG resonance {} of above {} T {}",
+                resonance.rate,
+                question.complete_below,
+                grid.times.last().unwrap()
+            );
             let forces = combine(
                 missed.forces.as_ref().subcols(0, resonance.amplitudes.nrows()),
                 resonance.amplitudes.as_ref(),
@@ -221,6 +231,9 @@ impl Beside<'_> {
     /// as the largest of these.
     fn more(&self, known: &Mat<f64>, further: Mat<f64>) -> Mat<f64> {
         let mut further = self.of(further);
+        let own = self.energy(&further);
+        let sizes: Vec<f64> = (0..own.nrows()).map(|j| own[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
+        further = Mat::from_fn(further.nrows(), further.ncols(), |i, j| further[(i, j)] / sizes[j]);
         let energy = self.energy(known);
         let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else { return further };
         let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
@@ -231,10 +244,12 @@ impl Beside<'_> {
             let shared = gram(weighted.as_ref(), further.as_ref());
             subtract_combination(further.as_mut(), orthonormal.as_ref(), shared.as_ref());
         }
-        let Some((turned, own)) = principal(self.energy(&further), ROUNDING, usize::MAX) else {
+        let Some((turned, own)) = principal(self.energy(&further), 0.0, usize::MAX) else {
             return Mat::zeros(further.nrows(), 0);
         };
-        let scaled = Mat::from_fn(turned.nrows(), own.len(), |row, k| turned[(row, k)] * roots[0] / own[k]);
+        // What is left of all that was shared is rounding.
+        let kept = own.iter().take_while(|root| **root > NEW).count();
+        let scaled = Mat::from_fn(turned.nrows(), kept, |row, k| turned[(row, k)] * roots[0] / own[k]);
         combine(further.as_ref(), scaled.as_ref())
     }
 }

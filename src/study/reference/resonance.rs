@@ -9,7 +9,7 @@ use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 
 /// Frequencies at the most.
-const MOST: usize = 6;
+const MOST: usize = 4;
 
 /// Combinations of forces that are looked at, and the part of the sum of their squares that is not.
 const MOST_COMBINATIONS: usize = 8;
