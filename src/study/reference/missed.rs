@@ -90,12 +90,6 @@ impl Missed {
         let resonances = missed.resonances(grid, question);
         missed.add(&beside, of_inertia);
         for resonance in resonances {
-            eprintln!(
-                "DEBUG resonance {} of above {} T {}",
-                resonance.rate,
-                question.complete_below,
-                grid.times.last().unwrap()
-            );
             let forces = combine(
                 missed.forces.as_ref().subcols(0, resonance.amplitudes.nrows()),
                 resonance.amplitudes.as_ref(),
