@@ -41,10 +41,9 @@ const DEFLECTION: f64 = 2e-3;
 const COUNTS: f64 = 1e-3;
 
 /// What there is to say of the distribution, in words.
-const REMAINS: &str = "\nThe estimate moves what is lacking together with the modes that the body has, by the mass that they share, and looks twelve times into the period of the fastest mode that counts. Before, with 121 instants and the\n\
-    modes left alone, estimates of enriched bodies were between a tenth and 2.4 times of the truth, the smallest of the plane frame, whose enriched bodies follow modes that 121 instants do not see. What the equations of a body take as\n\
-    approximate counts as well: nodal rotations that turn with the body (before, 0.05 of the deflection of a plane frame that a node carries and turns). Gyroscopic and centrifugal forces of what is lacking are not counted, nor are deflections\n\
-    beyond the first order.\n";
+const REMAINS: &str = "\nThe estimate moves what is lacking together with the modes that the body has, by the mass that they share; answers the inertia of what is lacking, and forces at the frequencies where their spectrum has peaks; and looks twelve times into the period of the fastest motion that counts\n\
+    and three times between two rows of a table. What the equations of a body take as approximate counts as well. Gyroscopic and centrifugal forces of what is lacking are not counted, nor is what the equations of a body leave out in second order of the deformation (frames whose nodal rotations carry mass,\n\
+    enriched so far that nothing else is left: deflections of which less than a tenth of the truth is told, where the truth is below a hundredth of the tolerance).\n";
 
 /// How loads begin, and what comes to them. A shock excites modes without end, which no number of responses follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
