@@ -299,7 +299,7 @@ fn driven_case(seed: u64) -> Case {
     let all = convert(&case.model, &settings(count), SILENT).expect("a body").body;
     let beyond = case.modes as u64 + pick(random, (2 * case.modes as u64).min((count - case.modes) as u64));
     let frequency = all.modes().eigenvalue[beyond as usize].sqrt() / TAU;
-    let duration = case.scene.run.duration.expect("a run").max(between(random, 20.0, 80.0) / frequency);
+    let duration = case.scene.run.duration.expect("a run").max(between(random, 10.0, 40.0) / frequency);
     case.scene.run.duration = Some(duration);
     let main = case.scene.loads[0].force.at(0.3 * duration).0.norm();
     let size = main * 10f64.powf(between(random, -3.5, -1.5));
