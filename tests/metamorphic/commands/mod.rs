@@ -1,0 +1,84 @@
+//! Commands that judge a motion, by the functions that the command line calls.
+
+mod response;
+mod simulation;
+mod verdicts;
+
+use crate::outputs::{Output, Outputs, Values};
+use crate::subject::Subject;
+use flexbody::base::diagnostic::Diagnostic;
+use flexbody::base::error::Result;
+use std::collections::BTreeSet;
+
+/// A command: the outputs of a subject.
+pub type Command = fn(&Subject) -> Result<Outputs>;
+
+/// All commands by name.
+pub const ALL: [(&str, Command); 6] = [
+    ("simulate", simulation::simulation),
+    ("select a body", verdicts::select_body),
+    ("select a model", verdicts::select_model),
+    ("trade", verdicts::trading),
+    ("convert for the scene", verdicts::conversion),
+    ("response", response::response),
+];
+
+/// Factor of the allowed difference of values that are read off at the places that an integration has looked at: other
+/// steps are other places, and a parabola through three of them finds a largest value to about 1e-5 (measured).
+pub const LOOKED_AT: f64 = 100.0;
+
+/// Factor of the allowed difference of errors of a motion against another: both are read off at places.
+const ERRORS: f64 = 1e4;
+
+/// Factor of the allowed difference of percentages in messages, which have two or three digits.
+const DIGITS: f64 = 2e5;
+
+/// Codes of findings, each once, in order.
+pub fn codes(found: &[Diagnostic]) -> String {
+    let codes: BTreeSet<&str> = found.iter().map(|one| one.code().id()).collect();
+    codes.into_iter().collect::<Vec<_>>().join(" ")
+}
+
+/// A decision, in words.
+pub fn facts(name: &str, facts: String) -> Output {
+    let values = Values::Facts(facts);
+    Output {
+        name: name.to_owned(),
+        unit: [0; 3],
+        values,
+        derivative: None,
+        least: 0.0,
+        by_instant: false,
+        slack: 1.0,
+    }
+}
+
+/// A number of the whole motion.
+pub fn number(name: &str, unit: [i32; 3], value: f64, least: f64) -> Output {
+    let values = Values::Numbers(vec![value]);
+    Output { values, unit, least, ..facts(name, String::new()) }
+}
+
+/// Codes of findings, and the percentages in their messages.
+pub fn findings(found: &[Diagnostic]) -> Vec<Output> {
+    let mut outputs = vec![facts("findings", codes(found))];
+    for one in found {
+        let name = format!("percentages of {}", one.code().id());
+        let words: Vec<&str> = one.message().split_whitespace().collect();
+        let numbers = words.windows(2).filter(|pair| pair[1].starts_with('%'));
+        let numbers: Vec<f64> = numbers.filter_map(|pair| pair[0].parse().ok()).collect();
+        outputs.push(Output {
+            values: Values::Numbers(numbers),
+            slack: DIGITS,
+            ..facts(&name, String::new())
+        });
+    }
+    outputs
+}
+
+/// An error over its tolerance.
+pub fn error(name: &str, errors: Vec<f64>) -> Output {
+    /// Errors below this part of the tolerance are those of the integration.
+    const LEAST: f64 = 1e-3;
+    Output { values: Values::Numbers(errors), least: LEAST, slack: ERRORS, ..facts(name, String::new()) }
+}

@@ -1,0 +1,88 @@
+//! `select`, `trade` and `convert --scene`.
+
+use super::{error, facts, findings};
+use crate::outputs::Outputs;
+use crate::subject::Subject;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::numerics::eigen::Resume;
+use flexbody::study::reference::ReferenceError;
+use flexbody::study::selection::{Selection, select_for_cases};
+use flexbody::study::tailoring::{Tailoring, convert_for_cases};
+use flexbody::study::trade::{Kind, Row, Settings, Source, trade_for_cases};
+
+/// What a selection says.
+fn outputs(selection: &Selection, modes: usize) -> Outputs {
+    let Selection { groups, guideline, chosen, n_modes, .. } = selection;
+    let mut all = vec![
+        facts("groups", format!("{groups:?}, {guideline}")),
+        facts("modes", format!("{:?} of {n_modes}, at first {modes}", selection.modes)),
+        facts("verdict", format!("{}", selection.holds())),
+    ];
+    if let Some(chosen) = chosen {
+        all.push(error("errors of the selected body", vec![chosen.worst]));
+    }
+    let sizes = selection.significances.iter().flat_map(|one| [Some(one.bound), one.of_body]);
+    all.push(error("significances", sizes.flatten().collect()));
+    let lacks = selection.lacks.iter().map(|lack| lack.worst);
+    all.push(error("errors of the body", lacks.collect()));
+    all.extend(findings(&selection.diagnostics));
+    Outputs { times: Vec::new(), all }
+}
+
+/// `select` of a body.
+pub fn select_body(subject: &Subject) -> Result<Outputs> {
+    let body = subject.body()?;
+    let selection = select_for_cases(&body, &[], &subject.scenes()?, None, SILENT)?;
+    Ok(outputs(&selection, body.n_modes()))
+}
+
+fn tailoring(subject: &Subject) -> Tailoring {
+    Tailoring { settings: subject.settings(), by_band: false, of_motion: false }
+}
+
+/// `select` of a model.
+pub fn select_model(subject: &Subject) -> Result<Outputs> {
+    let (model, scenes) = (subject.model()?, subject.scenes()?);
+    let enriched = tailoring(subject).convert_for_cases(&model, &scenes, Resume::default(), SILENT)?;
+    let body = &enriched.made.body;
+    let selection = select_for_cases(body, &enriched.rounds, &scenes, None, SILENT)?;
+    Ok(outputs(&selection, body.n_modes()))
+}
+
+/// `convert --scene`.
+pub fn conversion(subject: &Subject) -> Result<Outputs> {
+    let (model, scenes) = (subject.model()?, subject.scenes()?);
+    let (made, selection) =
+        convert_for_cases(&model, &tailoring(subject), &scenes, Resume::default(), SILENT)?;
+    let mut outputs = outputs(&selection, made.body.n_modes());
+    outputs.all.extend(findings(&made.diagnostics).into_iter().map(|output| {
+        let name = format!("{} of the conversion", output.name);
+        crate::outputs::Output { name, ..output }
+    }));
+    let lacks = selection.lacks.last().map(ReferenceError::is_reference);
+    outputs.all.push(facts("reference", format!("{lacks:?}")));
+    Ok(outputs)
+}
+
+/// `trade` of a body beside the motion of all nodes.
+pub fn trading(subject: &Subject) -> Result<Outputs> {
+    let (model, scenes) = (subject.model()?, subject.scenes()?);
+    let settings = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
+    let source = Source::new("body", subject.body()?, None)?;
+    let study = trade_for_cases(&[source], &scenes, Some(&model), &settings, SILENT)?;
+    // Rounded numbers are others in a body that is turned.
+    let exact = |row: &&Row| row.candidate.kind() != Kind::Single;
+    let rows: Vec<&Row> = study.rows.iter().filter(exact).collect();
+    let labels: Vec<String> = rows
+        .iter()
+        .map(|row| format!("{:?} {:?} {}", row.candidate.modes, row.candidate.groups, row.outcome.is_ok()))
+        .collect();
+    let errors = rows.iter().filter_map(|row| row.outcome.as_ref().ok()).map(|measured| measured.worst());
+    let mut all =
+        vec![facts("candidates", labels.join("; ")), error("errors of the candidates", errors.collect())];
+    let recommended = study.recommended.row().map(|row| &study.rows[row].candidate);
+    all.push(facts("recommended", format!("{:?}", recommended.map(|one| (&one.modes, one.groups)))));
+    all.extend(findings(&study.diagnostics));
+    Ok(Outputs { times: Vec::new(), all })
+}

@@ -1,0 +1,214 @@
+//! The runner of the crossings.
+
+use crate::commands;
+use crate::draws::{one_in, pick, stream};
+use crate::features::features;
+use crate::outputs::{Outputs, Violation};
+use crate::scenes;
+use crate::shrink::smallest;
+use crate::subject::Subject;
+use crate::text::Text;
+use crate::transformations::{self, Pair};
+use flexbody::base::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::time::{Duration, Instant};
+
+/// Number of crossings: `FLEXBODY_CROSSINGS`, or `few`.
+pub fn count(few: u64) -> u64 {
+    std::env::var("FLEXBODY_CROSSINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(few)
+}
+
+/// One scene, one transformation, one command.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    seed: u64,
+    transformation: usize,
+    command: usize,
+}
+
+/// Outcome of a crossing.
+enum Outcome {
+    /// The transformation does not apply to the scene.
+    Apart,
+    /// Both subjects are refused for the same reason.
+    Refused(String),
+    /// The outputs correspond, with this part of the allowed difference.
+    Same(f64),
+    /// They do not.
+    Violated(Violation),
+}
+
+/// Codes of an error.
+fn code(error: &Error) -> String {
+    commands::codes(error.diagnostics())
+}
+
+impl Crossing {
+    /// The crossing of a number: transformations and commands take turns.
+    fn of(number: u64) -> Self {
+        let random = &mut stream(number, 7);
+        let transformation = number as usize % transformations::ALL.len();
+        // Half of all is `simulate`, whose outputs say most; a complete basis is no matter of verdicts, which take time
+        // with it, and from a state a scene has other largest values.
+        let only_simulated = ["another complete basis", "start from a state"];
+        let simulated = only_simulated.contains(&transformations::ALL[transformation].0) || one_in(random, 2);
+        let command = if simulated { 0 } else { pick(random, commands::ALL.len()) };
+        Self { seed: number, transformation, command }
+    }
+
+    fn names(&self) -> (&'static str, &'static str) {
+        (transformations::ALL[self.transformation].0, commands::ALL[self.command].0)
+    }
+
+    fn pair(&self, subject: &Subject) -> Result<Option<Pair>> {
+        (transformations::ALL[self.transformation].1)(subject, &mut stream(self.seed, 3))
+    }
+
+    fn run(&self, subject: &Subject) -> Outcome {
+        let command = commands::ALL[self.command].1;
+        let pair = match self.pair(subject) {
+            Ok(Some(pair)) => pair,
+            Ok(None) => return Outcome::Apart,
+            Err(error) => return Outcome::Refused(code(&error)),
+        };
+        let violated = |detail: String| {
+            Outcome::Violated(Violation { output: "outcome".to_owned(), size: f64::INFINITY, detail })
+        };
+        let (own, other): (Result<Outputs>, Result<Outputs>) =
+            (command(&pair.original), command(&pair.changed));
+        match (own, other) {
+            (Ok(own), Ok(other)) => match own.compare(&other, &pair.map) {
+                (_, Some(violation)) => Outcome::Violated(violation),
+                (size, None) => Outcome::Same(size),
+            },
+            (Err(own), Err(other)) if code(&own) == code(&other) => Outcome::Refused(code(&own)),
+            (Err(own), Err(other)) => violated(format!("refused by `{own}` and by `{other}`")),
+            (Ok(_), Err(other)) => violated(format!("the changed scene is refused: {other}")),
+            (Err(own), Ok(_)) => violated(format!("the original scene is refused: {own}")),
+        }
+    }
+
+    /// A violation with the smallest scene that shows it.
+    fn told(&self, subject: &Subject, found: &Violation) -> String {
+        let fails = |subject: &Subject| matches!(self.run(subject), Outcome::Violated(other) if other.output == found.output);
+        let small = smallest(subject, fails);
+        let (transformation, command) = self.names();
+        let mut told = format!(
+            "crossing {}: {transformation} x {command}: {}, {:.1e} times what is allowed: {}\nbody: {}, {:?}, frame {:?}\nfeatures: {}\n",
+            self.seed,
+            found.output,
+            found.size,
+            found.detail,
+            small.kind,
+            small.basis,
+            small.frame,
+            features(&small).join(", ")
+        );
+        let changed = self.pair(&small).ok().flatten().map(|pair| pair.changed.scene);
+        for (name, scene) in [("scene", Some(small.scene)), ("changed scene", changed)] {
+            let Some(scene) = scene else { continue };
+            let text = Text::of(&scene);
+            let _ = writeln!(told, "--- {name}\n{}", text.scene);
+            for (name, table) in text.tables {
+                let _ = writeln!(told, "--- {name}\n{table}");
+            }
+        }
+        told
+    }
+}
+
+/// Counts and violations of many crossings.
+#[derive(Default)]
+struct Matrix {
+    /// Crossings of feature and transformation.
+    counts: BTreeMap<(&'static str, &'static str), usize>,
+    /// Crossings of transformation and command.
+    commands: BTreeMap<(&'static str, &'static str), usize>,
+    /// Largest differences by transformation.
+    largest: BTreeMap<&'static str, f64>,
+    refused: BTreeMap<String, usize>,
+    apart: usize,
+    scenes: usize,
+    violations: Vec<String>,
+}
+
+impl Matrix {
+    fn run(&mut self, number: u64) {
+        let crossing = Crossing::of(number);
+        let subject = match scenes::subject(number) {
+            Ok(subject) => subject,
+            Err(error) => return *self.refused.entry(code(&error)).or_default() += 1,
+        };
+        let (transformation, command) = crossing.names();
+        match crossing.run(&subject) {
+            Outcome::Apart => self.apart += 1,
+            Outcome::Refused(code) => *self.refused.entry(code).or_default() += 1,
+            Outcome::Same(size) => {
+                self.scenes += 1;
+                let largest = self.largest.entry(transformation).or_default();
+                *largest = largest.max(size);
+                *self.commands.entry((transformation, command)).or_default() += 1;
+                for feature in features(&subject) {
+                    *self.counts.entry((feature, transformation)).or_default() += 1;
+                }
+            }
+            Outcome::Violated(violation) => self.violations.push(crossing.told(&subject, &violation)),
+        }
+    }
+
+    /// The counts as a table.
+    fn table(&self) -> String {
+        let mut table = String::new();
+        let crossings: usize = self.counts.values().sum();
+        let _ = writeln!(
+            table,
+            "{} scenes, {crossings} crossings of feature and transformation, {} where the transformation does not apply, refused: {:?}",
+            self.scenes, self.apart, self.refused
+        );
+        let mut features: Vec<&str> = self.counts.keys().map(|(feature, _)| *feature).collect();
+        features.dedup();
+        for (i, (name, _)) in transformations::ALL.iter().enumerate() {
+            let largest = self.largest.get(name).copied().unwrap_or(0.0);
+            let by_command: Vec<String> = commands::ALL
+                .iter()
+                .map(|(command, _)| {
+                    format!("{command} {}", self.commands.get(&(*name, *command)).unwrap_or(&0))
+                })
+                .collect();
+            let _ = writeln!(
+                table,
+                "{i:>2} {name}: {}; largest difference {largest:.1e} of what is allowed",
+                by_command.join(", ")
+            );
+        }
+        for feature in features {
+            let row: String = transformations::ALL
+                .iter()
+                .map(|(name, _)| format!("{:>4}", self.counts.get(&(feature, *name)).unwrap_or(&0)))
+                .collect();
+            let _ = writeln!(table, "{feature:>24}{row}");
+        }
+        table
+    }
+}
+
+/// Runs so many crossings from number `first` on.
+///
+/// # Panics
+/// With the smallest scene of every violation.
+pub fn hold(first: u64, crossings: u64) {
+    let started = Instant::now();
+    let mut matrix = Matrix::default();
+    for number in first..first + crossings {
+        let before = Instant::now();
+        matrix.run(number);
+        let took = before.elapsed();
+        if took > Duration::from_secs(5) {
+            println!("crossing {number} {:?} took {took:.1?}", Crossing::of(number).names());
+        }
+    }
+    println!("{}{:.1?}", matrix.table(), started.elapsed());
+    let Matrix { violations, .. } = matrix;
+    assert!(violations.is_empty(), "{} violations:\n{}", violations.len(), violations.join("\n"));
+}

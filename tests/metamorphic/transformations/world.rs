@@ -1,0 +1,94 @@
+//! Transformations of the world.
+
+use super::Pair;
+use super::moved::Motion;
+use crate::correspondence::Correspondence;
+use crate::draws::{axis, between, direction};
+use crate::subject::Subject;
+use crate::support::random::Random;
+use flexbody::base::error::Result;
+use flexbody::motion::dynamics::{Orientation, RotationVector};
+use flexbody::motion::scene::{Drive, History, VectorHistory};
+use nalgebra::{Matrix3, Vector3};
+
+/// A random turn, of a plane model in its plane.
+pub fn turning(subject: &Subject, random: &mut Random) -> Matrix3<f64> {
+    let turn = axis(random, subject.dimension()) * between(random, 0.2, 3.0);
+    RotationVector(turn).axes()
+}
+
+/// Turns the world about its origin.
+pub fn turn(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    let world = turning(subject, random);
+    let map = Correspondence { world, ..Correspondence::default() };
+    Ok(Some(Pair::new(subject, Motion::of_world(world).applied(subject), map)))
+}
+
+/// Shifts the world.
+pub fn shift(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    let by = direction(random, subject.dimension()) * (3.0 * extent(subject));
+    let mut changed = subject.clone();
+    changed.scene.initial.origin += by;
+    let shift = [by, Vector3::zeros(), Vector3::zeros()];
+    Ok(Some(Pair::new(subject, changed, Correspondence { shift, ..Correspondence::default() })))
+}
+
+/// Sees the motion from an observer at constant velocity.
+pub fn boost(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    let Some(duration) = subject.scene.run.duration else { return Ok(None) };
+    let by = direction(random, subject.dimension()) * (extent(subject) / duration);
+    let mut changed = subject.clone();
+    let held = subject.scene.spin.as_ref().is_some_and(|spin| spin.hold);
+    match &mut changed.scene.carried {
+        _ if held => return Ok(None),
+        None => changed.scene.initial.velocity += by,
+        Some(carried) => {
+            let faster = match carried.translation.take() {
+                None => Drive::Velocity(VectorHistory::constant(by)),
+                // A motion in other directions has columns; those of a constant have no direction of their own.
+                Some(_) => return Ok(None),
+            };
+            carried.translation = Some(faster);
+        }
+    }
+    let shift = [Vector3::zeros(), by, Vector3::zeros()];
+    Ok(Some(Pair::new(subject, changed, Correspondence { shift, ..Correspondence::default() })))
+}
+
+/// Sees the motion from an observer that falls: uniform gravity and an acceleration of what carries the body are one.
+pub fn accelerate(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
+    let Some(gravity) = subject.scene.gravity else { return Ok(None) };
+    let held = subject.scene.spin.as_ref().is_some_and(|spin| spin.hold);
+    let mut changed = subject.clone();
+    changed.scene.gravity = None;
+    match &mut changed.scene.carried {
+        _ if held => return Ok(None),
+        None => {}
+        Some(carried) if carried.translation.is_none() => {
+            let (direction, factor) = (-gravity, History::Constant(1.0));
+            carried.translation = Some(Drive::Acceleration(VectorHistory::Along { direction, factor }));
+        }
+        Some(_) => return Ok(None),
+    }
+    let shift = [Vector3::zeros(), Vector3::zeros(), -gravity];
+    Ok(Some(Pair::new(subject, changed, Correspondence { shift, ..Correspondence::default() })))
+}
+
+/// Mirrors the world and the model in planes of their own.
+pub fn mirror(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    let image = |random: &mut Random| {
+        let normal = direction(random, subject.dimension());
+        Matrix3::identity() - normal * normal.transpose() * 2.0
+    };
+    let (world, model) = (image(random), image(random));
+    let motion = Motion { world, model, shift: Vector3::zeros() };
+    let map = Correspondence { world, model, ..Correspondence::default() };
+    Ok(Some(Pair::new(subject, motion.applied(subject), map)))
+}
+
+/// Largest distance of two nodes along an axis of the model.
+pub fn extent(subject: &Subject) -> f64 {
+    let along = |k: usize| subject.raw.nodes.positions.iter().map(move |x| x[k]);
+    let width = |k: usize| along(k).fold(f64::MIN, f64::max) - along(k).fold(f64::MAX, f64::min);
+    (0..3).map(width).fold(0.0, f64::max)
+}
