@@ -19,6 +19,9 @@ pub fn count(few: u64) -> u64 {
     std::env::var("FLEXBODY_CROSSINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(few)
 }
 
+/// Longest search for the smallest scene of a violation.
+const LONGEST: Duration = Duration::from_secs(40);
+
 /// One scene, one transformation, one command.
 #[derive(Debug, Clone, Copy)]
 struct Crossing {
@@ -33,10 +36,15 @@ enum Outcome {
     Apart,
     /// Both subjects are refused for the same reason.
     Refused(String),
-    /// The outputs correspond, with this part of the allowed difference.
-    Same(f64),
+    /// The outputs correspond, with this part of the allowed difference; an output that is open may not.
+    Same(f64, Option<Violation>),
     /// They do not.
     Violated(Violation),
+}
+
+/// True of an output that is known to depend on axes.
+fn is_open(name: &str) -> bool {
+    commands::OPEN.iter().any(|open| name.contains(open))
 }
 
 /// Codes of an error.
@@ -78,9 +86,9 @@ impl Crossing {
         let (own, other): (Result<Outputs>, Result<Outputs>) =
             (command(&pair.original), command(&pair.changed));
         match (own, other) {
-            (Ok(own), Ok(other)) => match own.compare(&other, &pair.map) {
+            (Ok(own), Ok(other)) => match own.compare(&other, &pair.map, |name| !is_open(name)) {
                 (_, Some(violation)) => Outcome::Violated(violation),
-                (size, None) => Outcome::Same(size),
+                (size, None) => Outcome::Same(size, own.compare(&other, &pair.map, is_open).1),
             },
             (Err(own), Err(other)) if code(&own) == code(&other) => Outcome::Refused(code(&own)),
             (Err(own), Err(other)) => violated(format!("refused by `{own}` and by `{other}`")),
@@ -91,7 +99,11 @@ impl Crossing {
 
     /// A violation with the smallest scene that shows it.
     fn told(&self, subject: &Subject, found: &Violation) -> String {
-        let fails = |subject: &Subject| matches!(self.run(subject), Outcome::Violated(other) if other.output == found.output);
+        let started = Instant::now();
+        let fails = |subject: &Subject| {
+            started.elapsed() < LONGEST
+                && matches!(self.run(subject), Outcome::Violated(other) if other.output == found.output)
+        };
         let small = smallest(subject, fails);
         let (transformation, command) = self.names();
         let mut told = format!(
@@ -130,6 +142,8 @@ struct Matrix {
     refused: BTreeMap<String, usize>,
     apart: usize,
     scenes: usize,
+    /// Differences of open outputs by output and transformation: their number, and the first with its crossing.
+    open: BTreeMap<(String, &'static str), (usize, u64, String)>,
     violations: Vec<String>,
 }
 
@@ -144,8 +158,13 @@ impl Matrix {
         match crossing.run(&subject) {
             Outcome::Apart => self.apart += 1,
             Outcome::Refused(code) => *self.refused.entry(code).or_default() += 1,
-            Outcome::Same(size) => {
+            Outcome::Same(size, open) => {
                 self.scenes += 1;
+                if let Some(open) = open {
+                    let first =
+                        self.open.entry((open.output, transformation)).or_insert((0, number, open.detail));
+                    first.0 += 1;
+                }
                 let largest = self.largest.entry(transformation).or_default();
                 *largest = largest.max(size);
                 *self.commands.entry((transformation, command)).or_default() += 1;
@@ -166,6 +185,12 @@ impl Matrix {
             "{} scenes, {crossings} crossings of feature and transformation, {} where the transformation does not apply, refused: {:?}",
             self.scenes, self.apart, self.refused
         );
+        for ((output, transformation), (count, first, detail)) in &self.open {
+            let _ = writeln!(
+                table,
+                "open: {output} x {transformation}: {count}, first in crossing {first}: {detail}"
+            );
+        }
         let mut features: Vec<&str> = self.counts.keys().map(|(feature, _)| *feature).collect();
         features.dedup();
         for (i, (name, _)) in transformations::ALL.iter().enumerate() {

@@ -134,11 +134,16 @@ impl Values {
 }
 
 impl Outputs {
-    /// The worst violation of `map` by the outputs `found` of a transformed subject, and the largest difference over
-    /// the allowed one.
-    pub fn compare(&self, found: &Self, map: &Correspondence) -> (f64, Option<Violation>) {
+    /// The worst violation of `map` by the outputs `found` of a transformed subject, among those whose name `counts`,
+    /// and the largest difference over the allowed one.
+    pub fn compare(
+        &self,
+        found: &Self,
+        map: &Correspondence,
+        counts: impl Fn(&str) -> bool,
+    ) -> (f64, Option<Violation>) {
         let mut worst = (0.0f64, None);
-        for own in &self.all {
+        for own in self.all.iter().filter(|own| counts(&own.name)) {
             if !own.by_instant && !map.whole {
                 continue;
             }

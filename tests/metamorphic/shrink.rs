@@ -69,9 +69,6 @@ fn simpler_scenes(scene: &Scene) -> Vec<Scene> {
         spins.for_each(|spin| spin.through = None);
     };
     with(&through);
-    with(&|simpler| {
-        drop(simpler.watched.pop());
-    });
     with(&|simpler| for_histories(simpler, constant));
     if scene.run.outputs > 2 {
         with(&|simpler| simpler.run.outputs = 2);

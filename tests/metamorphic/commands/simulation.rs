@@ -137,7 +137,12 @@ fn largest(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
     let energy = sizes.mass * (sizes.deflection * sizes.highest).powi(2);
     let turning = sizes.deflection / sizes.extent * sizes.highest;
     outputs.all.extend([
-        peak("largest deflection", [0; 3], extremes.deflection.value, sizes.deflection / sizes.extent),
+        peak(
+            "largest deflection of the body",
+            [0; 3],
+            extremes.deflection.value,
+            sizes.deflection / sizes.extent,
+        ),
         peak("largest elastic energy", ENERGY, extremes.elastic, energy),
         peak("largest spin", RATE, extremes.spin, turning),
         peak("largest reaction force", FORCE, extremes.reaction.0, sizes.force()),

@@ -1,7 +1,7 @@
 //! `select`, `trade` and `convert --scene`.
 
 use super::{error, facts, findings};
-use crate::outputs::Outputs;
+use crate::outputs::{Output, Outputs};
 use crate::subject::Subject;
 use flexbody::base::error::Result;
 use flexbody::base::progress::SILENT;
@@ -22,8 +22,11 @@ fn outputs(selection: &Selection, modes: usize) -> Outputs {
     if let Some(chosen) = chosen {
         all.push(error("errors of the selected body", vec![chosen.worst]));
     }
-    let sizes = selection.significances.iter().flat_map(|one| [Some(one.bound), one.of_body]);
+    // The last is a torque beside a rate of the angular momentum "per unit of time".
+    let (last, others) = selection.significances.split_last().expect("terms");
+    let sizes = others.iter().flat_map(|one| [Some(one.bound), one.of_body]);
     all.push(error("significances", sizes.flatten().collect()));
+    all.push(Output { unit: [0, 0, -1], ..error("significance of the Coriolis torque", vec![last.bound]) });
     let lacks = selection.lacks.iter().map(|lack| lack.worst);
     all.push(error("errors of the body", lacks.collect()));
     all.extend(findings(&selection.diagnostics));
@@ -58,7 +61,7 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
     let mut outputs = outputs(&selection, made.body.n_modes());
     outputs.all.extend(findings(&made.diagnostics).into_iter().map(|output| {
         let name = format!("{} of the conversion", output.name);
-        crate::outputs::Output { name, ..output }
+        Output { name, ..output }
     }));
     let lacks = selection.lacks.last().map(ReferenceError::is_reference);
     outputs.all.push(facts("reference", format!("{lacks:?}")));

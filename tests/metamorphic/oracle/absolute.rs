@@ -179,14 +179,23 @@ impl Absolute {
         (all, Some(reaction))
     }
 
-    /// Force and torque about the origin of the frame, along its axes, that the conditions take.
-    pub fn reaction(&self, time: f64, state: &State) -> Option<(Vector3<f64>, Vector3<f64>)> {
+    /// Force and torque about the origin of the frame, along its axes, that the prescribed motion takes: what the
+    /// conditions carry, and the moment of the elastic forces, which a frame that carries K leaves; and that moment.
+    pub fn reaction(&self, time: f64, state: &State) -> Option<(Vector3<f64>, Vector3<f64>, Vector3<f64>)> {
         let forces = self.accelerations(time, state).1?;
-        let frame = self.conditions.as_ref()?.frame.at(time);
+        let held = self.conditions.as_ref()?;
+        let frame = held.frame.at(time);
+        let elastic = match held.carries {
+            true => self.solid.carried_force(&state.x, &frame.axes),
+            false => self.solid.fitted_force(&state.x, &self.fit).0,
+        };
         let arm = |i: usize| frame.axes.tr_mul(&(node(&state.x, i) - frame.origin));
-        let n = self.solid.places.len();
-        let force = (0..n).map(|i| node(&forces, i)).sum();
-        Some((force, (0..n).map(|i| arm(i).cross(&node(&forces, i))).sum()))
+        let nodes = 0..self.solid.places.len();
+        let moment: Vector3<f64> =
+            nodes.clone().map(|i| arm(i).cross(&frame.axes.tr_mul(&node(&elastic, i)))).sum();
+        let force = nodes.clone().map(|i| node(&forces, i)).sum();
+        let torque = nodes.map(|i| arm(i).cross(&node(&forces, i))).sum::<Vector3<f64>>();
+        Some((force, torque + moment, moment))
     }
 
     /// The undeformed body: the model at `origin` + A x, the centre of mass moving with `velocity`, all of it turning
