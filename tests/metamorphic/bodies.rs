@@ -1,6 +1,7 @@
 //! Random bodies: solids, plane bodies, nodes with rotations, singular mass matrices.
 
 use crate::draws::{between, one_in, pick};
+use crate::stress::of_spin;
 use crate::support::beams::{BeamMass, elbow, star};
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::general::raw_fixture;
@@ -62,9 +63,14 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
     let border = 0.5 * size[0];
     let stiff = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let soft = Material { youngs: between(random, 0.5, 4.0), density: between(random, 0.3, 3.0), ..stiff };
-    let left = mesh.part(|node| node[0] < border).assemble(&stiff, rule);
-    let right = mesh.part(|node| node[0] >= border).assemble(&soft, rule);
-    left.plus(&right).raw_model()
+    let parts = [(mesh.part(|node| node[0] < border), stiff), (mesh.part(|node| node[0] >= border), soft)];
+    let [left, right] = parts.each_ref().map(|(part, material)| part.assemble(material, rule));
+    let raw = left.plus(&right).raw_model();
+    let geometric_stiffness = match rule == MassRule::Consistent && one_in(random, 3) {
+        true => of_spin(&raw, &parts),
+        false => Vec::new(),
+    };
+    RawModel { geometric_stiffness, ..raw }
 }
 
 /// The model with interfaces `root` and `tip` of its nodes of least and largest x; `by_node`: the root is its last

@@ -1,7 +1,7 @@
 //! Features of a scene, each of which can be told and taken away.
 
 use crate::subject::Subject;
-use flexbody::motion::scene::{Drive, History, Load, Point, VectorHistory};
+use flexbody::motion::scene::{Attachment, Drive, History, Load, Point, VectorHistory};
 use nalgebra::Vector3;
 
 /// Names of the features of a subject, ascending.
@@ -9,6 +9,8 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
     let scene = &subject.scene;
     let initial = &scene.initial;
     let carried_spin = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+    let spin_start = scene.spin.as_ref().and_then(|spin| spin.start);
+    let carried_start = carried_spin.and_then(|spin| spin.start);
     let drive = scene.carried.as_ref().and_then(|carried| carried.translation.as_ref());
     let world = |axes| axes == flexbody::motion::scene::Axes::World;
     let all = || scene.acting().chain(scene.driving()).filter(|history| !history.is_nothing());
@@ -47,7 +49,10 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
         ("damping of the model", subject.raw.damping.is_some()),
         ("geometric stiffness", !subject.raw.geometric_stiffness.is_empty()),
         ("reaction", scene.prescribes()),
-        ("several cases", subject.cases > 1),
+        ("several cases", subject.cases > 1 || subject.second.is_some()),
+        ("attachment", scene.requirements.attachment != Attachment::default()),
+        ("faster rotation allowed", scene.requirements.motion.angular_velocity.is_some()),
+        ("attitude over time", spin_start.or(carried_start).is_some()),
         ("rotations of nodes", subject.raw.dofs.iter().flatten().any(|label| label.direction > 3)),
         ("plane", subject.raw.dimension == 2),
         ("singular mass", subject.kind.contains("singular") || subject.kind.contains("massless")),

@@ -14,6 +14,7 @@ mod oracle;
 mod outputs;
 mod scenes;
 mod shrink;
+mod stress;
 mod subject;
 mod text;
 mod transformations;
@@ -26,11 +27,11 @@ const MANY: u64 = 200;
 
 #[test]
 fn crossings_keep_the_physics() {
-    matrix::hold(1, matrix::count(FEW));
+    matrix::hold(1, FEW);
 }
 
 #[test]
 #[ignore = "slow"]
 fn many_crossings_keep_the_physics() {
-    matrix::hold(1000, matrix::count(MANY));
+    matrix::hold(1000, MANY);
 }

@@ -1,6 +1,6 @@
 //! The runner of the crossings.
 
-use crate::commands;
+use crate::commands::{self, Command};
 use crate::draws::{one_in, pick, stream};
 use crate::features::features;
 use crate::outputs::{Outputs, Violation};
@@ -8,19 +8,24 @@ use crate::scenes;
 use crate::shrink::smallest;
 use crate::subject::Subject;
 use crate::text::Text;
-use crate::transformations::{self, Pair};
+use crate::transformations::{self, Pair, Transformation};
 use flexbody::base::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::fmt::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Number of crossings: `FLEXBODY_CROSSINGS`, or `few`.
-pub fn count(few: u64) -> u64 {
-    std::env::var("FLEXBODY_CROSSINGS").ok().and_then(|count| count.parse().ok()).unwrap_or(few)
+/// The value of an environment variable, or `usual`.
+fn asked(name: &str, usual: u64) -> u64 {
+    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
 }
 
 /// Longest search for the smallest scene of a violation.
 const LONGEST: Duration = Duration::from_secs(40);
+
+/// Crossings that take longer are named.
+const SLOW: Duration = Duration::from_secs(5);
 
 /// One scene, one transformation, one command.
 #[derive(Debug, Clone, Copy)]
@@ -53,28 +58,35 @@ fn code(error: &Error) -> String {
 }
 
 impl Crossing {
-    /// The crossing of a number: transformations and commands take turns.
+    /// The crossing of a number: transformations take turns, and half of all is `simulate`, whose outputs say most.
     fn of(number: u64) -> Self {
         let random = &mut stream(number, 7);
         let transformation = number as usize % transformations::ALL.len();
-        // Half of all is `simulate`, whose outputs say most; a complete basis is no matter of verdicts, which take time
-        // with it, and from a state a scene has other largest values.
-        let only_simulated = ["another complete basis", "start from a state"];
-        let simulated = only_simulated.contains(&transformations::ALL[transformation].0) || one_in(random, 2);
-        let command = if simulated { 0 } else { pick(random, commands::ALL.len()) };
+        let Transformation { reach, .. } = transformations::ALL[transformation];
+        let met: Vec<usize> = (0..commands::ALL.len()).filter(|&i| (commands::ALL[i].meets)(reach)).collect();
+        let command = if one_in(random, 2) { 0 } else { met[pick(random, met.len())] };
         Self { seed: number, transformation, command }
     }
 
     fn names(&self) -> (&'static str, &'static str) {
-        (transformations::ALL[self.transformation].0, commands::ALL[self.command].0)
+        (transformations::ALL[self.transformation].name, commands::ALL[self.command].name)
     }
 
+    /// The pair of the scene, with the second case transformed alike.
     fn pair(&self, subject: &Subject) -> Result<Option<Pair>> {
-        (transformations::ALL[self.transformation].1)(subject, &mut stream(self.seed, 3))
+        let of = |subject: &Subject| {
+            (transformations::ALL[self.transformation].apply)(subject, &mut stream(self.seed, 3))
+        };
+        let Some(second) = &subject.second else { return of(subject) };
+        let alone = Subject { scene: second.clone(), second: None, ..subject.clone() };
+        let (Some(mut pair), Some(other)) = (of(subject)?, of(&alone)?) else { return Ok(None) };
+        pair.original.second = Some(other.original.scene);
+        pair.changed.second = Some(other.changed.scene);
+        Ok(Some(pair))
     }
 
     fn run(&self, subject: &Subject) -> Outcome {
-        let command = commands::ALL[self.command].1;
+        let command = commands::ALL[self.command].run;
         let pair = match self.pair(subject) {
             Ok(Some(pair)) => pair,
             Ok(None) => return Outcome::Apart,
@@ -130,6 +142,32 @@ impl Crossing {
     }
 }
 
+/// A crossing that was run.
+struct Run {
+    /// Features of the scene.
+    features: Vec<&'static str>,
+    /// The outcome; of a violation with the smallest scene in its detail.
+    outcome: Outcome,
+}
+
+impl Run {
+    fn of(number: u64) -> Self {
+        let crossing = Crossing::of(number);
+        let subject = match scenes::subject(number) {
+            Ok(subject) => subject,
+            Err(error) => return Self { features: Vec::new(), outcome: Outcome::Refused(code(&error)) },
+        };
+        let outcome = match crossing.run(&subject) {
+            Outcome::Violated(found) => {
+                let detail = crossing.told(&subject, &found);
+                Outcome::Violated(Violation { detail, ..found })
+            }
+            outcome => outcome,
+        };
+        Self { features: features(&subject), outcome }
+    }
+}
+
 /// Counts and violations of many crossings.
 #[derive(Default)]
 struct Matrix {
@@ -148,31 +186,24 @@ struct Matrix {
 }
 
 impl Matrix {
-    fn run(&mut self, number: u64) {
-        let crossing = Crossing::of(number);
-        let subject = match scenes::subject(number) {
-            Ok(subject) => subject,
-            Err(error) => return *self.refused.entry(code(&error)).or_default() += 1,
-        };
-        let (transformation, command) = crossing.names();
-        match crossing.run(&subject) {
+    fn add(&mut self, number: u64, run: Run) {
+        let (transformation, command) = Crossing::of(number).names();
+        match run.outcome {
             Outcome::Apart => self.apart += 1,
             Outcome::Refused(code) => *self.refused.entry(code).or_default() += 1,
             Outcome::Same(size, open) => {
                 self.scenes += 1;
-                if let Some(open) = open {
-                    let first =
-                        self.open.entry((open.output, transformation)).or_insert((0, number, open.detail));
-                    first.0 += 1;
+                if let Some(Violation { output, detail, .. }) = open {
+                    self.open.entry((output, transformation)).or_insert((0, number, detail)).0 += 1;
                 }
                 let largest = self.largest.entry(transformation).or_default();
                 *largest = largest.max(size);
                 *self.commands.entry((transformation, command)).or_default() += 1;
-                for feature in features(&subject) {
+                for feature in run.features {
                     *self.counts.entry((feature, transformation)).or_default() += 1;
                 }
             }
-            Outcome::Violated(violation) => self.violations.push(crossing.told(&subject, &violation)),
+            Outcome::Violated(violation) => self.violations.push(violation.detail),
         }
     }
 
@@ -193,11 +224,11 @@ impl Matrix {
         }
         let mut features: Vec<&str> = self.counts.keys().map(|(feature, _)| *feature).collect();
         features.dedup();
-        for (i, (name, _)) in transformations::ALL.iter().enumerate() {
+        for (i, Transformation { name, .. }) in transformations::ALL.iter().enumerate() {
             let largest = self.largest.get(name).copied().unwrap_or(0.0);
             let by_command: Vec<String> = commands::ALL
                 .iter()
-                .map(|(command, _)| {
+                .map(|Command { name: command, .. }| {
                     format!("{command} {}", self.commands.get(&(*name, *command)).unwrap_or(&0))
                 })
                 .collect();
@@ -210,7 +241,9 @@ impl Matrix {
         for feature in features {
             let row: String = transformations::ALL
                 .iter()
-                .map(|(name, _)| format!("{:>4}", self.counts.get(&(feature, *name)).unwrap_or(&0)))
+                .map(|Transformation { name, .. }| {
+                    format!("{:>4}", self.counts.get(&(feature, *name)).unwrap_or(&0))
+                })
                 .collect();
             let _ = writeln!(table, "{feature:>24}{row}");
         }
@@ -218,21 +251,37 @@ impl Matrix {
     }
 }
 
-/// Runs so many crossings from number `first` on.
+/// Runs `few` crossings from number `first` on, or those that `FLEXBODY_CROSSINGS` and `FLEXBODY_FIRST_CROSSING` ask for.
 ///
 /// # Panics
 /// With the smallest scene of every violation.
-pub fn hold(first: u64, crossings: u64) {
+pub fn hold(first: u64, few: u64) {
+    let (first, crossings) = (asked("FLEXBODY_FIRST_CROSSING", first), asked("FLEXBODY_CROSSINGS", few));
     let started = Instant::now();
-    let mut matrix = Matrix::default();
-    for number in first..first + crossings {
-        let before = Instant::now();
-        matrix.run(number);
-        let took = before.elapsed();
-        if took > Duration::from_secs(5) {
-            println!("crossing {number} {:?} took {took:.1?}", Crossing::of(number).names());
+    let (next, matrix) = (AtomicU64::new(first), Mutex::new(Matrix::default()));
+    let work = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if number >= first + crossings {
+                return;
+            }
+            let before = Instant::now();
+            let run = Run::of(number);
+            let took = before.elapsed();
+            if took > SLOW {
+                println!("crossing {number} {:?} took {took:.1?}", Crossing::of(number).names());
+            }
+            if let Outcome::Violated(violation) = &run.outcome {
+                println!("{}", violation.detail);
+            }
+            matrix.lock().expect("no panic").add(number, run);
         }
-    }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(work);
+        scope.spawn(work);
+    });
+    let matrix = matrix.into_inner().expect("no panic");
     println!("{}{:.1?}", matrix.table(), started.elapsed());
     let Matrix { violations, .. } = matrix;
     assert!(violations.is_empty(), "{} violations:\n{}", violations.len(), violations.join("\n"));

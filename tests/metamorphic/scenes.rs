@@ -9,11 +9,12 @@ use flexbody::base::error::Result;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::model::RawModel;
+use flexbody::motion::dynamics::RotationVector;
 use flexbody::motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, Point, Samples, Scene, Scheme,
-    Spin, Tolerance, VectorHistory, trace,
+    AttachmentKind, Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, Point, Range,
+    Samples, Scene, Scheme, Spin, Tolerance, VectorHistory, trace,
 };
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 
 /// Largest deflection by the loads, relative to the extent of the body.
@@ -32,6 +33,8 @@ struct Scales<'r> {
     rate: f64,
     /// Extent of the body.
     extent: f64,
+    /// Mass of the body times the square of its extent.
+    inertia: f64,
     /// Duration of the scene.
     duration: f64,
     /// Number of dimensions.
@@ -48,28 +51,33 @@ pub fn subject(seed: u64) -> Result<Subject> {
     let raw = bodies::body(kind, random);
     let scene = nothing_happens("crossing", 1.0, TOLERANCE);
     let frame = BodyFrame::ALL[pick(random, BodyFrame::ALL.len())];
-    let mut subject = Subject {
+    let subject = Subject {
         kind: KINDS[kind],
         raw,
         basis: Basis::Lowest(MODES),
         frame,
         scene,
         cases: 1,
+        second: None,
         stored: false,
         written: false,
     };
     let probe = subject.body()?;
     let rate = probe.modes().eigenvalue[0].sqrt();
     let duration = between(random, 0.5, 1.5) * TAU / rate;
-    let mut scales = Scales {
-        rate,
-        extent: probe.extent(),
-        duration,
-        dimension: subject.dimension(),
-        random: &mut stream(seed, 2),
+    let scene_of = |purpose: u64, duration: f64| {
+        let random = &mut stream(seed, purpose);
+        let dimension = subject.dimension();
+        let inertia = probe.invariants().mass() * probe.extent().powi(2);
+        Scales { rate, extent: probe.extent(), inertia, duration, dimension, random }
+            .scene(&subject.raw, &probe)
     };
-    subject.scene = scales.scene(&subject.raw, &probe)?;
-    Ok(subject)
+    let scene = scene_of(2, duration)?;
+    let second = match one_in(random, 5) {
+        true => Some(Scene { name: "second".to_owned(), ..scene_of(4, 0.7 * duration)? }),
+        false => None,
+    };
+    Ok(Subject { scene, second, ..subject })
 }
 
 impl Scales<'_> {
@@ -112,11 +120,32 @@ impl Scales<'_> {
             1 => {
                 let hold = one_in(self.random, 2);
                 let (velocity_of_spin, axes) = self.turning(speed);
-                scene.spin = Some(Spin { velocity: velocity_of_spin, axes, start: None, hold });
+                let start = self.attitude(&velocity_of_spin, axes, scene);
+                scene.spin = Some(Spin { velocity: velocity_of_spin, axes, start, hold });
                 scene.initial.velocity = if hold { Vector3::zeros() } else { velocity };
             }
-            _ => scene.carried = Some(self.carried(speed, raw)),
+            _ => {
+                let mut carried = self.carried(speed, raw);
+                if let Some(spin) = &mut carried.spin {
+                    spin.start = self.attitude(&spin.velocity, spin.axes, scene);
+                }
+                scene.carried = Some(carried);
+            }
         }
+    }
+
+    /// The attitude at the start that `attitude_from` has, for columns along axes of the model.
+    fn attitude(
+        &mut self,
+        velocity: &VectorHistory,
+        axes: Axes,
+        scene: &mut Scene,
+    ) -> Option<RotationVector> {
+        if velocity.direction().is_some() || axes != Axes::Model {
+            return None;
+        }
+        scene.initial.rotation = Vector3::zeros();
+        Some(RotationVector(axis(self.random, self.dimension) * between(self.random, 0.1, 2.5)))
     }
 
     /// An angular velocity of about this size over time, and its axes.
@@ -234,6 +263,18 @@ impl Scales<'_> {
     /// Damping of the scene, and tolerances.
     fn demands(&mut self, scene: &mut Scene) {
         scene.requirements.damping = one_in(self.random, 3).then_some(0.02);
+        if one_in(self.random, 4) {
+            // Above the rates of all scenes.
+            scene.requirements.motion.angular_velocity = Some(Range::Any(0.15 * self.rate));
+        }
+        if one_in(self.random, 4) {
+            let attachment = &mut scene.requirements.attachment;
+            attachment.kind =
+                [AttachmentKind::Free, AttachmentKind::Soft, AttachmentKind::Stiff][pick(self.random, 3)];
+            let moments = self.random.vector::<3>().map(|x| (1.0 + 0.5 * x) * 0.05 * self.inertia);
+            attachment.inertia = Matrix3::from_diagonal(&Vector3::from(moments));
+            attachment.first_frequency = one_in(self.random, 2).then_some(0.8 * self.rate / TAU);
+        }
         let tolerance = 10f64.powf(between(self.random, -2.3, -0.8));
         scene.requirements.tolerance = Tolerance {
             attitude: tolerance,

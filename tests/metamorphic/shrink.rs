@@ -1,7 +1,7 @@
 //! The smallest scene that still shows a violation.
 
 use crate::subject::{Basis, Subject};
-use flexbody::motion::scene::{Axes, History, Scene, VectorHistory};
+use flexbody::motion::scene::{Attachment, Axes, History, MotionRange, Scene, VectorHistory};
 use nalgebra::Vector3;
 
 /// Drops features as long as `fails` holds; gives the last subject for which it does.
@@ -26,6 +26,9 @@ fn simplifications(subject: &Subject) -> Vec<Subject> {
     };
     if subject.raw.damping.is_some() {
         model(&|simpler| simpler.raw.damping = None);
+    }
+    if subject.second.is_some() {
+        model(&|simpler| simpler.second = None);
     }
     if !subject.raw.geometric_stiffness.is_empty() {
         model(&|simpler| simpler.raw.geometric_stiffness.clear());
@@ -55,6 +58,8 @@ fn simpler_scenes(scene: &Scene) -> Vec<Scene> {
     }
     with(&|simpler| simpler.gravity = None);
     with(&|simpler| simpler.requirements.damping = None);
+    with(&|simpler| simpler.requirements.motion = MotionRange::default());
+    with(&|simpler| simpler.requirements.attachment = Attachment::default());
     with(&|simpler| simpler.initial.settled = false);
     with(&|simpler| simpler.initial.origin = Vector3::zeros());
     with(&|simpler| simpler.initial.velocity = Vector3::zeros());

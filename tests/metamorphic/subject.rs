@@ -36,8 +36,10 @@ pub struct Subject {
     pub frame: BodyFrame,
     /// The scene.
     pub scene: Scene,
-    /// Number of load cases, all of them the scene.
+    /// Number of load cases that are the scene.
     pub cases: usize,
+    /// Another load case.
+    pub second: Option<Scene>,
     /// True if the body is written and read before use.
     pub stored: bool,
     /// True if the scene is written and read before use.
@@ -93,10 +95,15 @@ impl Subject {
     /// Those of the scene file.
     pub fn scenes(&self) -> Result<Vec<Scene>> {
         if !self.written {
-            return Ok(vec![self.scene.clone(); self.cases]);
+            return Ok(self.with_second(vec![self.scene.clone(); self.cases]));
         }
         let folder = tempfile::tempdir().expect("a folder");
-        read_cases(text::write(&self.scene, folder.path()))
+        Ok(self.with_second(read_cases(text::write(&self.scene, folder.path()))?))
+    }
+
+    fn with_second(&self, mut scenes: Vec<Scene>) -> Vec<Scene> {
+        scenes.extend(self.second.clone());
+        scenes
     }
 
     /// Number of dimensions of the model.

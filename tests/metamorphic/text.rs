@@ -1,6 +1,8 @@
 //! A scene as the files that a user would write.
 
-use flexbody::motion::scene::{Axes, Drive, History, Load, Point, Samples, Scene, Scheme, VectorHistory};
+use flexbody::motion::scene::{
+    Attachment, Axes, Drive, History, Load, Point, Range, Samples, Scene, Scheme, VectorHistory,
+};
 use nalgebra::Vector3;
 use std::fmt::Write;
 use std::fs;
@@ -102,6 +104,18 @@ impl Text {
         if let Some(ratio) = demands.damping {
             self.line(&format!("[damping]\nratio = {ratio:?}"));
         }
+        if let Some(Range::Any(length)) = demands.motion.angular_velocity {
+            self.line(&format!("[motion]\nangular_velocity = {length:?}"));
+        }
+        if demands.attachment != Attachment::default() {
+            let attachment = &demands.attachment;
+            let inertia = vector(&attachment.inertia.diagonal());
+            self.line(&format!("[attachment]\nkind = \"{}\"\ninertia = {inertia}", attachment.kind.name()));
+            attachment
+                .first_frequency
+                .iter()
+                .for_each(|own| self.line(&format!("first_frequency = {own:?}")));
+        }
         let tolerance = &demands.tolerance;
         self.line(&format!(
             "[tolerance]\nattitude = {:?}\ndeflection = {:?}\nstress = {:?}\nreaction = {:?}",
@@ -111,11 +125,14 @@ impl Text {
 
     fn start(&mut self, scene: &Scene) {
         let initial = &scene.initial;
+        let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+        let start = scene.spin.as_ref().and_then(|spin| spin.start).or(carried.and_then(|spin| spin.start));
+        let rotation = start.map_or(initial.rotation, |start| start.0);
         self.line("[initial]");
         for (key, value) in [
             ("origin", initial.origin),
             ("velocity", initial.velocity),
-            ("rotation", initial.rotation),
+            ("rotation", rotation),
             ("angular_velocity", initial.angular_velocity),
         ] {
             if value != Vector3::zeros() {

@@ -6,37 +6,71 @@ mod verdicts;
 
 use crate::outputs::{Output, Outputs, Values};
 use crate::subject::Subject;
+use crate::transformations::Reach;
 use flexbody::base::diagnostic::Diagnostic;
 use flexbody::base::error::Result;
+use flexbody::motion::scene::{Scene, Scheme};
 use std::collections::BTreeSet;
 
-/// A command: the outputs of a subject.
-pub type Command = fn(&Subject) -> Result<Outputs>;
+/// A command with its name.
+pub struct Command {
+    /// Name.
+    pub name: &'static str,
+    /// Outputs of a subject.
+    pub run: fn(&Subject) -> Result<Outputs>,
+    /// Transformations that it is crossed with.
+    pub meets: fn(Reach) -> bool,
+}
 
-/// All commands by name.
-pub const ALL: [(&str, Command); 6] = [
-    ("simulate", simulation::simulation),
-    ("select a body", verdicts::select_body),
-    ("select a model", verdicts::select_model),
-    ("trade", verdicts::trading),
-    ("convert for the scene", verdicts::conversion),
-    ("response", response::response),
+/// All commands, `simulate` first.
+pub const ALL: [Command; 6] = [
+    Command { name: "simulate", run: simulation::simulation, meets: |_| true },
+    Command { name: "select a body", run: verdicts::select_body, meets: |reach| reach != Reach::Simulation },
+    Command { name: "select a model", run: verdicts::select_model, meets: of_model },
+    Command { name: "trade", run: verdicts::trading, meets: |reach| reach != Reach::Simulation },
+    Command { name: "convert for the scene", run: verdicts::conversion, meets: of_model },
+    Command {
+        name: "response",
+        run: response::response,
+        meets: |reach| matches!(reach, Reach::All | Reach::Body),
+    },
 ];
+
+/// True of what reaches commands that convert a model themselves.
+fn of_model(reach: Reach) -> bool {
+    matches!(reach, Reach::All | Reach::Scene)
+}
+
+/// Tolerance of the integrations of verdicts: that of a scene file.
+const TOLERANCE: f64 = 1e-9;
 
 /// Factor of the allowed difference of values that are read off at the places that an integration has looked at: other
 /// steps are other places, and a parabola through three of them finds a largest value to about 1e-5 (measured).
 pub const LOOKED_AT: f64 = 100.0;
 
+/// Factor of the allowed difference of the largest spin, which is looked for at the ends of steps alone.
+pub const STEP_ENDS: f64 = 1e4;
+
 /// Factor of the allowed difference of errors of a motion against another: both are read off at places.
 const ERRORS: f64 = 1e4;
 
 /// Codes of findings, and names of outputs, that still depend on the axes of a model: components of the spin are tested
-/// one by one (FB542), the worst of six axes is taken (FB546), the extent is that of a box. Differences of outputs whose
+/// one by one (FB542), the worst of six axes is taken (FB546), the extent is that of a box; and enriched bodies differ. Differences of outputs whose
 /// name has one of these in it are counted, and fail nothing.
-pub const OPEN: [&str; 3] = ["FB542", "FB546", "largest deflection of the body"];
+pub const OPEN: [&str; 4] = ["FB542", "FB546", "largest deflection of the body", ENRICHED];
+
+/// End of the name of what depends on the modes of an enriched body.
+const ENRICHED: &str = "of an enriched body";
 
 /// Factor of the allowed difference of percentages in messages, which have two or three digits.
 const DIGITS: f64 = 2e5;
+
+/// The load cases of a verdict.
+fn cases(subject: &Subject) -> Result<Vec<Scene>> {
+    let mut scenes = subject.scenes()?;
+    scenes.iter_mut().for_each(|scene| scene.run.scheme = Scheme::Adaptive { tolerance: TOLERANCE });
+    Ok(scenes)
+}
 
 /// Codes of findings, each once, in order.
 pub fn codes(found: &[Diagnostic]) -> String {

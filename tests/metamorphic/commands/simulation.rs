@@ -1,6 +1,6 @@
 //! `simulate`.
 
-use super::{LOOKED_AT, findings, number};
+use super::{LOOKED_AT, STEP_ENDS, findings, number};
 use crate::outputs::{Along, Output, Outputs, Values};
 use crate::subject::Subject;
 use flexbody::base::error::Result;
@@ -144,7 +144,7 @@ fn largest(recording: &Recording, sizes: &Sizes, outputs: &mut Outputs) {
             sizes.deflection / sizes.extent,
         ),
         peak("largest elastic energy", ENERGY, extremes.elastic, energy),
-        peak("largest spin", RATE, extremes.spin, turning),
+        Output { slack: STEP_ENDS, ..peak("largest spin", RATE, extremes.spin, turning) },
         peak("largest reaction force", FORCE, extremes.reaction.0, sizes.force()),
         peak("largest reaction torque", ENERGY, extremes.reaction.1, sizes.force() * sizes.extent),
     ]);

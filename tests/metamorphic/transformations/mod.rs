@@ -36,27 +36,54 @@ impl Pair {
 /// A transformation: for a subject and random numbers the pair, or `None` where it does not apply.
 type Apply = fn(&Subject, &mut Random) -> Result<Option<Pair>>;
 
-/// All transformations by name.
-pub const ALL: [(&str, Apply); 21] = [
-    ("turn the world", world::turn),
-    ("shift the world", world::shift),
-    ("boost the world", world::boost),
-    ("accelerate the world", world::accelerate),
-    ("mirror the world and the model", world::mirror),
-    ("turn the model", model::turn),
-    ("shift the model", model::shift),
-    ("renumber the nodes", model::renumber),
-    ("permute the rows", model::permute),
-    ("change the units", units::change),
-    ("another frame", body::frame),
-    ("another complete basis", body::basis),
-    ("write and read the body", body::stored),
-    ("write and read the scene", body::written),
-    ("other axes of vectors", scene::axes),
-    ("split a load", scene::split),
-    ("refine a table", scene::refine),
-    ("start later", scene::later),
-    ("start from a state", scene::restart),
-    ("repeat a case", scene::repeat),
-    ("more outputs", scene::outputs),
+/// Commands that a transformation is crossed with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// `simulate` alone: a complete basis is no matter of verdicts, and a part of a motion has other largest values.
+    Simulation,
+    /// Commands that are given a body.
+    Body,
+    /// Commands that a scene matters to.
+    Scene,
+    /// All commands.
+    All,
+}
+
+/// A transformation with its name and reach.
+pub struct Transformation {
+    /// Name.
+    pub name: &'static str,
+    /// Commands.
+    pub reach: Reach,
+    /// The transformation.
+    pub apply: Apply,
+}
+
+const fn of(name: &'static str, reach: Reach, apply: Apply) -> Transformation {
+    Transformation { name, reach, apply }
+}
+
+/// All transformations.
+pub const ALL: [Transformation; 21] = [
+    of("turn the world", Reach::Scene, world::turn),
+    of("shift the world", Reach::Scene, world::shift),
+    of("boost the world", Reach::Scene, world::boost),
+    of("accelerate the world", Reach::Scene, world::accelerate),
+    of("mirror the world and the model", Reach::All, world::mirror),
+    of("turn the model", Reach::All, model::turn),
+    of("shift the model", Reach::All, model::shift),
+    of("renumber the nodes", Reach::All, model::renumber),
+    of("permute the rows", Reach::All, model::permute),
+    of("change the units", Reach::All, units::change),
+    of("another frame", Reach::All, body::frame),
+    of("another complete basis", Reach::Simulation, body::basis),
+    of("write and read the body", Reach::Body, body::stored),
+    of("write and read the scene", Reach::Scene, body::written),
+    of("other axes of vectors", Reach::Scene, scene::axes),
+    of("split a load", Reach::Scene, scene::split),
+    of("refine a table", Reach::Scene, scene::refine),
+    of("start later", Reach::Scene, scene::later),
+    of("start from a state", Reach::Simulation, scene::restart),
+    of("repeat a case", Reach::Scene, scene::repeat),
+    of("more outputs", Reach::Scene, scene::outputs),
 ];

@@ -108,6 +108,9 @@ impl Motion {
                 *way = way.turned(&self.world);
             }
         }
+        // Attached inertia turns with the body.
+        let inertia = &mut moved.requirements.attachment.inertia;
+        *inertia = self.model * *inertia * self.model.transpose();
         moved
     }
 }

@@ -19,7 +19,7 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let frame = subject.body()?.frame().axes;
     let mut changed = subject.clone();
     let scene = &mut changed.scene;
-    let start = RotationVector(scene.initial.rotation).axes();
+    let start = start_axes(scene);
     // Along the axes of the model: at time zero for axes that turn with the body.
     let in_model = |axes: Axes| match axes {
         Axes::World => start.transpose(),
@@ -40,19 +40,28 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
             load.axes = to;
         }
     }
-    let of_spin = |velocity: &mut VectorHistory, axes: &mut Axes| {
-        let keeps_axes = velocity.direction().is_some() || (*axes != Axes::World && to != Axes::World);
+    let of_spin = |velocity: &mut VectorHistory, axes: &mut Axes, start: Option<RotationVector>| {
+        // An attitude at the start is one of the frame that `axes` name.
+        let keeps_axes = start.is_none()
+            && (velocity.direction().is_some() || (*axes != Axes::World && to != Axes::World));
         if keeps_axes {
             (*velocity, *axes) = (velocity.turned(&turn(*axes)), to);
         }
     };
     if let Some(spin) = &mut scene.spin {
-        of_spin(&mut spin.velocity, &mut spin.axes);
+        of_spin(&mut spin.velocity, &mut spin.axes, spin.start);
     }
     if let Some(spin) = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut()) {
-        of_spin(&mut spin.velocity, &mut spin.axes);
+        of_spin(&mut spin.velocity, &mut spin.axes, spin.start);
     }
     Ok(Some(Pair::new(subject, changed, Correspondence::default())))
+}
+
+/// Attitude of the model at the start.
+fn start_axes(scene: &Scene) -> Matrix3<f64> {
+    let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+    let own = scene.spin.as_ref().and_then(|spin| spin.start).or(carried.and_then(|spin| spin.start));
+    own.unwrap_or(RotationVector(scene.initial.rotation)).axes()
 }
 
 /// Splits every load into two of different size.
@@ -155,7 +164,7 @@ pub fn restart(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
 
 /// States axes of rotation that turn with the body along those of the model.
 fn fix_axes(scene: &mut Scene) {
-    let start = RotationVector(scene.initial.rotation).axes();
+    let start = start_axes(scene);
     let fix = |velocity: &mut VectorHistory, axes: &mut Axes| {
         if *axes == Axes::World && velocity.direction().is_some() {
             (*velocity, *axes) = (velocity.turned(&start.transpose()), Axes::Model);
@@ -163,9 +172,11 @@ fn fix_axes(scene: &mut Scene) {
     };
     if let Some(spin) = &mut scene.spin {
         fix(&mut spin.velocity, &mut spin.axes);
+        spin.start = None;
     }
     if let Some(spin) = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut()) {
         fix(&mut spin.velocity, &mut spin.axes);
+        spin.start = None;
     }
 }
 

@@ -11,7 +11,7 @@ use crate::support::random::Random;
 use flexbody::base::error::Result;
 use flexbody::base::units::UnitSystem;
 use flexbody::model::{Damping, LoadKind, RawMatrix, RawModel, Reference};
-use flexbody::motion::scene::{Scene, Scheme};
+use flexbody::motion::scene::{Range, Scene, Scheme};
 use flexbody::numerics::linalg::CscMatrix;
 
 /// Numbers of a length, a mass and a time over those in the old units.
@@ -132,6 +132,13 @@ impl Units {
         }
         let demands = &mut changed.requirements;
         demands.band = demands.band.map(|band| band * rate);
+        demands.attachment.inertia *= self.mass * self.length * self.length;
+        demands.attachment.first_frequency = demands.attachment.first_frequency.map(|own| own * rate);
+        for range in [&mut demands.motion.angular_velocity, &mut demands.motion.angular_acceleration] {
+            if let Some(Range::Any(length)) = range {
+                *length *= rate;
+            }
+        }
         demands.tolerance.least_deflection =
             demands.tolerance.least_deflection.map(|least| least * self.length);
         changed
