@@ -55,10 +55,15 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
         ("attitude over time", spin_start.or(carried_start).is_some()),
         ("rotations of nodes", subject.raw.dofs.iter().flatten().any(|label| label.direction > 3)),
         ("plane", subject.raw.dimension == 2),
-        ("singular mass", subject.kind.contains("singular") || subject.kind.contains("massless")),
+        ("singular mass", has_singular_mass(subject)),
     ];
     found.retain(|(_, there)| *there);
     found.into_iter().map(|(name, _)| name).collect()
+}
+
+/// True of kinds of bodies with a singular mass matrix.
+pub fn has_singular_mass(subject: &Subject) -> bool {
+    subject.kind.contains("singular") || subject.kind.contains("massless")
 }
 
 /// The factor of a vector along one direction.

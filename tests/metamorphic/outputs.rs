@@ -157,7 +157,7 @@ impl Outputs {
                 worst = (violation.size, Some(violation));
             }
         }
-        let violation = worst.1.filter(|violation| !(violation.size <= 1.0));
+        let violation = worst.1.filter(|violation| violation.size > 1.0 || violation.size.is_nan());
         (worst.0, violation)
     }
 

@@ -62,7 +62,7 @@ impl Subject {
             Basis::All | Basis::Fixed => usize::MAX,
         };
         let basis = match self.basis {
-            Basis::Fixed => BasisChoice::CraigBampton(CraigBampton::default()),
+            Basis::Fixed => BasisChoice::CraigBampton(CraigBampton),
             Basis::Lowest(_) | Basis::All => BasisChoice::default(),
         };
         ConvertSettings {

@@ -58,7 +58,7 @@ pub fn select_model(subject: &Subject) -> Result<Outputs> {
     let body = &enriched.made.body;
     let selection = select_for_cases(body, &enriched.rounds, &scenes, None, SILENT)?;
     let mut outputs = outputs(subject, &selection, body.n_modes());
-    let first = enriched.rounds.iter().filter_map(|rounds| Some(rounds.first()?.worst));
+    let first = enriched.rounds.iter().filter_map(|rounds| Some(rounds.first()?.worst.min(BEYOND)));
     outputs.all.push(error("errors of the first body", first.collect()));
     Ok(outputs)
 }
@@ -69,10 +69,10 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
     let (made, selection) =
         convert_for_cases(&model, &tailoring(subject), &scenes, Resume::default(), SILENT)?;
     let mut outputs = outputs(subject, &selection, made.body.n_modes());
-    outputs.all.extend(findings(&made.diagnostics).into_iter().map(|output| {
-        let name = format!("{} of the conversion", output.name);
-        Output { name, ..output }
-    }));
+    let told = findings(&made.diagnostics).into_iter();
+    outputs.all.extend(
+        told.map(|output| Output { name: format!("conversion: {} {ENRICHED}", output.name), ..output }),
+    );
     let lacks = selection.lacks.last().map(ReferenceError::is_reference);
     outputs.all.push(facts("reference", format!("{lacks:?}")));
     Ok(outputs)

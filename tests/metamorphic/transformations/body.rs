@@ -2,6 +2,7 @@
 
 use super::Pair;
 use crate::correspondence::Correspondence;
+use crate::features::has_singular_mass;
 use crate::subject::{Basis, Subject};
 use crate::support::random::Random;
 use flexbody::base::error::Result;
@@ -14,9 +15,11 @@ pub fn frame(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(Some(Pair::new(subject, Subject { frame, ..subject.clone() }, Correspondence::default())))
 }
 
-/// Converts with another complete basis.
+/// Converts with another complete basis. With a singular mass matrix the static shapes of a Craig-Bampton basis keep a
+/// part that moves no mass, and do not span the finite modes (12 of 12 modes, the first at 0.453 instead of 0.246 Hz): such
+/// bodies are left out.
 pub fn basis(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
-    if !subject.scene.initial.modes.is_empty() {
+    if !subject.scene.initial.modes.is_empty() || has_singular_mass(subject) {
         return Ok(None);
     }
     let with = |basis: Basis| Subject { basis, ..subject.clone() };
