@@ -17,14 +17,14 @@ const BEYOND: f64 = 2.0;
 /// What a selection among so many modes says.
 ///
 /// Bodies that are enriched with responses to the residual forces of one another follow ways that rounding chooses:
-/// their verdict and groups correspond, their modes and what depends on them is open.
+/// their groups correspond, their modes and what depends on them is open.
 fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
     let is_enriched = matches!(subject.basis, Basis::Lowest(count) if modes > count);
     let name = |name: &str| if is_enriched { format!("{name} {ENRICHED}") } else { name.to_owned() };
     let Selection { groups, guideline, chosen, n_modes, .. } = selection;
     let mut all = vec![
         facts("groups", format!("{groups:?}, {guideline}")),
-        facts("verdict", format!("{}", selection.holds())),
+        facts(&name("verdict"), format!("{}", selection.holds())),
         facts(&name("modes"), format!("{:?} of {n_modes}, at first {modes}", selection.modes)),
     ];
     if let Some(chosen) = chosen {
@@ -59,7 +59,7 @@ pub fn select_model(subject: &Subject) -> Result<Outputs> {
     let selection = select_for_cases(body, &enriched.rounds, &scenes, None, SILENT)?;
     let mut outputs = outputs(subject, &selection, body.n_modes());
     let first = enriched.rounds.iter().filter_map(|rounds| Some(rounds.first()?.worst.min(BEYOND)));
-    outputs.all.push(error("errors of the first body", first.collect()));
+    outputs.all.push(error("errors of the first body", vec![first.fold(0.0, f64::max)]));
     Ok(outputs)
 }
 
@@ -74,7 +74,7 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
         told.map(|output| Output { name: format!("conversion: {} {ENRICHED}", output.name), ..output }),
     );
     let lacks = selection.lacks.last().map(ReferenceError::is_reference);
-    outputs.all.push(facts("reference", format!("{lacks:?}")));
+    outputs.all.push(facts(&format!("reference {ENRICHED}"), format!("{lacks:?}")));
     Ok(outputs)
 }
 
