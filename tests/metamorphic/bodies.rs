@@ -36,7 +36,8 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
         6 => rectangle(3, 1, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]),
         _ => raw_fixture("plane_frame"),
     };
-    let raw = with_ends(raw, kind == 2);
+    // Three nodes of the elbow lie on one line: its tip has the node of the corner as well.
+    let raw = with_ends(raw, kind == 2, if kind == 5 { 4 } else { 3 });
     RawModel { damping: damping(random), ..raw }
 }
 
@@ -73,9 +74,9 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
     RawModel { geometric_stiffness, ..raw }
 }
 
-/// The model with interfaces `root` and `tip` of its nodes of least and largest x; `by_node`: the root is its last
-/// node.
-fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
+/// The model with interfaces `root` and `tip` of its three nodes of least x and `at_tip` of largest x; `by_node`: the
+/// root is its last node.
+fn with_ends(raw: RawModel, by_node: bool, at_tip: usize) -> RawModel {
     const NODES: usize = 3;
     let mut order: Vec<usize> = (0..raw.nodes.len()).collect();
     order.sort_by(|&a, &b| raw.nodes.positions[a][0].total_cmp(&raw.nodes.positions[b][0]));
@@ -92,7 +93,7 @@ fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
         true => NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect()),
         false => set("root", &order[..NODES]),
     };
-    let interfaces = vec![root, set("tip", &order[order.len() - NODES..])];
+    let interfaces = vec![root, set("tip", &order[order.len() - at_tip..])];
     RawModel { interfaces, ..raw }
 }
 

@@ -59,11 +59,12 @@ const ERRORS: f64 = 1e4;
 ///
 /// * `FB542`: components of the spin are tested one by one.
 /// * `FB546`: the worst of six axes is taken.
-/// * The largest deflection is relative to a box along the axes of the model; the Coriolis torque of a body that nothing
-///   moves follows from it.
+/// * The largest deflection is relative to a box along the axes of the model, and the amplitudes that sizes of terms
+///   (significances, the Coriolis torque) are taken at are a part of it.
 /// * Enriched bodies: the responses that join a body are chosen by rounding where its basis is nearly complete, and a
 ///   limit of the estimate decides whether more rounds follow.
-pub const OPEN: [&str; 5] = ["FB542", "FB546", "largest deflection of the body", "Coriolis torque", ENRICHED];
+pub const OPEN: [&str; 6] =
+    ["FB542", "FB546", "largest deflection of the body", "significances", "Coriolis torque", ENRICHED];
 
 /// End of the name of what depends on the modes of an enriched body.
 const ENRICHED: &str = "of an enriched body";
