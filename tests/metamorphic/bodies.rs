@@ -36,8 +36,7 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
         6 => rectangle(3, 1, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]),
         _ => raw_fixture("plane_frame"),
     };
-    // Three nodes of the elbow lie on one line: its tip has the node of the corner as well.
-    let raw = with_ends(raw, kind == 2, if kind == 5 { 4 } else { 3 });
+    let raw = with_ends(raw, kind == 2);
     RawModel { damping: damping(random), ..raw }
 }
 
@@ -74,10 +73,11 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
     RawModel { geometric_stiffness, ..raw }
 }
 
-/// The model with interfaces `root` and `tip` of its three nodes of least x and `at_tip` of largest x; `by_node`: the
-/// root is its last node.
-fn with_ends(raw: RawModel, by_node: bool, at_tip: usize) -> RawModel {
-    const NODES: usize = 3;
+/// The model with interfaces `root` and `tip` of its nodes of least and largest x; `by_node`: the root is its last
+/// node. Three of the nodes may lie on one line, four do not.
+fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
+    const AT_ROOT: usize = 3;
+    const AT_TIP: usize = 4;
     let mut order: Vec<usize> = (0..raw.nodes.len()).collect();
     order.sort_by(|&a, &b| raw.nodes.positions[a][0].total_cmp(&raw.nodes.positions[b][0]));
     let set = |name: &str, nodes: &[usize]| {
@@ -91,9 +91,9 @@ fn with_ends(raw: RawModel, by_node: bool, at_tip: usize) -> RawModel {
     };
     let root = match by_node {
         true => NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect()),
-        false => set("root", &order[..NODES]),
+        false => set("root", &order[..AT_ROOT]),
     };
-    let interfaces = vec![root, set("tip", &order[order.len() - at_tip..])];
+    let interfaces = vec![root, set("tip", &order[order.len() - AT_TIP..])];
     RawModel { interfaces, ..raw }
 }
 

@@ -26,8 +26,8 @@ struct Sizes {
 }
 
 impl Sizes {
-    /// Deflections below this part of the extent do not count.
-    const LEAST: f64 = 1e-7;
+    /// Deflections below this part of the extent do not count, as in verdicts.
+    const LEAST: f64 = 1e-5;
 
     fn new(body: &FlexBody, recording: &Recording) -> Self {
         let positions = &body.nodes().positions;
