@@ -1,4 +1,4 @@
-//! How outputs of a transformed subject follow from those of the original.
+//! Relations between outputs of a transformed subject and outputs of the original.
 
 use crate::outputs::{Along, Output, Values};
 use nalgebra::{Matrix3, Vector3};
@@ -10,7 +10,7 @@ pub struct Correspondence {
     pub world: Matrix3<f64>,
     /// Turn or mirror image of the model.
     pub model: Matrix3<f64>,
-    /// Where the origin of the world is at time zero, how fast it moves, and its acceleration.
+    /// Place at time zero, velocity and acceleration of the old origin of the world.
     pub shift: [Vector3<f64>; 3],
     /// The numbers of a length, a mass and a time over those of the original.
     pub units: [f64; 3],

@@ -26,7 +26,7 @@ const TOLERANCE: f64 = 1e-12;
 /// Modes of a body.
 const MODES: usize = 8;
 
-/// What a scene is made of: a source of random numbers and the scales of the body.
+/// Generator of a scene: a source of random numbers and the scales of the body.
 struct Scales<'r> {
     random: &'r mut Random,
     /// Lowest natural circular frequency.
@@ -44,7 +44,7 @@ struct Scales<'r> {
 /// The subject of a seed.
 ///
 /// # Errors
-/// Those of the conversion and the motion that loads are scaled by.
+/// Errors of the conversion and of the motion that loads are scaled by.
 pub fn subject(seed: u64) -> Result<Subject> {
     let random = &mut stream(seed, 1);
     let kind = pick(random, KINDS.len());

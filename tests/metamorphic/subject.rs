@@ -50,7 +50,7 @@ impl Subject {
     /// The checked model.
     ///
     /// # Errors
-    /// Those of [`FeModel::from_raw`].
+    /// Errors of [`FeModel::from_raw`].
     pub fn model(&self) -> Result<FeModel> {
         Ok(FeModel::from_raw(self.raw.clone())?.model)
     }
@@ -77,7 +77,7 @@ impl Subject {
     /// The body.
     ///
     /// # Errors
-    /// Those of the conversion, and of the file.
+    /// Errors of the conversion, and of the file.
     pub fn body(&self) -> Result<FlexBody> {
         let body = convert(&self.model()?, &self.settings(), SILENT)?.body;
         if !self.stored {
@@ -92,7 +92,7 @@ impl Subject {
     /// The load cases.
     ///
     /// # Errors
-    /// Those of the scene file.
+    /// Errors of the scene file.
     pub fn scenes(&self) -> Result<Vec<Scene>> {
         if !self.written {
             return Ok(self.with_second(vec![self.scene.clone(); self.cases]));

@@ -68,7 +68,7 @@ fn vectors(name: String, along: Along, unit: [i32; 3], rates: Vec<Vector3<f64>>,
     Output { name, unit, values, derivative: None, least, by_instant: true, slack: 1.0 }
 }
 
-/// The same, turning over in a mirror.
+/// Marks vectors as axial: they turn over in a mirror.
 fn axial(output: Output) -> Output {
     match output.values {
         Values::Vectors { along, rates, .. } => {

@@ -14,7 +14,7 @@ use flexbody::study::trade::{Kind, Row, Settings, Source, trade_for_cases};
 /// Errors over their tolerances are compared up to this one.
 const BEYOND: f64 = 2.0;
 
-/// What a selection among so many modes says.
+/// Outputs of a selection among so many modes.
 ///
 /// Bodies that are enriched with responses to the residual forces of one another follow ways that rounding chooses:
 /// their groups correspond, their modes and what depends on them is open.

@@ -28,7 +28,7 @@ pub struct Driven {
     pub origin: Vector3<f64>,
     /// A point of the axis of rotation, in the model.
     pub through: Vector3<f64>,
-    /// Where the model's origin is at time zero.
+    /// Place of the model's origin at time zero.
     pub place: Vector3<f64>,
     /// Amplitude of the velocity of the axis: amplitude sin(frequency t).
     pub velocity: Vector3<f64>,
@@ -57,7 +57,7 @@ pub struct Absolute {
     conditions: Option<Conditions>,
 }
 
-/// What the frame does at a time.
+/// Attitude and motion of the frame at a time.
 struct Frame {
     axes: Matrix3<f64>,
     origin: Vector3<f64>,

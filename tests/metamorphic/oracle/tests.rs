@@ -46,7 +46,7 @@ struct Block {
     mass: f64,
 }
 
-/// What acts on the block, in units of its own.
+/// Loads, start and prescribed motion of the block, in units of its own.
 #[derive(Debug, Clone, Copy)]
 struct Happening {
     /// Size of forces, gravity and accelerations: about the deflection relative to the extent.
@@ -61,13 +61,13 @@ struct Happening {
     held: Held,
 }
 
-/// What is prescribed.
+/// Prescribed motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Held {
     Nothing,
     /// The rotation of the mean axes.
     Rotation,
-    /// That, and the centre of mass.
+    /// The rotation of the mean axes and the place of the centre of mass.
     Frame,
     /// The interface.
     Interface,

@@ -22,7 +22,7 @@ pub struct Pair {
     pub original: Subject,
     /// The other.
     pub changed: Subject,
-    /// How the outputs of the other follow from those of the one.
+    /// Relations between the outputs of the two.
     pub map: Correspondence,
 }
 
