@@ -1,6 +1,7 @@
 //! A subject in a world and a model that are turned, mirrored or shifted.
 
 use super::model::{conjugated, geometric};
+use super::scene::start_axes;
 use crate::subject::Subject;
 use flexbody::model::{Damping, RawMatrix, RawModel, Reference};
 use flexbody::motion::dynamics::{Orientation, RotationVector};
@@ -79,7 +80,7 @@ impl Motion {
         let mut moved = scene.clone();
         let initial = &mut moved.initial;
         initial.rotation = self.attitude(&initial.rotation);
-        let axes = RotationVector(initial.rotation).axes();
+        let axes = self.world * start_axes(scene) * self.model.transpose();
         initial.origin = self.world * initial.origin - axes * self.shift;
         initial.velocity = self.world * initial.velocity;
         initial.angular_velocity = self.of(initial.axes, true) * initial.angular_velocity;

@@ -58,7 +58,7 @@ pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
 }
 
 /// Attitude of the model at the start.
-fn start_axes(scene: &Scene) -> Matrix3<f64> {
+pub fn start_axes(scene: &Scene) -> Matrix3<f64> {
     let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
     let own = scene.spin.as_ref().and_then(|spin| spin.start).or(carried.and_then(|spin| spin.start));
     own.unwrap_or(RotationVector(scene.initial.rotation)).axes()
