@@ -52,6 +52,20 @@ fn is_open(name: &str) -> bool {
     commands::OPEN.iter().any(|open| name.contains(open))
 }
 
+/// Outcome of a refusal. Random scenes are sound, but for a torque where nothing follows a rotation (FB212) and places
+/// that a response is not asked for at (FB801).
+fn refused(error: &Error) -> Outcome {
+    match code(error) {
+        code if ["FB212", "FB801"].contains(&&*code) => Outcome::Refused(code),
+        _ => violated(format!("a sound scene is refused: {error}")),
+    }
+}
+
+/// A violation by the outcome itself.
+fn violated(detail: String) -> Outcome {
+    Outcome::Violated(Violation { output: "outcome".to_owned(), size: f64::INFINITY, detail })
+}
+
 /// Codes of an error.
 fn code(error: &Error) -> String {
     commands::codes(error.diagnostics())
@@ -92,10 +106,7 @@ impl Crossing {
         let pair = match self.pair(subject) {
             Ok(Some(pair)) => pair,
             Ok(None) => return Outcome::Apart,
-            Err(error) => return Outcome::Refused(code(&error)),
-        };
-        let violated = |detail: String| {
-            Outcome::Violated(Violation { output: "outcome".to_owned(), size: f64::INFINITY, detail })
+            Err(error) => return refused(&error),
         };
         let (own, other): (Result<Outputs>, Result<Outputs>) =
             (command(&pair.original), command(&pair.changed));
@@ -104,7 +115,7 @@ impl Crossing {
                 (_, Some(violation)) => Outcome::Violated(violation),
                 (size, None) => Outcome::Same(size, own.compare(&other, &pair.map, is_open).1),
             },
-            (Err(own), Err(other)) if code(&own) == code(&other) => Outcome::Refused(code(&own)),
+            (Err(own), Err(other)) if code(&own) == code(&other) => refused(&own),
             (Err(own), Err(other)) => violated(format!("refused by `{own}` and by `{other}`")),
             (Ok(_), Err(other)) => violated(format!("the changed scene is refused: {other}")),
             (Err(own), Ok(_)) => violated(format!("the original scene is refused: {own}")),
@@ -157,7 +168,7 @@ impl Run {
         let crossing = Crossing::of(number);
         let subject = match scenes::subject(number) {
             Ok(subject) => subject,
-            Err(error) => return Self { features: Vec::new(), outcome: Outcome::Refused(code(&error)) },
+            Err(error) => return Self { features: Vec::new(), outcome: refused(&error) },
         };
         let outcome = match crossing.run(&subject) {
             Outcome::Violated(found) => {

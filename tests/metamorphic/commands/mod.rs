@@ -45,8 +45,8 @@ fn of_model(reach: Reach) -> bool {
 const TOLERANCE: f64 = 1e-9;
 
 /// Factor of the allowed difference of values that are read off at the places that an integration has looked at: other
-/// steps are other places, and a parabola through three of them finds a largest value to about 1e-5 (measured).
-pub const LOOKED_AT: f64 = 100.0;
+/// steps are other places, and a parabola through three of them finds a largest value to about 1e-4 (measured).
+pub const LOOKED_AT: f64 = 1000.0;
 
 /// Factor of the allowed difference of the largest spin, which is looked for at the ends of steps alone.
 pub const STEP_ENDS: f64 = 1e4;

@@ -1,7 +1,7 @@
 //! Transformations of the scene.
 
 use super::Pair;
-use super::histories::Clock;
+use super::histories::{Clock, for_driving};
 use crate::correspondence::Correspondence;
 use crate::draws::{between, pick};
 use crate::scenes::scaled;
@@ -74,10 +74,22 @@ pub fn split(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     Ok(applies.then(|| Pair::new(subject, changed, Correspondence::default())))
 }
 
-/// Adds points to tables of straight lines.
+/// Adds points to tables of straight lines, which take the place of smooth factors of loads.
 pub fn refine(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    const ROWS: usize = 5;
     let part = between(random, 0.2, 0.8);
-    let (mut changed, mut count) = (subject.clone(), 0);
+    let Some(duration) = subject.scene.run.duration else { return Ok(None) };
+    let mut original = subject.clone();
+    for load in &mut original.scene.loads {
+        for history in [&mut load.force, &mut load.torque] {
+            if let VectorHistory::Along { factor, .. } = history {
+                let times: Vec<f64> = (0..ROWS).map(|i| duration * i as f64 / (ROWS - 1) as f64).collect();
+                let values = times.iter().map(|time| factor.at(*time).0).collect();
+                *factor = History::Table { times, values };
+            }
+        }
+    }
+    let (mut changed, mut count) = (original.clone(), 0);
     let mut finer = |history: &mut VectorHistory| {
         if let VectorHistory::Along { factor: History::Table { times, values }, .. } = history {
             let middle = |ends: &[f64]| [ends[0], ends[0] + part * (ends[1] - ends[0])];
@@ -92,35 +104,41 @@ pub fn refine(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
         finer(&mut load.force);
         finer(&mut load.torque);
     }
-    Ok((count > 0).then(|| Pair::new(subject, changed, Correspondence::default())))
+    Ok((count > 0).then(|| Pair::new(&original, changed, Correspondence::default())))
 }
 
-/// True if nothing moves, and nothing acts before time zero or at it.
-fn begins_at_rest(scene: &Scene) -> bool {
-    let rises = |history: &VectorHistory| match history {
-        VectorHistory::Along { direction, .. } if *direction == Vector3::zeros() => true,
-        VectorHistory::Along { factor: History::Constant(_) | History::Sine { .. }, .. } => false,
-        _ => history.at(0.0).0.norm() == 0.0 && history.at(-1.0).0.norm() == 0.0,
+/// The scene from rest: no velocity and no gravity, and everything that acts or drives rises from zero.
+fn from_rest(scene: &Scene, duration: f64) -> Scene {
+    let mut scene = scene.clone();
+    scene.gravity = None;
+    let initial = &mut scene.initial;
+    (initial.velocity, initial.angular_velocity) = (Vector3::zeros(), Vector3::zeros());
+    initial.modes.clear();
+    let rising = |history: &VectorHistory| {
+        let (size, _) = history.largest_until(duration);
+        let direction = history.main_direction().unwrap_or_else(Vector3::zeros) * size;
+        let factor = History::Ramp { from: 0.0, to: 1.0, start: 0.0, duration: 0.7 * duration };
+        VectorHistory::Along { direction, factor }
     };
-    let initial = &scene.initial;
-    initial.velocity == Vector3::zeros()
-        && initial.angular_velocity == Vector3::zeros()
-        && initial.modes.is_empty()
-        && scene.gravity.is_none()
-        && scene.acting().chain(scene.driving()).all(rises)
+    for load in &mut scene.loads {
+        (load.force, load.torque) = (rising(&load.force), rising(&load.torque));
+    }
+    for_driving(&mut scene, |history, _| *history = rising(history));
+    scene
 }
 
-/// Starts everything later.
+/// Starts everything later, from rest.
 pub fn later(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
-    let scene = &subject.scene;
-    let (Some(duration), true) = (scene.run.duration, begins_at_rest(scene)) else { return Ok(None) };
-    let delayed = 1 + pick(random, scene.run.outputs);
-    let delay = duration * delayed as f64 / scene.run.outputs as f64;
-    let mut changed = subject.clone();
+    let Some(duration) = subject.scene.run.duration else { return Ok(None) };
+    let original = Subject { scene: from_rest(&subject.scene, duration), ..subject.clone() };
+    let outputs = original.scene.run.outputs;
+    let delayed = 1 + pick(random, outputs);
+    let delay = duration * delayed as f64 / outputs as f64;
+    let mut changed = original.clone();
     Clock { factor: 1.0, delay }.scene(&mut changed.scene);
     changed.scene.run.duration = Some(duration + delay);
     changed.scene.run.outputs += delayed;
-    Ok(Some(Pair::new(subject, changed, Correspondence { delayed, ..Correspondence::default() })))
+    Ok(Some(Pair::new(&original, changed, Correspondence { delayed, ..Correspondence::default() })))
 }
 
 /// Starts from a state of the motion.

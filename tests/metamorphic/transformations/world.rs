@@ -37,41 +37,36 @@ pub fn shift(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
 pub fn boost(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let Some(duration) = subject.scene.run.duration else { return Ok(None) };
     let by = direction(random, subject.dimension()) * (extent(subject) / duration);
-    let mut changed = subject.clone();
-    let held = subject.scene.spin.as_ref().is_some_and(|spin| spin.hold);
+    let mut original = subject.clone();
+    original.scene.spin.iter_mut().for_each(|spin| spin.hold = false);
+    // A velocity along a direction of its own cannot be added to another motion.
+    original.scene.carried.iter_mut().for_each(|carried| carried.translation = None);
+    let mut changed = original.clone();
     match &mut changed.scene.carried {
-        _ if held => return Ok(None),
         None => changed.scene.initial.velocity += by,
-        Some(carried) => {
-            let faster = match carried.translation.take() {
-                None => Drive::Velocity(VectorHistory::constant(by)),
-                // A motion in other directions has columns; those of a constant have no direction of their own.
-                Some(_) => return Ok(None),
-            };
-            carried.translation = Some(faster);
-        }
+        Some(carried) => carried.translation = Some(Drive::Velocity(VectorHistory::constant(by))),
     }
     let shift = [Vector3::zeros(), by, Vector3::zeros()];
-    Ok(Some(Pair::new(subject, changed, Correspondence { shift, ..Correspondence::default() })))
+    Ok(Some(Pair::new(&original, changed, Correspondence { shift, ..Correspondence::default() })))
 }
 
 /// Sees the motion from an observer that falls: uniform gravity and an acceleration of what carries the body are one.
-pub fn accelerate(subject: &Subject, _: &mut Random) -> Result<Option<Pair>> {
-    let Some(gravity) = subject.scene.gravity else { return Ok(None) };
-    let held = subject.scene.spin.as_ref().is_some_and(|spin| spin.hold);
-    let mut changed = subject.clone();
+pub fn accelerate(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
+    let Some(duration) = subject.scene.run.duration else { return Ok(None) };
+    let size = 0.1 * extent(subject) / (duration * duration);
+    let gravity = direction(random, subject.dimension()) * size;
+    let mut original = subject.clone();
+    original.scene.gravity = Some(gravity);
+    original.scene.carried.iter_mut().for_each(|carried| carried.translation = None);
+    original.scene.spin.iter_mut().for_each(|spin| spin.hold = false);
+    let mut changed = original.clone();
     changed.scene.gravity = None;
-    match &mut changed.scene.carried {
-        _ if held => return Ok(None),
-        None => {}
-        Some(carried) if carried.translation.is_none() => {
-            let (direction, factor) = (-gravity, History::Constant(1.0));
-            carried.translation = Some(Drive::Acceleration(VectorHistory::Along { direction, factor }));
-        }
-        Some(_) => return Ok(None),
+    if let Some(carried) = &mut changed.scene.carried {
+        let (direction, factor) = (-gravity, History::Constant(1.0));
+        carried.translation = Some(Drive::Acceleration(VectorHistory::Along { direction, factor }));
     }
     let shift = [Vector3::zeros(), Vector3::zeros(), -gravity];
-    Ok(Some(Pair::new(subject, changed, Correspondence { shift, ..Correspondence::default() })))
+    Ok(Some(Pair::new(&original, changed, Correspondence { shift, ..Correspondence::default() })))
 }
 
 /// Mirrors the world and the model in planes of their own.
