@@ -52,8 +52,8 @@ fn is_open(name: &str) -> bool {
     commands::OPEN.iter().any(|open| name.contains(open))
 }
 
-/// Outcome of a refusal. Random scenes are sound, but for a torque where nothing follows a rotation (FB212) and places
-/// that a response is not asked for at (FB801).
+/// Outcome of a refusal. Random scenes are sound, but for a torque where nothing follows a rotation (FB212) and bodies
+/// that `trade --reference nodal` is not for (FB801).
 fn refused(error: &Error) -> Outcome {
     match code(error) {
         code if ["FB212", "FB801"].contains(&&*code) => Outcome::Refused(code),
