@@ -1,0 +1,103 @@
+//! Random bodies: solids, plane bodies, nodes with rotations, singular mass matrices.
+
+use crate::draws::{between, one_in, pick};
+use crate::stress::of_spin;
+use crate::support::beams::{BeamMass, elbow, star};
+use crate::support::elements::{Kind as Element, MassRule, Material};
+use crate::support::general::raw_fixture;
+use crate::support::mesh::{Mesh, grid};
+use crate::support::plane::rectangle;
+use crate::support::random::Random;
+use crate::support::turning::block;
+use flexbody::model::{Coupling, Damping, NodeSet, RawModel, Reference};
+use nalgebra::Vector3;
+
+/// Kinds of bodies.
+pub const KINDS: [&str; 8] = [
+    "solid",
+    "solid, singular mass",
+    "solid with a rigid end",
+    "beams",
+    "beams, massless rotations",
+    "elbow",
+    "plane solid",
+    "plane frame",
+];
+
+/// A random body of one of the [`KINDS`].
+pub fn body(kind: usize, random: &mut Random) -> RawModel {
+    let raw = match kind {
+        0 => graded_block(random, MassRule::Consistent),
+        1 => graded_block(random, MassRule::Reduced),
+        2 => block(Element::Hex8).raw,
+        3 => star(if one_in(random, 2) { BeamMass::Rotary } else { BeamMass::Consistent }),
+        4 => star(BeamMass::Lumped),
+        5 => elbow(3),
+        6 => rectangle(3, 1, between(random, 0.0, 3.0), [between(random, -3.0, 3.0), 1.0]),
+        _ => raw_fixture("plane_frame"),
+    };
+    let raw = with_ends(raw, kind == 2);
+    RawModel { damping: damping(random), ..raw }
+}
+
+/// Damping of the model in a third of the cases.
+fn damping(random: &mut Random) -> Option<Damping<flexbody::model::RawMatrix>> {
+    match pick(random, 6) {
+        0 => Some(Damping::Ratio(0.02)),
+        // Named by ratios of the lowest frequencies, which all bodies but the plane frame have near one.
+        1 => Some(Damping::Rayleigh { alpha: 0.02, beta: 0.0 }),
+        _ => None,
+    }
+}
+
+/// A block of bricks, askew, whose stiffness and density change along it.
+fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
+    // The points of a reduced rule must not lie on one line.
+    let across = if rule == MassRule::Reduced { 2 } else { 1 + pick(random, 2) as i32 };
+    let cells = [3, across, 1];
+    let size = [between(random, 0.3, 0.7), between(random, 0.2, 0.5), between(random, 0.1, 0.4)];
+    let [skew, taper] = [between(random, 0.02, 0.2), between(random, -0.1, 0.1)];
+    let mesh = Mesh::from_cells(Element::Hex8, &grid(cells), |[x, y, z]| {
+        [size[0] * x + skew * y, size[1] * y * (1.0 - taper * x), size[2] * z * (1.0 + taper * y)]
+    });
+    let border = 0.5 * size[0];
+    let stiff = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let soft = Material { youngs: between(random, 0.5, 4.0), density: between(random, 0.3, 3.0), ..stiff };
+    let parts = [(mesh.part(|node| node[0] < border), stiff), (mesh.part(|node| node[0] >= border), soft)];
+    let [left, right] = parts.each_ref().map(|(part, material)| part.assemble(material, rule));
+    let raw = left.plus(&right).raw_model();
+    let geometric_stiffness = match rule == MassRule::Consistent && one_in(random, 3) {
+        true => of_spin(&raw, &parts),
+        false => Vec::new(),
+    };
+    RawModel { geometric_stiffness, ..raw }
+}
+
+/// The model with interfaces `root` and `tip` of its nodes of least and largest x; `by_node`: the root is its last
+/// node. Three of the nodes may lie on one line, four do not.
+fn with_ends(raw: RawModel, by_node: bool) -> RawModel {
+    const AT_ROOT: usize = 3;
+    const AT_TIP: usize = 4;
+    let mut order: Vec<usize> = (0..raw.nodes.len()).collect();
+    order.sort_by(|&a, &b| raw.nodes.positions[a][0].total_cmp(&raw.nodes.positions[b][0]));
+    let set = |name: &str, nodes: &[usize]| {
+        let places = nodes.iter().map(|&i| Vector3::from(raw.nodes.positions[i]));
+        let mean = places.sum::<Vector3<f64>>() / nodes.len() as f64;
+        NodeSet {
+            coupling: Some(Coupling::Averaging),
+            reference: Reference::Point(mean.into()),
+            ..NodeSet::new(name, nodes.iter().map(|&i| raw.nodes.ids[i]).collect())
+        }
+    };
+    let root = match by_node {
+        true => NodeSet::new("root", raw.nodes.ids.last().copied().into_iter().collect()),
+        false => set("root", &order[..AT_ROOT]),
+    };
+    let interfaces = vec![root, set("tip", &order[order.len() - AT_TIP..])];
+    RawModel { interfaces, ..raw }
+}
+
+/// True if a node has rotations.
+pub fn turns(raw: &RawModel, id: i64) -> bool {
+    raw.dofs.iter().flatten().any(|label| label.node == id && label.direction > 3)
+}

@@ -1,0 +1,140 @@
+//! Commands that judge a motion, by the functions that the command line calls.
+
+mod response;
+mod simulation;
+mod verdicts;
+
+use crate::outputs::{Output, Outputs, Values};
+use crate::subject::Subject;
+use crate::transformations::Reach;
+use flexbody::base::diagnostic::Diagnostic;
+use flexbody::base::error::Result;
+use flexbody::motion::scene::{Scene, Scheme};
+use std::collections::BTreeSet;
+
+/// A command with its name.
+pub struct Command {
+    /// Name.
+    pub name: &'static str,
+    /// Outputs of a subject.
+    pub run: fn(&Subject) -> Result<Outputs>,
+    /// Transformations that it is crossed with.
+    pub meets: fn(Reach) -> bool,
+}
+
+/// All commands, `simulate` first.
+pub const ALL: [Command; 6] = [
+    Command { name: "simulate", run: simulation::simulation, meets: |_| true },
+    Command { name: "select a body", run: verdicts::select_body, meets: |reach| reach != Reach::Simulation },
+    Command { name: "select a model", run: verdicts::select_model, meets: of_model },
+    Command { name: "trade", run: verdicts::trading, meets: |reach| reach != Reach::Simulation },
+    Command { name: "convert for the scene", run: verdicts::conversion, meets: of_model },
+    Command {
+        name: "response",
+        run: response::response,
+        meets: |reach| matches!(reach, Reach::All | Reach::Body),
+    },
+];
+
+/// True of what reaches commands that convert a model themselves.
+fn of_model(reach: Reach) -> bool {
+    matches!(reach, Reach::All | Reach::Scene)
+}
+
+/// Tolerance of the integrations of verdicts: that of a scene file.
+const TOLERANCE: f64 = 1e-9;
+
+/// Factor of the allowed difference of values that are read off at the places that an integration has looked at: other
+/// steps are other places, and a parabola through three of them finds a largest value to about 1e-4 (measured).
+pub const LOOKED_AT: f64 = 1000.0;
+
+/// Factor of the allowed difference of the largest spin, which is looked for at the ends of steps alone.
+pub const STEP_ENDS: f64 = 1e4;
+
+/// Factor of the allowed difference of errors of a motion against another: both are read off at places.
+const ERRORS: f64 = 1e4;
+
+/// Outputs that are known not to correspond, by a part of their name. Their differences are counted and shown, and fail
+/// nothing; an entry goes as soon as its cause does.
+///
+/// * `FB542`: components of the spin are tested one by one.
+/// * `FB546`: the worst of six axes is taken.
+/// * The largest deflection (and with it `FB541`) is relative to a box along the axes of the model, and the amplitudes that sizes of terms
+///   (significances, the Coriolis torque) are taken at are a part of it.
+/// * Enriched bodies: the responses that join a body are chosen by rounding where its basis is nearly complete, and a
+///   limit of the estimate decides whether more rounds follow.
+pub const OPEN: [&str; 7] = [
+    "FB541",
+    "FB542",
+    "FB546",
+    "largest deflection of the body",
+    "significances",
+    "Coriolis torque",
+    ENRICHED,
+];
+
+/// End of the name of what depends on the modes of an enriched body.
+const ENRICHED: &str = "of an enriched body";
+
+/// Factor of the allowed difference of percentages in messages, which have two or three digits.
+const DIGITS: f64 = 2e5;
+
+/// The load cases of a verdict.
+fn cases(subject: &Subject) -> Result<Vec<Scene>> {
+    let mut scenes = subject.scenes()?;
+    scenes.iter_mut().for_each(|scene| scene.run.scheme = Scheme::Adaptive { tolerance: TOLERANCE });
+    Ok(scenes)
+}
+
+/// Codes of findings, each once, in order.
+pub fn codes(found: &[Diagnostic]) -> String {
+    let codes: BTreeSet<&str> = found.iter().map(|one| one.code().id()).collect();
+    codes.into_iter().collect::<Vec<_>>().join(" ")
+}
+
+/// A decision, in words.
+pub fn facts(name: &str, facts: String) -> Output {
+    let values = Values::Facts(facts);
+    Output {
+        name: name.to_owned(),
+        unit: [0; 3],
+        values,
+        derivative: None,
+        least: 0.0,
+        by_instant: false,
+        slack: 1.0,
+    }
+}
+
+/// A number of the whole motion.
+pub fn number(name: &str, unit: [i32; 3], value: f64, least: f64) -> Output {
+    let values = Values::Numbers(vec![value]);
+    Output { values, unit, least, ..facts(name, String::new()) }
+}
+
+/// Codes of findings, and the percentages in their messages.
+pub fn findings(found: &[Diagnostic]) -> Vec<Output> {
+    let (open, others): (Vec<_>, Vec<_>) =
+        found.iter().cloned().partition(|one| OPEN.contains(&one.code().id()));
+    let mut outputs =
+        vec![facts("findings", codes(&others)), facts("findings FB541 FB542 FB546", codes(&open))];
+    for (i, one) in found.iter().enumerate() {
+        let name = format!("percentages of {}, finding {i}", one.code().id());
+        let words: Vec<&str> = one.message().split_whitespace().collect();
+        let numbers = words.windows(2).filter(|pair| pair[1].starts_with('%'));
+        let numbers: Vec<f64> = numbers.filter_map(|pair| pair[0].parse().ok()).collect();
+        outputs.push(Output {
+            values: Values::Numbers(numbers),
+            slack: DIGITS,
+            ..facts(&name, String::new())
+        });
+    }
+    outputs
+}
+
+/// An error over its tolerance.
+pub fn error(name: &str, errors: Vec<f64>) -> Output {
+    /// Errors below this part of the tolerance are those of the integration.
+    const LEAST: f64 = 1e-3;
+    Output { values: Values::Numbers(errors), least: LEAST, slack: ERRORS, ..facts(name, String::new()) }
+}

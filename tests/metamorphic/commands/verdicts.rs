@@ -1,0 +1,102 @@
+//! `select`, `trade` and `convert --scene`.
+
+use super::{ENRICHED, cases, error, facts, findings};
+use crate::outputs::{Output, Outputs};
+use crate::subject::{Basis, Subject};
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::numerics::eigen::Resume;
+use flexbody::study::reference::ReferenceError;
+use flexbody::study::selection::{Selection, select_for_cases};
+use flexbody::study::tailoring::{Tailoring, convert_for_cases};
+use flexbody::study::trade::{Kind, Row, Settings, Source, trade_for_cases};
+
+/// Errors over their tolerances are compared up to this one.
+const BEYOND: f64 = 2.0;
+
+/// Outputs of a selection among so many modes.
+///
+/// Bodies that are enriched with responses to the residual forces of one another follow ways that rounding chooses:
+/// their groups correspond, their modes and what depends on them is open.
+fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
+    let is_enriched = matches!(subject.basis, Basis::Lowest(count) if modes > count);
+    let name = |name: &str| if is_enriched { format!("{name} {ENRICHED}") } else { name.to_owned() };
+    let Selection { groups, guideline, chosen, n_modes, .. } = selection;
+    let mut all = vec![
+        facts("groups", format!("{groups:?}, {guideline}")),
+        facts(&name("verdict"), format!("{}", selection.holds())),
+        facts(&name("modes"), format!("{:?} of {n_modes}, at first {modes}", selection.modes)),
+    ];
+    if let Some(chosen) = chosen {
+        all.push(error(&name("errors of the selected body"), vec![chosen.worst]));
+    }
+    // The last is a torque beside a rate of the angular momentum "per unit of time".
+    let (last, others) = selection.significances.split_last().expect("terms");
+    let sizes = others.iter().flat_map(|one| [Some(one.bound), one.of_body]);
+    all.push(error(&name("significances"), sizes.flatten().collect()));
+    all.push(Output { unit: [0, 0, -1], ..error(&name("Coriolis torque"), vec![last.bound]) });
+    let told = findings(&selection.diagnostics);
+    all.extend(told.into_iter().map(|output| Output { name: name(&output.name), ..output }));
+    Outputs { times: Vec::new(), all }
+}
+
+/// `select` of a body.
+pub fn select_body(subject: &Subject) -> Result<Outputs> {
+    let body = subject.body()?;
+    let selection = select_for_cases(&body, &[], &cases(subject)?, None, SILENT)?;
+    Ok(outputs(subject, &selection, body.n_modes()))
+}
+
+fn tailoring(subject: &Subject) -> Tailoring {
+    Tailoring { settings: subject.settings(), by_band: false, of_motion: false }
+}
+
+/// `select` of a model.
+pub fn select_model(subject: &Subject) -> Result<Outputs> {
+    let (model, scenes) = (subject.model()?, cases(subject)?);
+    let enriched = tailoring(subject).convert_for_cases(&model, &scenes, Resume::default(), SILENT)?;
+    let body = &enriched.made.body;
+    let selection = select_for_cases(body, &enriched.rounds, &scenes, None, SILENT)?;
+    let mut outputs = outputs(subject, &selection, body.n_modes());
+    let first = enriched.rounds.iter().filter_map(|rounds| Some(rounds.first()?.worst.min(BEYOND)));
+    outputs.all.push(error("errors of the first body", vec![first.fold(0.0, f64::max)]));
+    Ok(outputs)
+}
+
+/// `convert --scene`.
+pub fn conversion(subject: &Subject) -> Result<Outputs> {
+    let (model, scenes) = (subject.model()?, cases(subject)?);
+    let (made, selection) =
+        convert_for_cases(&model, &tailoring(subject), &scenes, Resume::default(), SILENT)?;
+    let mut outputs = outputs(subject, &selection, made.body.n_modes());
+    let told = findings(&made.diagnostics).into_iter();
+    outputs.all.extend(
+        told.map(|output| Output { name: format!("conversion: {} {ENRICHED}", output.name), ..output }),
+    );
+    let lacks = selection.lacks.last().map(ReferenceError::is_reference);
+    outputs.all.push(facts(&format!("reference {ENRICHED}"), format!("{lacks:?}")));
+    Ok(outputs)
+}
+
+/// `trade` of a body beside the motion of all nodes.
+pub fn trading(subject: &Subject) -> Result<Outputs> {
+    let (model, scenes) = (subject.model()?, cases(subject)?);
+    let settings = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
+    let source = Source::new("body", subject.body()?, None)?;
+    let study = trade_for_cases(&[source], &scenes, Some(&model), &settings, SILENT)?;
+    // Rounded numbers are others in a body that is turned.
+    let exact = |row: &&Row| row.candidate.kind() != Kind::Single;
+    let rows: Vec<&Row> = study.rows.iter().filter(exact).collect();
+    let labels: Vec<String> = rows
+        .iter()
+        .map(|row| format!("{:?} {:?} {}", row.candidate.modes, row.candidate.groups, row.outcome.is_ok()))
+        .collect();
+    let errors =
+        rows.iter().filter_map(|row| row.outcome.as_ref().ok()).map(|measured| measured.worst().min(BEYOND));
+    let mut all =
+        vec![facts("candidates", labels.join("; ")), error("errors of the candidates", errors.collect())];
+    let recommended = study.recommended.row().map(|row| &study.rows[row].candidate);
+    all.push(facts("recommended", format!("{:?}", recommended.map(|one| (&one.modes, one.groups)))));
+    all.extend(findings(&study.diagnostics));
+    Ok(Outputs { times: Vec::new(), all })
+}

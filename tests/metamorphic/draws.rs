@@ -1,0 +1,41 @@
+//! Random choices.
+
+use crate::support::random::Random;
+use nalgebra::Vector3;
+
+/// A stream of random numbers for a seed and a purpose: purposes do not share numbers.
+pub fn stream(seed: u64, purpose: u64) -> Random {
+    let mut random =
+        Random(seed.wrapping_mul(0x5851_f42d_4c95_7f2d) ^ purpose.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    random.next_u64();
+    random
+}
+
+/// A number between two others.
+pub fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * 0.5 * (random.signed() + 1.0)
+}
+
+/// One of `count` numbers from 0.
+pub fn pick(random: &mut Random, count: usize) -> usize {
+    (random.next_u64() % count as u64) as usize
+}
+
+/// True once in `of` draws.
+pub fn one_in(random: &mut Random, of: usize) -> bool {
+    pick(random, of) == 0
+}
+
+/// A vector of unit length; of a plane body in its plane.
+pub fn direction(random: &mut Random, dimension: usize) -> Vector3<f64> {
+    let [x, y, z] = random.vector::<3>();
+    Vector3::new(x, y, if dimension == 2 { 0.0 } else { z }).normalize()
+}
+
+/// An axis of unit length that a body may turn about; of a plane body z or its opposite.
+pub fn axis(random: &mut Random, dimension: usize) -> Vector3<f64> {
+    match dimension {
+        2 => Vector3::z() * random.signed().signum(),
+        _ => direction(random, 3),
+    }
+}

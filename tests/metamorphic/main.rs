@@ -1,0 +1,37 @@
+//! The metamorphic matrix: scene features crossed with transformations that must not change the physics, crossed with
+//! the commands that judge a motion.
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod bodies;
+mod commands;
+mod correspondence;
+mod draws;
+mod features;
+mod matrix;
+mod oracle;
+mod outputs;
+mod scenes;
+mod shrink;
+mod stress;
+mod subject;
+mod text;
+mod transformations;
+
+/// Crossings of the plain test: about half a minute on two cores.
+const FEW: u64 = 30;
+
+/// Crossings of the slow test: within three minutes on two cores.
+const MANY: u64 = 200;
+
+#[test]
+fn crossings_keep_the_physics() {
+    matrix::hold(1, FEW);
+}
+
+#[test]
+#[ignore = "slow"]
+fn many_crossings_keep_the_physics() {
+    matrix::hold(1000, MANY);
+}

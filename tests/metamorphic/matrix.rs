@@ -1,0 +1,301 @@
+//! The runner of the crossings.
+
+use crate::commands::{self, Command};
+use crate::draws::{one_in, pick, stream};
+use crate::features::features;
+use crate::outputs::{Outputs, Violation};
+use crate::scenes;
+use crate::shrink::smallest;
+use crate::subject::Subject;
+use crate::text::Text;
+use crate::transformations::{self, Pair, Transformation};
+use flexbody::base::error::{Error, Result};
+use std::collections::BTreeMap;
+use std::fmt::Write;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// The value of an environment variable, or `usual`.
+fn asked(name: &str, usual: u64) -> u64 {
+    std::env::var(name).ok().and_then(|value| value.parse().ok()).unwrap_or(usual)
+}
+
+/// Longest search for the smallest scene of a violation.
+const LONGEST: Duration = Duration::from_secs(40);
+
+/// Crossings that take longer are named.
+const SLOW: Duration = Duration::from_secs(5);
+
+/// One scene, one transformation, one command.
+#[derive(Debug, Clone, Copy)]
+struct Crossing {
+    seed: u64,
+    transformation: usize,
+    command: usize,
+}
+
+/// Outcome of a crossing.
+enum Outcome {
+    /// The transformation does not apply to the scene.
+    Apart,
+    /// Both subjects are refused for the same reason.
+    Refused(String),
+    /// The outputs correspond, with this part of the allowed difference; an output that is open may not.
+    Same(f64, Option<Violation>),
+    /// They do not.
+    Violated(Violation),
+}
+
+/// True of an output that is known to depend on axes.
+fn is_open(name: &str) -> bool {
+    commands::OPEN.iter().any(|open| name.contains(open))
+}
+
+/// Outcome of a refusal. Random scenes are sound, but for a torque where nothing follows a rotation (FB212) and bodies
+/// that `trade --reference nodal` is not for (FB801).
+fn refused(error: &Error) -> Outcome {
+    match code(error) {
+        code if ["FB212", "FB801"].contains(&&*code) => Outcome::Refused(code),
+        _ => violated(format!("a sound scene is refused: {error}")),
+    }
+}
+
+/// A violation by the outcome itself.
+fn violated(detail: String) -> Outcome {
+    Outcome::Violated(Violation { output: "outcome".to_owned(), size: f64::INFINITY, detail })
+}
+
+/// Codes of an error.
+fn code(error: &Error) -> String {
+    commands::codes(error.diagnostics())
+}
+
+impl Crossing {
+    /// The crossing of a number: transformations take turns, and half of all is `simulate`, whose outputs say most; with
+    /// `FLEXBODY_SIMULATED_CROSSINGS` all of them.
+    fn of(number: u64) -> Self {
+        let random = &mut stream(number, 7);
+        let transformation = number as usize % transformations::ALL.len();
+        let Transformation { reach, .. } = transformations::ALL[transformation];
+        let met: Vec<usize> = (0..commands::ALL.len()).filter(|&i| (commands::ALL[i].meets)(reach)).collect();
+        let simulated = one_in(random, 2) || std::env::var_os("FLEXBODY_SIMULATED_CROSSINGS").is_some();
+        let command = if simulated { 0 } else { met[pick(random, met.len())] };
+        Self { seed: number, transformation, command }
+    }
+
+    fn names(&self) -> (&'static str, &'static str) {
+        (transformations::ALL[self.transformation].name, commands::ALL[self.command].name)
+    }
+
+    /// The pair of the scene, with the second case transformed alike.
+    fn pair(&self, subject: &Subject) -> Result<Option<Pair>> {
+        let of = |subject: &Subject| {
+            (transformations::ALL[self.transformation].apply)(subject, &mut stream(self.seed, 3))
+        };
+        let Some(second) = &subject.second else { return of(subject) };
+        let alone = Subject { scene: second.clone(), second: None, ..subject.clone() };
+        let (Some(mut pair), Some(other)) = (of(subject)?, of(&alone)?) else { return Ok(None) };
+        pair.original.second = Some(other.original.scene);
+        pair.changed.second = Some(other.changed.scene);
+        Ok(Some(pair))
+    }
+
+    fn run(&self, subject: &Subject) -> Outcome {
+        let command = commands::ALL[self.command].run;
+        let pair = match self.pair(subject) {
+            Ok(Some(pair)) => pair,
+            Ok(None) => return Outcome::Apart,
+            Err(error) => return refused(&error),
+        };
+        let (own, other): (Result<Outputs>, Result<Outputs>) =
+            (command(&pair.original), command(&pair.changed));
+        match (own, other) {
+            (Ok(own), Ok(other)) => match own.compare(&other, &pair.map, |name| !is_open(name)) {
+                (_, Some(violation)) => Outcome::Violated(violation),
+                (size, None) => Outcome::Same(size, own.compare(&other, &pair.map, is_open).1),
+            },
+            (Err(own), Err(other)) if code(&own) == code(&other) => refused(&own),
+            (Err(own), Err(other)) => violated(format!("refused by `{own}` and by `{other}`")),
+            (Ok(_), Err(other)) => violated(format!("the changed scene is refused: {other}")),
+            (Err(own), Ok(_)) => violated(format!("the original scene is refused: {own}")),
+        }
+    }
+
+    /// A violation with the smallest scene that shows it.
+    fn told(&self, subject: &Subject, found: &Violation) -> String {
+        let started = Instant::now();
+        let fails = |subject: &Subject| {
+            started.elapsed() < LONGEST
+                && matches!(self.run(subject), Outcome::Violated(other) if other.output == found.output)
+        };
+        let small = smallest(subject, fails);
+        let (transformation, command) = self.names();
+        let mut told = format!(
+            "crossing {}: {transformation} x {command}: {}, {:.1e} times what is allowed: {}\nbody: {}, {:?}, frame {:?}\nfeatures: {}\n",
+            self.seed,
+            found.output,
+            found.size,
+            found.detail,
+            small.kind,
+            small.basis,
+            small.frame,
+            features(&small).join(", ")
+        );
+        let changed = self.pair(&small).ok().flatten().map(|pair| pair.changed.scene);
+        for (name, scene) in [("scene", Some(small.scene)), ("changed scene", changed)] {
+            let Some(scene) = scene else { continue };
+            let text = Text::of(&scene);
+            let _ = writeln!(told, "--- {name}\n{}", text.scene);
+            for (name, table) in text.tables {
+                let _ = writeln!(told, "--- {name}\n{table}");
+            }
+        }
+        told
+    }
+}
+
+/// A crossing that was run.
+struct Run {
+    /// Features of the scene.
+    features: Vec<&'static str>,
+    /// The outcome; of a violation with the smallest scene in its detail.
+    outcome: Outcome,
+}
+
+impl Run {
+    fn of(number: u64) -> Self {
+        let crossing = Crossing::of(number);
+        let subject = match scenes::subject(number) {
+            Ok(subject) => subject,
+            Err(error) => return Self { features: Vec::new(), outcome: refused(&error) },
+        };
+        let outcome = match crossing.run(&subject) {
+            Outcome::Violated(found) => {
+                let detail = crossing.told(&subject, &found);
+                Outcome::Violated(Violation { detail, ..found })
+            }
+            outcome => outcome,
+        };
+        Self { features: features(&subject), outcome }
+    }
+}
+
+/// Counts and violations of many crossings.
+#[derive(Default)]
+struct Matrix {
+    /// Crossings of feature and transformation.
+    counts: BTreeMap<(&'static str, &'static str), usize>,
+    /// Crossings of transformation and command.
+    commands: BTreeMap<(&'static str, &'static str), usize>,
+    /// Largest differences by transformation.
+    largest: BTreeMap<&'static str, f64>,
+    refused: BTreeMap<String, usize>,
+    apart: usize,
+    scenes: usize,
+    /// Differences of open outputs by output and transformation: their number, and the first with its crossing.
+    open: BTreeMap<(String, &'static str), (usize, u64, String)>,
+    violations: Vec<String>,
+}
+
+impl Matrix {
+    fn add(&mut self, number: u64, run: Run) {
+        let (transformation, command) = Crossing::of(number).names();
+        match run.outcome {
+            Outcome::Apart => self.apart += 1,
+            Outcome::Refused(code) => *self.refused.entry(code).or_default() += 1,
+            Outcome::Same(size, open) => {
+                self.scenes += 1;
+                if let Some(Violation { output, detail, .. }) = open {
+                    self.open.entry((output, transformation)).or_insert((0, number, detail)).0 += 1;
+                }
+                let largest = self.largest.entry(transformation).or_default();
+                *largest = largest.max(size);
+                *self.commands.entry((transformation, command)).or_default() += 1;
+                for feature in run.features {
+                    *self.counts.entry((feature, transformation)).or_default() += 1;
+                }
+            }
+            Outcome::Violated(violation) => self.violations.push(violation.detail),
+        }
+    }
+
+    /// The counts as a table.
+    fn table(&self) -> String {
+        let mut table = String::new();
+        let crossings: usize = self.counts.values().sum();
+        let _ = writeln!(
+            table,
+            "{} scenes, {crossings} crossings of feature and transformation, {} where the transformation does not apply, refused: {:?}",
+            self.scenes, self.apart, self.refused
+        );
+        for ((output, transformation), (count, first, detail)) in &self.open {
+            let _ = writeln!(
+                table,
+                "open: {output} x {transformation}: {count}, first in crossing {first}: {detail}"
+            );
+        }
+        let mut features: Vec<&str> = self.counts.keys().map(|(feature, _)| *feature).collect();
+        features.dedup();
+        for (i, Transformation { name, .. }) in transformations::ALL.iter().enumerate() {
+            let largest = self.largest.get(name).copied().unwrap_or(0.0);
+            let by_command: Vec<String> = commands::ALL
+                .iter()
+                .map(|Command { name: command, .. }| {
+                    format!("{command} {}", self.commands.get(&(*name, *command)).unwrap_or(&0))
+                })
+                .collect();
+            let _ = writeln!(
+                table,
+                "{i:>2} {name}: {}; largest difference {largest:.1e} of what is allowed",
+                by_command.join(", ")
+            );
+        }
+        for feature in features {
+            let row: String = transformations::ALL
+                .iter()
+                .map(|Transformation { name, .. }| {
+                    format!("{:>4}", self.counts.get(&(feature, *name)).unwrap_or(&0))
+                })
+                .collect();
+            let _ = writeln!(table, "{feature:>24}{row}");
+        }
+        table
+    }
+}
+
+/// Runs `few` crossings from number `first` on, or those that `FLEXBODY_CROSSINGS` and `FLEXBODY_FIRST_CROSSING` ask for.
+///
+/// # Panics
+/// With the smallest scene of every violation.
+pub fn hold(first: u64, few: u64) {
+    let (first, crossings) = (asked("FLEXBODY_FIRST_CROSSING", first), asked("FLEXBODY_CROSSINGS", few));
+    let started = Instant::now();
+    let (next, matrix) = (AtomicU64::new(first), Mutex::new(Matrix::default()));
+    let work = || {
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if number >= first + crossings {
+                return;
+            }
+            let before = Instant::now();
+            let run = Run::of(number);
+            let took = before.elapsed();
+            if took > SLOW {
+                println!("crossing {number} {:?} took {took:.1?}", Crossing::of(number).names());
+            }
+            if let Outcome::Violated(violation) = &run.outcome {
+                println!("{}", violation.detail);
+            }
+            matrix.lock().expect("no panic").add(number, run);
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(work);
+        scope.spawn(work);
+    });
+    let matrix = matrix.into_inner().expect("no panic");
+    println!("{}{:.1?}", matrix.table(), started.elapsed());
+    let Matrix { violations, .. } = matrix;
+    assert!(violations.is_empty(), "{} violations:\n{}", violations.len(), violations.join("\n"));
+}

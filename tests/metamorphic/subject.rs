@@ -1,0 +1,113 @@
+//! A model with the scene that it is put into.
+
+use crate::text;
+use flexbody::base::error::Result;
+use flexbody::base::progress::SILENT;
+use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
+use flexbody::body::convert::{ConvertSettings, convert};
+use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
+use flexbody::formats::flex_body_file;
+use flexbody::model::{FeModel, RawModel};
+use flexbody::motion::scene::{Scene, read_cases};
+use flexbody::numerics::eigen::Wanted;
+
+/// Modes of a conversion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    /// The lowest free modes.
+    Lowest(usize),
+    /// All free modes: a complete basis.
+    All,
+    /// All fixed-interface modes and all constraint modes: a complete basis.
+    Fixed,
+}
+
+/// A model, its conversion, and the load cases of the body.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// Name of the kind of body.
+    pub kind: &'static str,
+    /// The model.
+    pub raw: RawModel,
+    /// Modes of the conversion.
+    pub basis: Basis,
+    /// Frame of the conversion.
+    pub frame: BodyFrame,
+    /// The scene.
+    pub scene: Scene,
+    /// Number of load cases that are the scene.
+    pub cases: usize,
+    /// Another load case.
+    pub second: Option<Scene>,
+    /// True if the body is written and read before use.
+    pub stored: bool,
+    /// True if the scene is written and read before use.
+    pub written: bool,
+}
+
+impl Subject {
+    /// The checked model.
+    ///
+    /// # Errors
+    /// Errors of [`FeModel::from_raw`].
+    pub fn model(&self) -> Result<FeModel> {
+        Ok(FeModel::from_raw(self.raw.clone())?.model)
+    }
+
+    /// Settings of the conversion.
+    pub fn settings(&self) -> ConvertSettings {
+        let wanted = match self.basis {
+            Basis::Lowest(count) => count,
+            Basis::All | Basis::Fixed => usize::MAX,
+        };
+        let basis = match self.basis {
+            Basis::Fixed => BasisChoice::CraigBampton(CraigBampton),
+            Basis::Lowest(_) | Basis::All => BasisChoice::default(),
+        };
+        ConvertSettings {
+            modes: ModeSettings { wanted: Wanted::Lowest(wanted), ..ModeSettings::default() },
+            basis,
+            frame: self.frame,
+            lumped: Vec::new(),
+            ..ConvertSettings::default()
+        }
+    }
+
+    /// The body.
+    ///
+    /// # Errors
+    /// Errors of the conversion, and of the file.
+    pub fn body(&self) -> Result<FlexBody> {
+        let body = convert(&self.model()?, &self.settings(), SILENT)?.body;
+        if !self.stored {
+            return Ok(body);
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("body.flex.h5");
+        flex_body_file::write(&body, &path)?;
+        flex_body_file::read(&path)
+    }
+
+    /// The load cases.
+    ///
+    /// # Errors
+    /// Errors of the scene file.
+    pub fn scenes(&self) -> Result<Vec<Scene>> {
+        if !self.written {
+            return Ok(self.with_second(vec![self.scene.clone(); self.cases]));
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        Ok(self.with_second(read_cases(text::write(&self.scene, folder.path()))?))
+    }
+
+    fn with_second(&self, mut scenes: Vec<Scene>) -> Vec<Scene> {
+        scenes.extend(self.second.clone());
+        scenes
+    }
+
+    /// Number of dimensions of the model.
+    pub fn dimension(&self) -> usize {
+        usize::from(self.raw.dimension)
+    }
+}

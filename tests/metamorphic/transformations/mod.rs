@@ -1,0 +1,89 @@
+//! Transformations that must not change the physics.
+
+mod body;
+mod histories;
+mod model;
+mod moved;
+mod scene;
+mod units;
+mod world;
+
+pub use histories::{Driven, for_driving};
+
+use crate::correspondence::Correspondence;
+use crate::subject::Subject;
+use crate::support::random::Random;
+use flexbody::base::error::Result;
+
+/// Two subjects whose outputs must correspond.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    /// The one.
+    pub original: Subject,
+    /// The other.
+    pub changed: Subject,
+    /// Relations between the outputs of the two.
+    pub map: Correspondence,
+}
+
+impl Pair {
+    /// A changed subject beside the unchanged one.
+    fn new(original: &Subject, changed: Subject, map: Correspondence) -> Self {
+        Self { original: original.clone(), changed, map }
+    }
+}
+
+/// A transformation: for a subject and random numbers the pair, or `None` where it does not apply.
+type Apply = fn(&Subject, &mut Random) -> Result<Option<Pair>>;
+
+/// Commands that a transformation is crossed with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Reach {
+    /// `simulate` alone: a complete basis is no matter of verdicts, and a part of a motion has other largest values.
+    Simulation,
+    /// Commands that are given a body.
+    Body,
+    /// Commands that a scene matters to.
+    Scene,
+    /// All commands.
+    All,
+}
+
+/// A transformation with its name and reach.
+pub struct Transformation {
+    /// Name.
+    pub name: &'static str,
+    /// Commands.
+    pub reach: Reach,
+    /// The transformation.
+    pub apply: Apply,
+}
+
+const fn of(name: &'static str, reach: Reach, apply: Apply) -> Transformation {
+    Transformation { name, reach, apply }
+}
+
+/// All transformations.
+pub const ALL: [Transformation; 21] = [
+    of("turn the world", Reach::Scene, world::turn),
+    of("shift the world", Reach::Scene, world::shift),
+    of("boost the world", Reach::Scene, world::boost),
+    of("accelerate the world", Reach::Scene, world::accelerate),
+    of("mirror the world and the model", Reach::All, world::mirror),
+    of("turn the model", Reach::All, model::turn),
+    of("shift the model", Reach::All, model::shift),
+    of("renumber the nodes", Reach::All, model::renumber),
+    of("permute the rows", Reach::All, model::permute),
+    of("change the units", Reach::All, units::change),
+    of("another frame", Reach::All, body::frame),
+    of("another complete basis", Reach::Simulation, body::basis),
+    of("write and read the body", Reach::Body, body::stored),
+    of("write and read the scene", Reach::Scene, body::written),
+    of("other axes of vectors", Reach::Scene, scene::axes),
+    of("split a load", Reach::Scene, scene::split),
+    of("refine a table", Reach::Scene, scene::refine),
+    of("start later", Reach::Scene, scene::later),
+    of("start from a state", Reach::Simulation, scene::restart),
+    of("repeat a case", Reach::Scene, scene::repeat),
+    of("more outputs", Reach::Scene, scene::outputs),
+];
