@@ -135,7 +135,9 @@ impl Missed {
     /// of the root of the elastic energy. `moving`: z (k x m).
     pub fn dominant(&self, moving: &Mat<f64>, enough: f64) -> Mat<f64> {
         let none = || Mat::zeros(self.forces.nrows(), 0);
-        let Some((turned, roots)) = principal(self.energy.clone(), 0.0, usize::MAX) else { return none() };
+        let Some((turned, roots)) = principal(self.energy.clone(), ROUNDING, usize::MAX) else {
+            return none();
+        };
         // w = T'z with E'K E = T T': the elastic energy is |w|^2 / 2.
         let w = |k: usize, i: usize| -> f64 {
             roots[k] * (0..turned.nrows()).map(|row| turned[(row, k)] * moving[(row, i)]).sum::<f64>()
@@ -207,7 +209,7 @@ impl Beside<'_> {
     /// The forces M E y of the few E y that have nearly all of the elastic energy of E c(t). `amplitudes`: c.
     fn inertia(&self, responses: Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
         let responses = self.of(responses);
-        let Some((turned, roots)) = principal(self.energy(&responses), 0.0, usize::MAX) else {
+        let Some((turned, roots)) = principal(self.energy(&responses), ROUNDING, usize::MAX) else {
             return Mat::zeros(responses.nrows(), 0);
         };
         let moving = gram(turned.as_ref(), amplitudes.as_ref());

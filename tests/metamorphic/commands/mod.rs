@@ -57,21 +57,9 @@ const ERRORS: f64 = 1e4;
 /// Outputs that are known not to correspond, by a part of their name. Their differences are counted and shown, and fail
 /// nothing; an entry goes as soon as its cause does.
 ///
-/// * `FB542`: components of the spin are tested one by one.
-/// * `FB546`: the worst of six axes is taken.
-/// * The largest deflection (and with it `FB541`) is relative to a box along the axes of the model, and the amplitudes that sizes of terms
-///   (significances, the Coriolis torque) are taken at are a part of it.
 /// * Enriched bodies: the responses that join a body are chosen by rounding where its basis is nearly complete, and a
 ///   limit of the estimate decides whether more rounds follow.
-pub const OPEN: [&str; 7] = [
-    "FB541",
-    "FB542",
-    "FB546",
-    "largest deflection of the body",
-    "significances",
-    "Coriolis torque",
-    ENRICHED,
-];
+pub const OPEN: [&str; 1] = [ENRICHED];
 
 /// End of the name of what depends on the modes of an enriched body.
 const ENRICHED: &str = "of an enriched body";
@@ -114,10 +102,7 @@ pub fn number(name: &str, unit: [i32; 3], value: f64, least: f64) -> Output {
 
 /// Codes of findings, and the percentages in their messages.
 pub fn findings(found: &[Diagnostic]) -> Vec<Output> {
-    let (open, others): (Vec<_>, Vec<_>) =
-        found.iter().cloned().partition(|one| OPEN.contains(&one.code().id()));
-    let mut outputs =
-        vec![facts("findings", codes(&others)), facts("findings FB541 FB542 FB546", codes(&open))];
+    let mut outputs = vec![facts("findings", codes(found))];
     for (i, one) in found.iter().enumerate() {
         let name = format!("percentages of {}, finding {i}", one.code().id());
         let words: Vec<&str> = one.message().split_whitespace().collect();
