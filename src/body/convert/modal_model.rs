@@ -68,7 +68,7 @@ impl<'m> ModalModel<'m> {
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
-        let interfaces = interfaces(model, &frame, coupled);
+        let interfaces = interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,
             settings,
@@ -113,7 +113,7 @@ fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperti
 
 /// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where
 /// none was stated.
-fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
+pub(crate) fn interfaces_in_frame(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     let in_body = |reference: &Reference| match reference {
         Reference::Point(x) => Some(frame.to_body(&[*x])[0]),
