@@ -251,6 +251,11 @@ impl<'a> Recomputed<'a> {
     /// What accuracy `certified` guarantees, where it does.
     fn guarantee(&self) -> Vec<IdentityCheck> {
         let body = self.body;
+        if body.certificate().guarantee.is_some() && !self.model.has_exact_scalar_mass() {
+            let formula = "M as stored is what the bounds are about: the same along x, y and z";
+            let deviation = self.model.mass_deviation().max(f64::MIN_POSITIVE);
+            return vec![IdentityCheck::new("certified_mass", formula, deviation, 0.0)];
+        }
         let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, self.model.scalar_mass()) else {
             return Vec::new();
         };

@@ -172,7 +172,7 @@ fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
                 Some((stored - value).abs() / value.abs().max(1.0))
             })
             .collect();
-        largest(differences.into_iter())
+        largest(differences)
     };
     if body.lumped().is_empty() {
         return None;
