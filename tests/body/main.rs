@@ -13,6 +13,7 @@ mod first_shift;
 mod geometric_stiffness;
 mod imported_shapes;
 mod invariants;
+mod lumped_modes;
 mod partial_bodies;
 mod partial_conversion;
 mod residual_vectors;
