@@ -202,6 +202,7 @@ codes! {
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     MotionWithoutBasis = "FB552", Note, Done, "a motion that no few shapes make", "nothing to do: the modes are those without --basis scene";
+    SelectionUnjudged = "FB557", Error, CheckFailed, "a body for a scene that it does not hold, or where nothing can be said of it", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body all the same";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -11,6 +11,11 @@ use crate::model::{Damping, FeModel, GeometricStiffness, UnitLoad};
 use crate::numerics::eigen::{relative_residual, residual_scale, rounding_residual};
 use crate::numerics::linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
 use faer::Mat;
+use interfaces::interface_checks;
+use recounts::recounts;
+
+mod interfaces;
+mod recounts;
 
 /// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
 const RECOMPUTED: f64 = 1e-12;
@@ -22,9 +27,12 @@ const STIFFNESS: &str = "modal_stiffness";
 /// shapes were also turned into body axes and back.
 const ROUNDING: f64 = 30.0;
 
-/// What must hold for `body` without its model: the identities of `flexbody check`.
+/// Everything that must hold for `body` without its model: the identities of theory section 10, and the statements
+/// of the file that its own numbers can be held to.
 pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
-    body.identities(frame_of(body))
+    let mut checks = body.identities(frame_of(body));
+    checks.extend(recounts(body));
+    checks
 }
 
 /// What the frame of `body` was meant to be.
@@ -64,6 +72,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     checks.extend(against.geometric_stiffness()?);
     checks.extend(against.inertia_stiffness());
     checks.extend(against.guarantee());
+    checks.extend(interface_checks(body, model));
     Ok(checks)
 }
 
@@ -242,6 +251,11 @@ impl<'a> Recomputed<'a> {
     /// What accuracy `certified` guarantees, where it does.
     fn guarantee(&self) -> Vec<IdentityCheck> {
         let body = self.body;
+        if body.certificate().guarantee.is_some() && !self.model.has_exact_scalar_mass() {
+            let formula = "M as stored is what the bounds are about: the same along x, y and z";
+            let deviation = self.model.mass_deviation().max(f64::MIN_POSITIVE);
+            return vec![IdentityCheck::new("certified_mass", formula, deviation, 0.0)];
+        }
         let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, self.model.scalar_mass()) else {
             return Vec::new();
         };

@@ -440,6 +440,9 @@ pub struct ConvertArguments {
     /// Load case of the scene to take, by its name [default: all, which one body has to serve]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
+    /// Write the body of a scene although its selection does not hold, or cannot be judged (FB557)
+    #[arg(long, requires = "scene")]
+    pub allow_unjudged: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,

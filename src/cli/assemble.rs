@@ -59,6 +59,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         no_mesh: arguments.no_mesh,
         scene: None,
         case: None,
+        allow_unjudged: false,
         report: arguments.report.clone(),
         checkpoint: None,
         split: false,

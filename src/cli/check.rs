@@ -5,6 +5,7 @@ use super::models::of_manifest_or_job;
 use super::outcome::Outcome;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
+use crate::body::convert::poor_fits;
 use crate::body::flex_body::FlexBody;
 use crate::body::verification::{changed_sources, own_identities, verify};
 use crate::formats::flex_body_file;
@@ -18,6 +19,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
     let (body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
+    diagnostics.extend(poor_fits(&body));
     let mut checks = own_identities(&body);
     if let Some(path) = &arguments.against {
         let files = of_manifest_or_job(path, &arguments.job)?;

@@ -10,6 +10,7 @@ use super::places::{Places, Reserved, format_of, refuse_replacing};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::select::asked_cases;
 use super::terminal::body_text;
+use super::unjudged::refuse_unjudged;
 use super::watcher::Watcher;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
@@ -190,6 +191,7 @@ impl Job<'_> {
         }?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
+        refuse_unjudged(arguments, selection.as_ref(), &conversion.diagnostics)?;
         if arguments.storage == StorageName::F32 {
             conversion.body = conversion.body.rounded_to_f32()?;
         }
@@ -506,6 +508,7 @@ fn run_data(
             subspace_cosine: pipeline.subspace_cosine,
             comparison: pipeline.comparison.clone(),
             remark: pipeline.remark.clone(),
+            caution: pipeline.caution.clone(),
         })
         .collect();
     RunData {

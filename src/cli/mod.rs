@@ -26,6 +26,7 @@ mod select;
 mod simulate;
 mod terminal;
 mod trade;
+mod unjudged;
 mod view;
 mod watcher;
 

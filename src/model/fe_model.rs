@@ -28,6 +28,8 @@ pub struct FeModel {
     /// M, where it is not Ms kron I_d.
     whole_mass: Option<SymmetricMatrix>,
     commutes: bool,
+    /// True if Ms kron I_d is M to the last bit.
+    exact_scalar_mass: bool,
     damping: Option<Damping<SymmetricMatrix>>,
     geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
     interfaces: Vec<NodeSet>,
@@ -67,6 +69,7 @@ impl FeModel {
             mean_mass: form.scalar,
             whole_mass: (!scalar).then_some(mass),
             commutes: form.commutes,
+            exact_scalar_mass: form.commutes && form.exact,
             damping,
             geometric_stiffness,
             interfaces: raw.interfaces,
@@ -130,6 +133,7 @@ impl FeModel {
             mean_mass: diagonal(&mut masses.iter().copied(), self.mean_mass.n()),
             whole_mass: (!self.rows.are_plain()).then(|| diagonal(by_row, self.rows.len())),
             commutes: true,
+            exact_scalar_mass: true,
             mass_deviation: 0.0,
             fixed_mass_share: 0.0,
             diagonal_mass: true,
@@ -148,6 +152,12 @@ impl FeModel {
     /// row carries mass. `None` when M has no such form.
     pub fn scalar_mass(&self) -> Option<&SymmetricMatrix> {
         self.commutes.then_some(&self.mean_mass)
+    }
+
+    /// True if [`scalar_mass`](Self::scalar_mass) is the mass matrix as stored, and no mean of directions that differ
+    /// by rounding.
+    pub fn has_exact_scalar_mass(&self) -> bool {
+        self.exact_scalar_mass
     }
 
     /// M on points and directors; `None` when no rotation of a node carries mass. Made at the first call.

@@ -12,8 +12,11 @@ const NODES: usize = 2048;
 
 /// What the mass matrix turned out to be.
 pub(super) struct MassForm {
-    /// Ms (nodes, then vectors without a place): the mean of the directions of their displacements.
+    /// Ms (nodes, then vectors without a place): the entry of all directions of their displacements where these
+    /// are equal, else the mean of them.
     pub scalar: SymmetricMatrix,
+    /// True if every block is a multiple of the identity to the last bit, so that Ms is M as stored.
+    pub exact: bool,
     /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj), and
     /// where it is.
     pub deviation: f64,
@@ -65,24 +68,26 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     let scale = |a: usize, b: usize| (sizes[a] * sizes[b]).max(smallest);
     let parts: Vec<Part> =
         chunks(n).into_par_iter().map(|nodes| reduce(m, dimension, displacements, nodes, scale)).collect();
-    let (scalar, deviation, worst) = joined(n, parts);
-    let commutes = deviation <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
-    Ok(MassForm { scalar, deviation, worst, commutes })
+    let mut form = joined(n, parts);
+    form.commutes = form.deviation <= tolerance && (displacements..m.n()).all(|row| m.row(row).0.is_empty());
+    Ok(form)
 }
 
-/// Ms (n x n) from its columns part by part, with the largest deviation of a block and its place.
-fn joined(n: usize, parts: Vec<Part>) -> (SymmetricMatrix, f64, (usize, usize)) {
-    let (mut worst, mut worst_at) = (0.0f64, (0, 0));
+/// The form with Ms (n x n) from its columns part by part and the largest deviation of a block with its place;
+/// `commutes` is still to be found.
+fn joined(n: usize, parts: Vec<Part>) -> MassForm {
+    let (mut deviation, mut worst, mut exact) = (0.0f64, (0, 0), true);
     let mut columns = Vec::with_capacity(parts.len());
     for part in parts {
         columns.push(part.columns);
-        if part.worst > worst {
-            (worst, worst_at) = (part.worst, part.worst_at);
+        exact &= !part.differs;
+        if part.worst > deviation {
+            (deviation, worst) = (part.worst, part.worst_at);
         }
     }
     let scalar = SymmetricMatrix::new(Columns::joined(n, columns))
         .expect("the mean of entries is symmetric because each of them is, to the bit");
-    (scalar, worst, worst_at)
+    MassForm { scalar, exact, deviation, worst, commutes: false }
 }
 
 /// Sum of M along each direction over the rows of some nodes and the columns up to `end`, and the mean of the
@@ -114,6 +119,8 @@ struct Part {
     columns: Columns,
     worst: f64,
     worst_at: (usize, usize),
+    /// True if a block is no multiple of the identity to the last bit.
+    differs: bool,
 }
 
 /// Reduces the rows of some nodes, the columns up to `end`; deviations are relative to `scale` of the two
@@ -147,14 +154,16 @@ fn reduce(
                     if j as usize % dimension == k {
                         diagonal[k] = v;
                     } else {
+                        part.differs |= v != 0.0;
                         part.deviates(v.abs() / scale, dimension * node + k, j as usize);
                     }
                 }
             }
             let diagonal = &diagonal[..dimension];
-            let alpha = diagonal.iter().sum::<f64>() / dimension as f64;
+            let alpha = mean(diagonal);
             for (k, &v) in diagonal.iter().enumerate() {
                 let (row, column) = (dimension * node + k, dimension * other as usize + k);
+                part.differs |= v != alpha;
                 part.deviates((v - alpha).abs() / scale, row, column);
             }
             part.columns.push(other as usize, alpha);
@@ -162,6 +171,14 @@ fn reduce(
         part.columns.end();
     }
     part
+}
+
+/// Returns the mean of the values; equal values are their mean, which a sum would round.
+fn mean(values: &[f64]) -> f64 {
+    if values.iter().all(|value| *value == values[0]) {
+        return values[0];
+    }
+    values.iter().sum::<f64>() / values.len() as f64
 }
 
 impl Part {

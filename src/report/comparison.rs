@@ -17,6 +17,11 @@ use serde::Serialize;
 use std::collections::HashMap;
 use std::ops::Range;
 
+mod interfaces;
+mod modal_matrices;
+mod nodal_rows;
+mod not_compared;
+
 /// Largest differences that pass, all relative.
 ///
 /// The defaults are those of two computations of the same model on different machines. Bodies from matrices
@@ -31,11 +36,12 @@ pub struct Tolerances {
     /// Of the inertia about the centre of mass, each entry relative to sqrt(I_kk I_ll). Default 1e-9, as the
     /// mass.
     pub inertia: f64,
-    /// Of invariants and shapes, relative to the Cauchy-Schwarz bounds. Default 1e-8: vectors of modes are
-    /// known to residual / gap, less than eigenvalues.
+    /// Of invariants and shapes, relative to the Cauchy-Schwarz bounds, and of damping and of the stiffness of unit
+    /// loads, relative to their largest entries. Default 1e-8: vectors of modes are known to residual / gap, less
+    /// than eigenvalues.
     pub invariants: f64,
-    /// Of the centre of mass and of node positions, relative to the radius of gyration. Default 1e-9, as the
-    /// mass.
+    /// Of the centre of mass, of node positions and of the reference points of interfaces, relative to the radius
+    /// of gyration. Default 1e-9, as the mass.
     pub centre_of_mass: f64,
 }
 
@@ -69,6 +75,7 @@ pub struct BodyComparison {
     same_nodes: bool,
     rows: Vec<ComparisonRow>,
     notes: Vec<String>,
+    not_compared: Vec<String>,
 }
 
 /// Compares `b` with `a`, in the frame of `a`.
@@ -77,12 +84,14 @@ pub struct BodyComparison {
 /// modes are aligned inside each cluster of close eigenvalues ([`align`](crate::body::invariants::align),
 /// plain product of the nodal components), and positions, shapes and every primary invariant are compared.
 /// Otherwise only what needs no common node is: mass, centre of mass, inertia, frequencies, and the norms of
-/// the invariants over clusters of modes, which no choice of signs or basis changes. A body that comes from a
+/// the invariants over clusters of modes, which no choice of signs or basis changes. Damping, geometric stiffness,
+/// stiffness of inertia and interfaces are compared in both cases. [`BodyComparison::not_compared`] lists the
+/// entries of the file that are not. A body that comes from a
 /// file of another program does not know where its frame is in the model; with such a one the body frames are
 /// taken as the same.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when units or numbers of modes differ; [`compare_common`]
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units, dimensions or numbers of modes differ; [`compare_common`]
 /// compares bodies with different numbers of modes.
 pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
     comparable(a, b)?;
@@ -101,16 +110,24 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         same_nodes: false,
         rows: Vec::new(),
         notes: Vec::new(),
+        not_compared: Vec::new(),
     };
     comparison.rigid(a, b, tolerances);
     let change = FrameChange::new(a, b);
     let in_a = b.invariants().shifted(change.shift).rotated(&change.axes);
     let groups = clusters(&a.modes().eigenvalue, &b.modes().eigenvalue);
     let pair = Pair { a, b, change, in_a, groups };
-    match common_nodes(&a.nodes().ids, &b.nodes().ids) {
-        Some(order) => comparison.mode_by_mode(&pair, &order, tolerances),
-        None => comparison.norms_only(&pair, tolerances.invariants),
-    }
+    let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
+    comparison.not_compared = not_compared::entries(a, b, order.is_some());
+    let basis = match order {
+        Some(order) => Some(comparison.mode_by_mode(&pair, &order, tolerances)),
+        None => {
+            comparison.norms_only(&pair, tolerances.invariants);
+            None
+        }
+    };
+    comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
+    comparison.interfaces(&pair, tolerances.centre_of_mass);
     if !placed {
         let note = "a body comes from a file of another program, which does not tell where its frame is in the model: the body frames are taken as the same";
         comparison.notes.push(note.to_owned());
@@ -171,6 +188,10 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
                 y.name()
             )));
         }
+    }
+    if a.dimension() != b.dimension() {
+        let (a, b) = (a.dimension(), b.dimension());
+        problems.push(incomparable(format!("the first body has dimension {a}, the second {b}")));
     }
     if a.n_modes() != b.n_modes() {
         let message = format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes());
@@ -248,7 +269,19 @@ impl BodyComparison {
         &self.notes
     }
 
-    /// As JSON: `a`, `b`, `passed`, `same_nodes`, `rows`, `notes`.
+    /// Entries of the flex-body file that were not compared, each with its paths: `lumped comparators (/lumped,
+    /// /comparison)`.
+    pub fn not_compared(&self) -> &[String] {
+        &self.not_compared
+    }
+
+    /// Notes, and a sentence for every entry that was not compared.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let left_out = self.not_compared.iter().map(|entry| format!("not compared: {entry}"));
+        self.notes.iter().cloned().chain(left_out).collect()
+    }
+
+    /// As JSON: `a`, `b`, `passed`, `same_nodes`, `rows`, `notes`, `not_compared`.
     pub fn json(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("plain data with text keys")
     }
@@ -264,6 +297,9 @@ impl BodyComparison {
         for note in &self.notes {
             text.push_str(&format!("note: {}\n", plain(note)));
         }
+        for entry in &self.not_compared {
+            text.push_str(&format!("not compared: {entry}\n"));
+        }
         let failed = self.rows.iter().filter(|row| !row.passed).count();
         text.push_str(&match failed {
             0 => "the bodies agree\n".to_owned(),
@@ -271,6 +307,24 @@ impl BodyComparison {
             count => format!("the bodies DIFFER in {count} quantities\n"),
         });
         text
+    }
+
+    /// True if one of the bodies comes from a file of another program, which may have no place for what `has` finds,
+    /// and has none; `name (paths)` is then listed as not compared, if the other has some.
+    fn leave_out(
+        &mut self,
+        pair: &Pair<'_>,
+        name: &str,
+        paths: &str,
+        has: impl Fn(&FlexBody) -> bool,
+    ) -> bool {
+        let may_lack = |body: &FlexBody| !is_placed(body) && !has(body);
+        let left_out = may_lack(pair.a) || may_lack(pair.b);
+        if left_out && (has(pair.a) || has(pair.b)) {
+            let entry = format!("{name}, of which a body of another program has none ({paths})");
+            self.not_compared.push(entry);
+        }
+        left_out
     }
 
     fn row(&mut self, quantity: &'static str, meaning: &'static str, difference: f64, tolerance: f64) {
@@ -327,8 +381,9 @@ impl BodyComparison {
         self.row("frequency", "relative, largest of all modes", largest, tolerances.frequency);
     }
 
-    /// Positions, shapes and invariants; `order` gives the node of b for each of a.
-    fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) {
+    /// Compares positions, shapes and invariants; `order` gives the node of b for each of a. Returns the basis change
+    /// that carries the modes of b to those of a.
+    fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) -> Mat<f64> {
         let Pair { a, b, change, in_a, groups } = pair;
         self.same_nodes = true;
         let (pa, pb) = (&a.nodes().positions, &b.nodes().positions);
@@ -373,6 +428,8 @@ impl BodyComparison {
                 self.row(quantity, meaning, difference, tolerances.invariants + lost);
             }
         }
+        self.nodal_rows(pair, order, alignment.basis.as_ref(), tolerances.invariants);
+        alignment.basis
     }
 
     /// Norms of the invariants over groups of modes, which no orthogonal change inside the groups alters.

@@ -89,11 +89,9 @@ impl ComparisonReport<'_> {
         let rows: Vec<_> = self.comparison.rows().iter().map(cells).collect();
         let head = texts(["Quantity", "Difference", "Tolerance", "", "Relative to"]);
         table(&mut content, "Largest differences, without units", &head, &[0, 3, 4], &rows);
-        if !self.comparison.notes().is_empty() {
-            section(&mut content, "Notes");
-            for note in self.comparison.notes() {
-                content.push_str(&format!("<p>{}</p>\n", escape(note)));
-            }
+        section(&mut content, "Notes");
+        for note in self.comparison.remarks() {
+            content.push_str(&format!("<p>{}</p>\n", escape(&note)));
         }
         page(&self.title(), "Comparison of two bodies", &generator(), &content)
     }
@@ -116,10 +114,8 @@ impl ComparisonReport<'_> {
             let meaning = escape(row.meaning);
             xml.push_str(&format!("><failure message=\"{message}\">{meaning}</failure></testcase>\n"));
         }
-        if !self.comparison.notes().is_empty() {
-            let notes: Vec<String> = self.comparison.notes().iter().map(|note| escape(note)).collect();
-            xml.push_str(&format!("<system-out>{}</system-out>\n", notes.join("\n")));
-        }
+        let notes: Vec<String> = self.comparison.remarks().iter().map(|note| escape(note)).collect();
+        xml.push_str(&format!("<system-out>{}</system-out>\n", notes.join("\n")));
         xml + "</testsuite>\n</testsuites>\n"
     }
 
@@ -135,8 +131,8 @@ impl ComparisonReport<'_> {
                 row.quantity
             ));
         }
-        for note in self.comparison.notes() {
-            text.push_str(&format!("\n* {}\n", cell(note)));
+        for note in self.comparison.remarks() {
+            text.push_str(&format!("\n* {}\n", cell(&note)));
         }
         text
     }

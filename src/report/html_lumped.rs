@@ -128,4 +128,7 @@ pub(super) fn lumped_modes(html: &mut String, facts: &Facts<'_>) {
         &[0, 4],
         &rows,
     );
+    for lumped in facts.lumped_modes.iter().filter(|lumped| !lumped.caution.is_empty()) {
+        html.push_str(&format!("<p>{}: {}</p>\n", escape(&lumped.scheme), escape(&lumped.caution)));
+    }
 }

@@ -130,6 +130,7 @@ pub(super) struct LumpedModesFacts {
     pub scheme: String,
     pub done: bool,
     pub remark: String,
+    pub caution: String,
     pub frequency_hz: Vec<f64>,
     /// Relative change of the frequency that changes most, in ascending order of each; `None` without modes.
     pub worst_frequency_change: Option<f64>,
@@ -148,6 +149,7 @@ impl LumpedModesFacts {
             scheme: lumped.scheme.clone(),
             done: lumped.remark.is_empty(),
             remark: lumped.remark.clone(),
+            caution: lumped.caution.clone(),
             frequency_hz: lumped.frequencies_hz.clone(),
             worst_frequency_change: worst.map(|(_, change)| change),
             worst_frequency_mode: worst.map(|(mode, _)| mode + 1),

@@ -26,6 +26,9 @@ pub struct LumpedModes {
     pub comparison: Vec<(String, f64)>,
     /// Why it could not be done (negative masses, for example); empty when it could.
     pub remark: String,
+    /// Why errors of the invariants and the cosine say little (the count cuts a group of equal frequencies, for
+    /// example); empty when they do not.
+    pub caution: String,
 }
 
 /// Data of one run. The default stands for a body read from a file, of whose run nothing is known.

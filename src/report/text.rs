@@ -236,7 +236,9 @@ pub(super) fn own_modes(lumped: &LumpedModesFacts) -> String {
         return "no modes".to_owned();
     };
     let cosine = significant(lumped.subspace_cosine, 4);
-    format!("frequency {mode} off by {}, subspace cosine {cosine}", percent(change))
+    let caution =
+        if lumped.caution.is_empty() { String::new() } else { format!("; {}", plain(&lumped.caution)) };
+    format!("frequency {mode} off by {}, subspace cosine {cosine}{caution}", percent(change))
 }
 
 fn timing(page: &mut Page, run: &RunFacts) {

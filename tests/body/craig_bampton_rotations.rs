@@ -8,7 +8,7 @@ use flexbody::base::progress::SILENT;
 use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
-use flexbody::body::verification::verify;
+use flexbody::body::verification::{own_identities, verify};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody::numerics::eigen::Wanted;
@@ -74,7 +74,7 @@ fn close(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
 
 fn all_hold(body: &FlexBody, model: &FeModel, what: &str) {
     let mut checks = verify(body, model).expect("the same nodes");
-    checks.extend(body.parts().interface_identities());
+    checks.extend(own_identities(body));
     for check in checks {
         assert!(check.passed, "{what}, {}: {:e} > {:e}", check.name, check.value, check.limit);
     }

@@ -117,7 +117,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     told.body.modal_damping = Some(mix.transpose() * &damping * &mix);
     let load = flexbody::model::UnitLoad { kind: flexbody::model::LoadKind::Spin, component: 1 };
     told.body.geometric_stiffness =
-        vec![GeometricStiffness { load, matrix: mix.transpose() * &damping * &mix }];
+        vec![GeometricStiffness { load: load.clone(), matrix: mix.transpose() * &damping * &mix }];
 
     let Imported { body: taken, diagnostics } = imported(&told).expect("a body");
     assert_eq!(diagnostics.iter().map(|d| d.code()).collect::<Vec<_>>(), [Code::ForeignChanged]);
@@ -126,6 +126,10 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     let mut in_frame = body.clone().into_parts();
     in_frame.frame = *taken.frame();
     in_frame.units = taken.units().clone();
+    let omega: Vec<f64> = in_frame.modes.eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
+    in_frame.modes.damping_ratio = (0..nf).map(|j| damping[(j, j)] / (2.0 * omega[j])).collect();
+    in_frame.geometric_stiffness = vec![GeometricStiffness { load: load.clone(), matrix: damping.clone() }];
+    in_frame.modes.modal_damping = Some(damping.clone());
     let in_frame = FlexBody::new(in_frame).expect("a body");
     let strict = Tolerances { frequency: 1e-11, invariants: 1e-9, ..Tolerances::default() };
     let comparison = compare(&in_frame, &taken, &strict).expect("comparable");

@@ -155,6 +155,23 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
     assert_eq!(array("modes/q"), flat(|s| s.q.clone()));
     assert_eq!(array("modes/qd"), flat(|s| s.qd.clone()));
     assert_eq!(file.dataset("modes/q").unwrap().shape(), [41, 5]);
+    // Scenes of one mode are matrices too.
+    let one = body.reduced(&[0], body.groups(), Vec::new()).expect("a mode");
+    let mut of_one_mode = described.clone();
+    of_one_mode.initial.modes.clear();
+    let (recorded, _) = simulate(&one, &of_one_mode, None, |_| ()).expect("a motion");
+    let single = place.join("single.h5");
+    let slot = flex_body_file::OutputSlot::prepare(&single).expect("a place");
+    flex_body_file::fill_simulation(&recorded, one.units(), &slot).expect("written");
+    slot.commit().expect("in its place");
+    let of_one = hdf5::File::open(&single).expect("HDF5");
+    for name in ["modes/q", "modes/qd"] {
+        assert_eq!(of_one.dataset(name).unwrap().shape(), [41, 1], "{name}");
+    }
+    assert_eq!(of_one.dataset("energy/work").unwrap().shape(), [41]);
+    of_one.close().expect("closed");
+    let read = flex_body_file::read_simulation(&single).expect("readable");
+    assert_eq!((read.modes, read.q.len()), (1, 41));
     let places: Vec<f64> = recording.paths[1].place.iter().flat_map(|v| v.as_slice().to_vec()).collect();
     assert_eq!(array("points/interface bolt_base/place"), places);
     let all = |vectors: &[Vector3<f64>]| -> Vec<f64> {

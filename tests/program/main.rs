@@ -9,6 +9,7 @@ mod bad_input;
 mod checkpoint;
 mod cluster;
 mod command_line;
+mod comparison_coverage;
 mod docs_generated;
 mod front_door;
 #[cfg(unix)]

@@ -99,6 +99,52 @@ fn a_cost_that_nothing_meets_is_a_check_that_fails() {
     assert!(json(&run.stdout)["results"]["chosen"]["multiplications"].as_u64().expect("a number") <= 900);
 }
 
+/// `convert --scene` judges as `select` of the same does: the same exit code, and no file where it does not hold.
+#[test]
+fn a_body_for_a_scene_is_written_where_the_selection_holds_and_only_there() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let tight = "[run]\nduration = 2e-4\noutputs = 4\n[initial]\nangular_velocity = [0, 0, 1]\n\
+                 [tolerance]\nattitude = 1\nstress = 1e-7\n";
+    let cube = fixtures().join("models/cube_hex8/model.toml").to_str().expect("a path").to_owned();
+    let bracket = prepare(place, "");
+    let scene = fs::read_to_string(place.join("scene.toml")).expect("written");
+    let dear = format!("{scene}[cost]\nmultiplications = 5\n");
+    for (manifest, scene, holds, said) in [
+        (&bracket, scene.as_str(), true, ""),
+        (&bracket, dear.as_str(), false, "do not hold what the scene asks for"),
+        (&cube, tight, false, "nothing can be said of the selection"),
+    ] {
+        fs::write(place.join("scene.toml"), scene).expect("written");
+        let of_scene = |command: &str, rest: &[&str]| {
+            let words =
+                [&[command, manifest, "--scene", "scene.toml", "--modes", "5", "--quiet"], rest].concat();
+            flexbody(place, &words)
+        };
+        let selected = of_scene("select", &[]);
+        let outputs = ["-o", "made.flex.h5", "--report", "made.txt"];
+        let made = of_scene("convert", &outputs);
+        let code = if holds { 0 } else { 1 };
+        let errors = String::from_utf8_lossy(&made.stderr).into_owned();
+        assert_eq!(
+            (selected.status.code(), made.status.code()),
+            (Some(code), Some(code)),
+            "{scene}: {errors}"
+        );
+        let there = |name: &str| place.join(name).exists();
+        assert_eq!((there("made.flex.h5"), there("made.txt")), (holds, holds), "{scene}");
+        if !holds {
+            assert!(errors.contains("error[FB557]") && errors.contains(said), "{errors}");
+            let allowed = of_scene("convert", &[&outputs[..], &["--allow-unjudged"]].concat());
+            assert_eq!(allowed.status.code(), Some(0), "{}", String::from_utf8_lossy(&allowed.stderr));
+            assert!(there("made.flex.h5") && there("made.txt"));
+        }
+        for name in ["made.flex.h5", "made.txt"] {
+            std::fs::remove_file(place.join(name)).expect("written");
+        }
+    }
+}
+
 #[test]
 fn contradictions_are_refused() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -2,7 +2,7 @@
 //! know.
 
 use super::geometric_stiffness::softening_warning;
-use super::remarks::{free_frequencies, poor_fit};
+use super::remarks::{free_frequencies, poor_fits};
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
@@ -191,11 +191,12 @@ impl ModalModel<'_> {
     /// Warnings and notes about the finished body.
     fn remarks(&self, overdamped: Option<Diagnostic>, body: &FlexBody) -> Vec<Diagnostic> {
         let softening = softening_warning(self.model, &self.settings.basis, body);
-        let poor_fits = self
-            .interfaces
-            .iter()
-            .filter_map(|interface| poor_fit(interface, &self.nodes, &self.modes, self.model.dimension()));
         let found = self.found.diagnostics.iter().cloned();
-        found.chain(overdamped).chain(softening).chain(poor_fits).chain(free_frequencies(body)).collect()
+        found
+            .chain(overdamped)
+            .chain(softening)
+            .chain(poor_fits(body))
+            .chain(free_frequencies(body))
+            .collect()
     }
 }

@@ -31,7 +31,17 @@ pub struct LumpedPipeline {
     pub comparison: Vec<(String, f64)>,
     /// Why there is no result; empty when there is one.
     pub remark: String,
+    /// Why the figures of the invariants and the cosine say little; empty when they do not.
+    pub caution: String,
 }
+
+/// Relative difference of eigenvalues up to which modes count as a group with one frequency: discretisation splits
+/// the pairs of symmetric parts by less, and any vectors of the group may be its modes. A larger value warns of
+/// neighbours that are told apart.
+const SAME_FREQUENCY: f64 = 1e-3;
+
+/// Cosine below which the two subspaces have a direction that is nearer to what the other one leaves out (45 degrees).
+const NEARLY_DISJOINT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Lumping {
     /// The masses of the nodes of `model`.
@@ -97,7 +107,7 @@ pub(super) fn pipeline(
     watch: Watch<'_>,
 ) -> Result<LumpedPipeline> {
     let scheme = masses.scheme().name().to_owned();
-    let EigenSolution { eigenvalues, vectors, .. } = match own_modes(modal, masses, watch) {
+    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } = match own_modes(modal, masses, watch) {
         Ok(found) => found,
         Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
     };
@@ -107,13 +117,45 @@ pub(super) fn pipeline(
     let alignment = align(cross.as_ref(), std::slice::from_ref(&(0..modal.n_modes())));
     let stiffness = reduced(modal.model.stiffness(), modes.vectors.as_ref());
     let own = lumped_invariants(modal, masses, modes.of_nodes(), stiffness, exact.groups());
+    let exact_modes = &modal.found.solution;
+    let cuts = [
+        ("model", exact_modes.eigenvalues.last().copied(), exact_modes.next_eigenvalue),
+        ("lumped mass", eigenvalues.last().copied(), next_eigenvalue),
+    ];
     Ok(LumpedPipeline {
+        caution: caution(modal, &cuts, alignment.agreement),
         scheme,
         eigenvalues,
         subspace_cosine: alignment.agreement,
         comparison: error_norms(exact, &own.with_basis(alignment.basis.as_ref())),
         remark: String::new(),
     })
+}
+
+/// Says why the compared subspaces are arbitrary, or have little in common: `cuts` are the last eigenvalue of each and
+/// the next one.
+fn caution(
+    modal: &ModalModel<'_>,
+    cuts: &[(&str, Option<f64>, Option<f64>)],
+    subspace_cosine: f64,
+) -> String {
+    let count = modal.n_modes();
+    let hertz = |lambda: f64| format!("{:.5} Hz", modal.model.units().frequency_of(lambda));
+    let cut = cuts.iter().filter_map(|&(whose, last, next)| {
+        let (last, next) = (last?, next?);
+        (next - last <= SAME_FREQUENCY * next).then(|| {
+            format!("{count} modes cut a group of equal frequencies of the {whose} at {}", hertz(last))
+        })
+    });
+    let disjoint = (subspace_cosine < NEARLY_DISJOINT).then(|| {
+        let angle = subspace_cosine.clamp(0.0, 1.0).acos().to_degrees();
+        format!("the subspaces differ by {angle:.0} degrees: other modes are among the lowest {count}")
+    });
+    let found: Vec<String> = cut.chain(disjoint).collect();
+    if found.is_empty() {
+        return String::new();
+    }
+    format!("{}; errors of invariants are arbitrary, take another --modes", found.join("; "))
 }
 
 /// As many modes of the lumped mass as the body has; else why there are none.
@@ -145,6 +187,7 @@ fn own_modes(
 impl LumpedPipeline {
     fn without_result(scheme: String, remark: String) -> Self {
         let (eigenvalues, comparison) = (Vec::new(), Vec::new());
-        Self { scheme, eigenvalues, subspace_cosine: f64::NAN, comparison, remark }
+        let caution = String::new();
+        Self { scheme, eigenvalues, subspace_cosine: f64::NAN, comparison, remark, caution }
     }
 }

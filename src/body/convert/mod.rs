@@ -25,4 +25,6 @@ pub(crate) use damping::modal_damping;
 pub(crate) use geometric_stiffness::modal_geometric_stiffness;
 pub use lumped::LumpedPipeline;
 pub use modal_model::ModalModel;
+pub(crate) use modal_model::interfaces_in_frame;
+pub use remarks::poor_fits;
 pub use settings::{ConvertSettings, Lumping, MeshChoice};

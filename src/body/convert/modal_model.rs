@@ -68,7 +68,7 @@ impl<'m> ModalModel<'m> {
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
-        let interfaces = interfaces(model, &frame, coupled);
+        let interfaces = interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,
             settings,
@@ -91,8 +91,17 @@ impl<'m> ModalModel<'m> {
     }
 }
 
-/// Rows that are no displacements have no place in the double-double condensation.
+/// Refuses accuracy `certified` for rows that are no displacements, which have no place in the double-double
+/// condensation, and for a mass that is stored otherwise along x, y and z: bounds would be about the mean.
 fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
+    if accuracy == Accuracy::Certified && model.scalar_mass().is_some() && !model.has_exact_scalar_mass() {
+        let message = format!(
+            "accuracy certified bounds the matrices as they are stored, and the mass matrix differs along x, y and z by {:.1e} of its diagonal",
+            model.mass_deviation()
+        );
+        let help = "use --accuracy standard, which takes the mean, or write the same mass along all axes";
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    }
     let plain = model.scalar_mass().is_some() && model.rows().len() == model.rows().displacements();
     if accuracy == Accuracy::Certified && !plain {
         let message = "accuracy certified covers displacements whose mass commutes with rotations";
@@ -113,7 +122,7 @@ fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperti
 
 /// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where
 /// none was stated.
-fn interfaces(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
+pub(crate) fn interfaces_in_frame(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     let in_body = |reference: &Reference| match reference {
         Reference::Point(x) => Some(frame.to_body(&[*x])[0]),

@@ -1,9 +1,8 @@
 //! What the user is told about a finished body.
 
-use super::BodyModes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::body::flex_body::{FlexBody, Interface};
-use crate::model::{Coupling, Nodes};
+use crate::model::Coupling;
 use faer::Mat;
 
 /// Part by which a frequency may be too high before the user is told.
@@ -39,20 +38,20 @@ pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
 /// Part of the motion of an interface that is rounding.
 const RIGID_FIT: f64 = 1e-8;
 
-/// A warning about an interface that was declared rigid, but is not in these modes.
-pub(super) fn poor_fit(
-    interface: &Interface,
-    nodes: &Nodes,
-    modes: &BodyModes,
-    dimension: usize,
-) -> Option<Diagnostic> {
+/// Warnings about interfaces that are declared rigid, but are not in the modes of the body.
+pub fn poor_fits(body: &FlexBody) -> Vec<Diagnostic> {
+    body.interfaces().iter().filter_map(|interface| poor_fit(interface, body)).collect()
+}
+
+fn poor_fit(interface: &Interface, body: &FlexBody) -> Option<Diagnostic> {
     if interface.coupling != Some(Coupling::Rigid) {
         return None;
     }
-    let rotations = modes.rotations.as_ref().map(Mat::as_ref);
-    let rows = interface.rows(nodes, modes.of_nodes(), rotations, dimension)?;
+    let modes = body.modes();
+    let rotations = modes.rotation.as_ref().map(Mat::as_ref);
+    let rows = interface.rows(body.nodes(), modes.shape.as_ref(), rotations, body.dimension())?;
     let (mode, part) = rows.deformation();
-    (part > RIGID_FIT).then(|| {
+    (part > RIGID_FIT + 4.0 * body.storage().rounding()).then(|| {
         let message = format!(
             "interface `{}` was declared rigid, but deforms by {:.2} % of its largest motion in mode {}: its rows are its mean rigid motion",
             interface.name,

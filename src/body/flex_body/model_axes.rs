@@ -2,6 +2,7 @@
 
 use super::{FlexBody, GeometricStiffness, InternalRows, LumpedBody, UnitLoad};
 use crate::base::error::Result;
+use crate::body::invariants::InertiaStiffness;
 use crate::model::LoadKind;
 use faer::{Mat, MatRef, Scale};
 use nalgebra::{Matrix3, Vector3};
@@ -33,11 +34,7 @@ impl FlexBody {
         parts.modes.shape = turned(parts.modes.shape.as_ref(), &to_model, usize::MAX);
         parts.modes.rotation =
             parts.modes.rotation.map(|rotation| turned(rotation.as_ref(), &to_model, usize::MAX));
-        parts.modes.internal = parts.modes.internal.map(|internal| InternalRows {
-            // Rows that are no vectors come last.
-            shape: turned(internal.shape.as_ref(), &to_model, vectors(&internal)),
-            ..internal
-        });
+        parts.modes.internal = parts.modes.internal.map(|internal| internal.in_axes(&to_body));
         parts.invariants = parts.invariants.shifted(origin).rotated(&to_body);
         parts.lumped = parts
             .lumped
@@ -47,16 +44,40 @@ impl FlexBody {
                 ..lumped
             })
             .collect();
-        let about_origin = shifted(&parts.geometric_stiffness, &origin, parts.dimension);
-        parts.geometric_stiffness = along(&about_origin, &to_body);
-        parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
-            (Some(own), Some(rotation)) => {
-                Some(own.in_frame(&origin, &to_body, rotation.as_ref(), parts.dimension))
-            }
-            _ => None,
-        };
+        parts.geometric_stiffness = self.geometric_stiffness_in(&origin, &to_body);
+        parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
         parts.coordinates = None;
         Self::new(parts)
+    }
+
+    /// The geometric stiffness of unit loads about the point `d` and along the columns of `axes`, both in the body
+    /// frame.
+    pub fn geometric_stiffness_in(
+        &self,
+        d: &Vector3<f64>,
+        axes: &Matrix3<f64>,
+    ) -> Vec<GeometricStiffness<Mat<f64>>> {
+        along(&shifted(self.geometric_stiffness(), d, self.dimension()), axes)
+    }
+
+    /// The stiffness of inertia about the point `d` and along the columns of `axes`, both in the body frame; `None`
+    /// where the body has none.
+    pub fn inertia_stiffness_in(&self, d: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<InertiaStiffness> {
+        let (own, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
+        if *d == Vector3::zeros() && *axes == Matrix3::identity() {
+            return Some(own.clone());
+        }
+        let rotation = turned(rotation.as_ref(), &axes.transpose(), usize::MAX);
+        Some(own.in_frame(d, axes, rotation.as_ref(), self.dimension()))
+    }
+}
+
+impl InternalRows {
+    /// The same rows with their vectors along the columns of `axes`; rows that are no vectors, which come last,
+    /// stay.
+    pub fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
+        let shape = turned(self.shape.as_ref(), &axes.transpose(), vectors(self));
+        Self { dofs: self.dofs.clone(), shape }
     }
 }
 

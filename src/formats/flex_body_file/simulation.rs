@@ -40,8 +40,13 @@ struct DescribedGroup<'a> {
 }
 
 impl DescribedGroup<'_> {
-    /// A dataset with a row for every instant.
-    fn put(
+    /// A dataset with a number for every instant.
+    fn put(&self, name: &str, units: Units, description: &str, values: &[f64]) -> hdf5::Result<()> {
+        self.put_shaped(name, units, description, &[values.len()], values)
+    }
+
+    /// A matrix with `rows` rows, of two dimensions also where one of them is 1.
+    fn put_rows(
         &self,
         name: &str,
         units: Units,
@@ -49,12 +54,19 @@ impl DescribedGroup<'_> {
         rows: usize,
         values: &[f64],
     ) -> hdf5::Result<()> {
-        let columns = values.len() / rows.max(1);
+        self.put_shaped(name, units, description, &[rows, values.len() / rows.max(1)], values)
+    }
+
+    fn put_shaped(
+        &self,
+        name: &str,
+        units: Units,
+        description: &str,
+        shape: &[usize],
+        values: &[f64],
+    ) -> hdf5::Result<()> {
         let builder = self.group.new_dataset::<f64>().obj_track_times(false);
-        let dataset = match columns {
-            1 => builder.shape([rows]).create(name)?,
-            _ => builder.shape([rows, columns]).create(name)?,
-        };
+        let dataset = builder.shape(shape.to_vec()).create(name)?;
         dataset.write_raw(values)?;
         put_text(&dataset, "units", &units.concrete(self.units))?;
         put_text(&dataset, "description", description)
@@ -68,7 +80,7 @@ impl DescribedGroup<'_> {
         vectors: impl Iterator<Item = &'v Vector3<f64>>,
     ) -> hdf5::Result<()> {
         let values: Vec<f64> = vectors.flat_map(|v| [v.x, v.y, v.z]).collect();
-        self.put(name, units, description, values.len() / 3, &values)
+        self.put_rows(name, units, description, values.len() / 3, &values)
     }
 }
 
@@ -78,7 +90,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     writer.method()?;
     writer.summary()?;
     let top = DescribedGroup { group: writer.file.as_group()?, units };
-    top.put("time", unit(0, 0, 1), "instants", writer.instants(), &recording.time)?;
+    top.put("time", unit(0, 0, 1), "instants", &recording.time)?;
     writer.frame()?;
     writer.modes()?;
     writer.energy()?;
@@ -157,9 +169,9 @@ impl Writer<'_> {
             states.iter().map(|s| &s.origin),
         )?;
         let in_model = "origin of the frame in the coordinates of the model";
-        frame.put("origin_in_model", unit(0, 1, 0), in_model, 1, setting.origin.as_slice())?;
+        frame.put_rows("origin_in_model", unit(0, 1, 0), in_model, 1, setting.origin.as_slice())?;
         let attitudes: Vec<f64> = states.iter().flat_map(|s| s.attitude.0).collect();
-        frame.put(
+        frame.put_rows(
             "attitude",
             Units::One,
             "Euler parameters of the frame, from axes of the model, turning with the body, to world axes; the cosine of half the angle first",
@@ -181,9 +193,9 @@ impl Writer<'_> {
         let states = &self.recording.states;
         let modes = self.group("modes")?;
         let q: Vec<f64> = states.iter().flat_map(|s| s.q.iter().copied()).collect();
-        modes.put("q", unit(1, 1, 0), "modal coordinates", self.instants(), &q)?;
+        modes.put_rows("q", unit(1, 1, 0), "modal coordinates", self.instants(), &q)?;
         let qd: Vec<f64> = states.iter().flat_map(|s| s.qd.iter().copied()).collect();
-        modes.put("qd", unit(1, 1, -1), "their rates", self.instants(), &qd)
+        modes.put_rows("qd", unit(1, 1, -1), "their rates", self.instants(), &qd)
     }
 
     fn energy(&self) -> hdf5::Result<()> {
@@ -191,7 +203,7 @@ impl Writer<'_> {
         let energy = self.group("energy")?;
         let put = |name: &str, description: &str, part: fn(&Balance) -> f64| {
             let values: Vec<f64> = balances.iter().map(part).collect();
-            energy.put(name, unit(2, 2, -2), description, self.instants(), &values)
+            energy.put(name, unit(2, 2, -2), description, &values)
         };
         put("kinetic", "kinetic energy", |b| b.kinetic)?;
         put("elastic", "elastic energy", |b| b.elastic)?;

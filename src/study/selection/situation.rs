@@ -328,7 +328,7 @@ fn energy_norm(rows: &DMatrix<f64>, root: &[f64]) -> f64 {
 }
 
 /// How the deformation changes the modal forces of torques: a torque t works on the rotation vector theta =
-/// Theta q of its point as G(theta)'t, where G = integral_0^1 exp(s theta~) ds, which changes by no more than
+/// Theta q of its point as G(theta) t, where G = integral_0^1 exp(-s theta~) ds, which changes by no more than
 /// half of what theta changes by.
 fn turned_torques(
     body: &FlexBody,

@@ -3,16 +3,17 @@
 
 use super::exact::count_below;
 use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::mesh::Mesh;
+use crate::support::mesh::{Mesh, entries};
+use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::invariants::BodyFrame;
 use flexbody::body::verification::verify;
 use flexbody::formats::flex_body_file;
-use flexbody::model::{FeModel, check};
+use flexbody::model::{FeModel, RawModel, check};
 use flexbody::numerics::eigen::{Accuracy, Method, Wanted};
-use flexbody::numerics::linalg::SymmetricMatrix;
+use flexbody::numerics::linalg::{CscMatrix, SymmetricMatrix};
 
 fn settings(accuracy: Accuracy, count: usize, frame: BodyFrame) -> ConvertSettings {
     let modes = ModeSettings {
@@ -131,4 +132,62 @@ fn other_levels_store_no_guarantees() {
     let conversion =
         convert(&model, &settings(Accuracy::Standard, 6, BodyFrame::Principal), SILENT).expect("sound");
     assert_eq!(conversion.body.certificate().guarantee, None);
+}
+
+/// A model whose mass is the same along all axes, changed by `change` of its entries (row, column, value).
+fn with_mass(change: impl Fn(u32, u32, f64) -> f64) -> RawModel {
+    let mesh = Mesh::block(Kind::Hex8, [2, 2, 1], [0.4, 0.15, 0.1]);
+    let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let changed: Vec<_> = entries(&raw.mass.matrix).map(|(i, j, v)| (i, j, change(i, j, v))).collect();
+    let n = raw.mass.matrix.n_rows();
+    raw.mass.matrix = CscMatrix::from_triplets(n, n, &changed);
+    raw
+}
+
+/// Three equal entries are their own mean: their sum is rounded, and a third of it may be another number.
+#[test]
+fn a_mass_that_is_the_same_along_all_axes_is_bounded_as_stored() {
+    // A quarter of all mantissas above 4/3 are not a third of three times themselves.
+    let is_rounded = |v: f64| (v + v + v) / 3.0 != v;
+    let scaled = |k: u32| with_mass(move |_, _, v| v * (1.0 + 0.07 * f64::from(k)));
+    let some_are = |raw: &RawModel| entries(&raw.mass.matrix).any(|(_, _, v)| is_rounded(v));
+    let raw = (0..20).map(scaled).find(some_are).expect("mantissas of all kinds");
+    let stored: Vec<(u32, u32, f64)> = entries(&raw.mass.matrix).collect();
+    let model = check(raw).expect("a sound body").model;
+    assert!(model.has_exact_scalar_mass());
+    let scalar = model.scalar_mass().expect("a solid").as_csc();
+    for (i, j, v) in stored {
+        assert_eq!(scalar.get(i as usize / 3, j as usize / 3), v, "({i}, {j})");
+    }
+}
+
+/// Bounds about the mean of the directions would be bounds of another model.
+#[test]
+fn a_mass_that_differs_along_an_axis_by_rounding_is_not_certified() {
+    let certified = settings(Accuracy::Certified, 6, BodyFrame::Principal);
+    let sound = check(with_mass(|_, _, v| v)).expect("a sound body").model;
+    let body = convert(&sound, &certified, SILENT).expect("certified").body;
+    let failed = |model: &FeModel| -> Vec<&'static str> {
+        let checks = verify(&body, model).expect("the same nodes");
+        checks.iter().filter(|c| !c.passed).map(|c| c.name).collect()
+    };
+    assert!(failed(&sound).is_empty());
+    let (one_ulp, coupled) = (|v: f64| v.next_up(), 1e-15);
+    let along_z = with_mass(|i, j, v| if i % 3 == 2 && j % 3 == 2 { one_ulp(v) } else { v });
+    let one_entry = with_mass(|i, j, v| if (i, j) == (4, 4) { one_ulp(v) } else { v });
+    let mut across = with_mass(|_, _, v| v);
+    let size = across.mass.matrix.get(0, 0) * coupled;
+    let more: Vec<_> = entries(&across.mass.matrix).chain([(0, 1, size), (1, 0, size)]).collect();
+    let n = across.mass.matrix.n_rows();
+    across.mass.matrix = CscMatrix::from_triplets(n, n, &more);
+    for raw in [along_z, one_entry, across] {
+        let model = check(raw).expect("a sound body").model;
+        assert!(model.scalar_mass().is_some() && !model.has_exact_scalar_mass());
+        let error = convert(&model, &certified, SILENT).expect_err("another mass matrix");
+        assert_eq!(error.diagnostics()[0].code(), Code::Usage);
+        assert!(error.to_string().contains("differs along x, y and z"), "{error}");
+        let standard = settings(Accuracy::Standard, 6, BodyFrame::Principal);
+        convert(&model, &standard, SILENT).expect("standard takes the mean");
+        assert_eq!(failed(&model), ["certified_mass"]);
+    }
 }

@@ -1,0 +1,35 @@
+//! Conversions for a scene whose selection does not hold: nothing is written unless the user allows it.
+
+use super::arguments::ConvertArguments;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::{Error, Result};
+use crate::study::reference::ReferenceError;
+use crate::study::selection::Selection;
+
+/// Ends a conversion whose `selection` does not hold, without `--allow-unjudged`; `found` are the diagnostics of the
+/// conversion, which say why.
+///
+/// # Errors
+/// [`SelectionUnjudged`](Code::SelectionUnjudged) after `found`.
+pub(super) fn refuse_unjudged(
+    arguments: &ConvertArguments,
+    selection: Option<&Selection>,
+    found: &[Diagnostic],
+) -> Result<()> {
+    let Some(selection) = selection.filter(|selection| !selection.holds()) else { return Ok(()) };
+    if arguments.allow_unjudged {
+        return Ok(());
+    }
+    let message = match selection.lacks.last().filter(|lacks| !ReferenceError::is_reference(lacks)) {
+        Some(lacks) => format!(
+            "nothing is written: the body of {} modes that errors are measured against lacks {:.0} % of the tolerances, more than half, so that nothing can be said of the selection",
+            lacks.modes,
+            100.0 * lacks.worst
+        ),
+        None => {
+            "nothing is written: the selected modes and terms do not hold what the scene asks for".to_owned()
+        }
+    };
+    let refused = Error::from(Diagnostic::new(Code::SelectionUnjudged, message));
+    Err(refused.after(found.to_vec()))
+}
