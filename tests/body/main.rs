@@ -17,4 +17,5 @@ mod partial_bodies;
 mod partial_conversion;
 mod residual_vectors;
 mod spinning_shaft;
+mod stress_relations;
 mod turning_nodes;
