@@ -4,8 +4,8 @@
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::files::{Triangle, matrix_market, write_model};
 use crate::support::mesh::Mesh;
-use serde_json::Value;
 use flexbody::numerics::linalg::CscMatrix;
+use serde_json::Value;
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -153,7 +153,8 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
         (2.., Some((place, value))) => format!("{place} {}\n", 2.0 * value.parse::<f64>().expect("a number")),
         _ => format!("{line}\n"),
     };
-    fs::write(path.join("Kg2.mtx"), stretched.lines().enumerate().map(doubled).collect::<String>()).expect("written");
+    fs::write(path.join("Kg2.mtx"), stretched.lines().enumerate().map(doubled).collect::<String>())
+        .expect("written");
     let (code, out, err) = flexbody(path, "check b.h5 --against model.toml");
     assert_eq!(code, 1, "{out}{err}");
     assert!(err.contains("warning[FB706]: geometric_stiffness file Kg2.mtx has other bytes"), "{err}");

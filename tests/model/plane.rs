@@ -223,7 +223,8 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
         assert_eq!(one.load.label(), label);
         for p in 0..6 {
             for q in 0..6 {
-                let terms = ends.iter().zip(ratios(0).iter()).map(|(&end, ratio)| {
+                let pulls = ratios(0);
+                let terms = ends.iter().zip(pulls.iter()).map(|(&end, ratio)| {
                     let [p, q] = [stroke(end, p), stroke(end, q)];
                     -ratio * part * (p[0] * q[0] + p[1] * q[1])
                 });
@@ -239,7 +240,8 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
         [(LoadKind::Spin, 0), (LoadKind::Acceleration, 2), (LoadKind::AngularAcceleration, 1)]
     {
         let load = UnitLoad { kind, component };
-        let error = check(with(vec![GeometricStiffness { load, ..given(force(), 0) }])).expect_err("out of the plane");
+        let error = check(with(vec![GeometricStiffness { load, ..given(force(), 0) }]))
+            .expect_err("out of the plane");
         assert!(error.to_string().contains("a body of dimension 2 has"), "{error}");
     }
 }

@@ -115,7 +115,7 @@ impl<'m> UnitLoads<'m> {
             .map(|(f, &member)| if member { Vector3::zeros() } else { *f })
             .collect();
         let resultant = self.resultant_of(wanted, self.reference(set, &is_member));
-        let balance = -solve(self.mass, &resultant).map(|c| -c);
+        let balance = solve(self.mass, &resultant);
         let candidates = [Vector6::zeros(), balance, least_lengths(&outside, &self.relief)];
         let total: f64 = forces.iter().map(Vector3::norm).sum::<f64>().max(f64::MIN_POSITIVE);
         let error = |by: &Vector6<f64>| {
@@ -183,34 +183,30 @@ impl<'m> UnitLoads<'m> {
 
     /// Rigid acceleration whose inertia forces balance a load.
     fn balance(&self, load: &[Vector3<f64>]) -> Vector6<f64> {
-        let centre = self.rows.centre();
-        let mut resultant = Vector6::zeros();
-        for (x, f) in self.model.nodes().positions.iter().zip(load) {
-            let own = self.resultant_of(&force_only(f), Vector3::from(*x));
-            debug_assert!(centre.iter().all(|c| c.is_finite()));
-            resultant += own;
-        }
+        let at = |(x, f): (&[f64; 3], &Vector3<f64>)| self.resultant_of(&force_only(f), Vector3::from(*x));
+        let resultant = self.model.nodes().positions.iter().zip(load).map(at).sum();
         solve(self.mass, &resultant)
     }
 
-    /// Difference of `forces` from `load` and the relief by an acceleration, at the nodes where it is least, relative
-    /// to the forces there.
+    /// Difference of `forces` from `load` with the relief by an acceleration, at the nodes where it is least, relative to
+    /// the forces there.
     fn unexplained(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], by: &Vector6<f64>) -> f64 {
-        let rest = |i: usize| (forces[i] - load[i] - force(&self.relief[i], by)).norm();
-        let size = |i: usize| larger(load[i].norm(), forces[i].norm());
-        let mut nodes: Vec<(f64, usize)> = (0..load.len()).map(|i| (rest(i), i)).collect();
+        let net: Vec<_> = load.iter().zip(&self.relief).map(|(f, relief)| f + force(relief, by)).collect();
+        let mut nodes: Vec<(f64, usize)> =
+            forces.iter().zip(&net).map(|(f, net)| (f - net).norm()).zip(0..).collect();
         nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let all: f64 = load.iter().map(Vector3::norm).sum();
+        let all: f64 = net.iter().map(Vector3::norm).sum();
         let floor = SMALL_LOAD * self.inertia();
-        let (mut sums, mut carried) = ([0.0; 2], 0.0);
+        let (mut difference, mut size, mut carried) = (0.0, 0.0, 0.0);
         for (count, &(rest, i)) in nodes.iter().enumerate() {
-            if count as f64 >= FREE_NODES * load.len() as f64 && carried >= FREE_LOAD * all {
+            if count as f64 >= FREE_NODES * net.len() as f64 && carried >= FREE_LOAD * all {
                 break;
             }
-            carried += load[i].norm();
-            sums = [sums[0] + rest, sums[1] + size(i)];
+            carried += net[i].norm();
+            difference += rest;
+            size += larger(net[i].norm(), forces[i].norm());
         }
-        sums[0] / larger(sums[1], floor)
+        difference / larger(size, floor)
     }
 
     /// Sum of the inertia forces of unit motions over the nodes, rotations by their lengths.
