@@ -115,6 +115,7 @@ codes! {
     PlaceUnknown = "FB218", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
     SceneCase = "FB219", Error, BadInput, "load case is not in the scene, or none is named where one is needed", "name a case of the scene with --case NAME";
     NodeSetUnknown = "FB220", Error, BadInput, "node set or region has no nodes of the model", "name a node set of the deck, or correct the region";
+    SceneDamping = "FB225", Error, BadInput, "scene and body both state a damping", "leave [damping] out of the scene (--damping out of the command), or write `replace = true` in it: the damping of the body then does not count";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
@@ -205,6 +206,7 @@ codes! {
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     MotionWithoutBasis = "FB552", Note, Done, "a motion that no few shapes make", "nothing to do: the modes are those without --basis scene";
+    RateUnsettled = "FB554", Warning, Done, "a rate that still changes with the steps of the integration", "give a smaller `tolerance` (a shorter `step`) in [run], and take the rate for settled when it no longer changes";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
