@@ -13,7 +13,7 @@ use crate::formats::export::ExportOptions;
 use crate::formats::flex_body_file::RecordedMotion;
 use crate::formats::{FORMATS, export, find_format};
 use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
-use crate::motion::scene::{Point, body_point, simulate};
+use crate::motion::scene::{Point, body_point, simulate, unsettled_rate};
 use crate::study::selection::select_for_cases;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
@@ -317,7 +317,10 @@ impl FlexBody {
     pub fn simulate_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
         let (recording, diagnostics) = heard(listener, |watch| {
             watch(Event::Phase("simulation"));
-            simulate(&self.0, &scene.0, None, |part| watch(Event::Fraction(part)))
+            let (recording, mut found) =
+                simulate(&self.0, &scene.0, None, |part| watch(Event::Fraction(part)))?;
+            found.extend(unsettled_rate(&self.0, &scene.0, &recording, None)?);
+            Ok((recording, found))
         })?;
         let (units, extent) = (self.0.units().clone(), self.0.extent());
         Ok(Motion { recording, units, extent, diagnostics })

@@ -115,6 +115,7 @@ codes! {
     PlaceUnknown = "FB218", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
     SceneCase = "FB219", Error, BadInput, "load case is not in the scene, or none is named where one is needed", "name a case of the scene with --case NAME";
     NodeSetUnknown = "FB220", Error, BadInput, "node set or region has no nodes of the model", "name a node set of the deck, or correct the region";
+    SceneDamping = "FB225", Error, BadInput, "scene and body both state a damping", "leave [damping] out of the scene (--damping out of the command), or write `replace = true` in it: the damping of the body then does not count";
     // FB3xx: matrices
     MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
     MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
@@ -165,6 +166,9 @@ codes! {
     DensityImplausible = "FB437", Error, BadInput, "density of no known matter: mass and coordinates do not fit the stated units", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
     MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass";
     InterfaceFar = "FB439", Warning, Done, "reference point of an interface is far from its nodes", "reference points are in model axes and in the unit of length of the nodes";
+    GeometricStiffnessMotion = "FB440", Error, BadInput, "geometric stiffness is not that of a stress: it breaks a relation with rigid motion", "give the stress stiffness alone: the difference of the stiffness matrices with and without prestress holds the stiffness of the initial displacements as well";
+    GeometricStiffnessLoad = "FB441", Error, BadInput, "geometric stiffness is not that of the load that it is given for", "check load, axis, sign and units, and divide the matrix by the size of the load (spin: by the square of the rate in radians per unit of time)";
+    GeometricStiffnessRough = "FB442", Warning, Done, "geometric stiffness fulfils its relations with rigid motion roughly", "nothing to do where elements of reduced integration explain it; else check that the matrix holds the stress stiffness alone";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
     Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
@@ -202,6 +206,7 @@ codes! {
     RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
     StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
     MotionWithoutBasis = "FB552", Note, Done, "a motion that no few shapes make", "nothing to do: the modes are those without --basis scene";
+    RateUnsettled = "FB554", Warning, Done, "a rate that still changes with the steps of the integration", "give a smaller `tolerance` (a shorter `step`) in [run], and take the rate for settled when it no longer changes";
     SelectionUnjudged = "FB557", Error, CheckFailed, "a body for a scene that it does not hold, or where nothing can be said of it", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body all the same";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";

@@ -148,6 +148,8 @@ fn settings(arguments: &ResponseArguments, scene: Option<&Scene>, body: &FlexBod
         points: arguments.points as usize,
         solves: arguments.solves as usize,
         damping: arguments.damping.or_else(|| scene?.requirements.damping),
+        replaces_damping: arguments.damping.is_none()
+            && scene.is_some_and(|scene| scene.requirements.replaces_damping),
         tolerance: arguments.tolerance,
         memory: memory_left(None),
         longest: longest(arguments.allow_long),

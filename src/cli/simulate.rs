@@ -12,7 +12,7 @@ use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::body::flex_body::FlexBody;
 use crate::formats::flex_body_file;
-use crate::motion::scene::{Scene, simulate};
+use crate::motion::scene::{Scene, simulate, unsettled_rate};
 use crate::report::{Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
@@ -87,7 +87,11 @@ impl Job<'_> {
         watcher.hear(Event::Phase("simulation"));
         let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
         let hear = |part| watcher.hear(Event::Fraction(part));
-        let (recording, found) = simulate(self.body, scene, memory_left(None), hear).map_err(|error| {
+        let run = simulate(self.body, scene, memory_left(None), hear).and_then(|(recording, mut found)| {
+            found.extend(unsettled_rate(self.body, scene, &recording, memory_left(None))?);
+            Ok((recording, found))
+        });
+        let (recording, found) = run.map_err(|error| {
             let error = error.in_file(self.path);
             match &name {
                 Some(name) => error.about(name),

@@ -61,6 +61,6 @@ pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
 pub use readers::READERS;
 pub use recipes::{RECIPES, Recipe, Step};
 pub use region::Region;
-pub(crate) use series::{ColumnKey, Series, read_series};
+pub(crate) use series::{ColumnKey, Series, closer_than_rounding, read_series};
 pub use shapes::{ImportedColumns, read_imported, read_shapes};
 pub(crate) use walk::{Table, Value, Walk, integer, read_toml, real};

@@ -16,6 +16,33 @@ const SHOWN: usize = 5;
 /// Rows that there must be.
 const LEAST_ROWS: usize = 2;
 
+/// Distance of two rows, relative to the largest time of a table, below which only rounding may tell them apart: times that
+/// are summed up over ten thousand steps are off by this.
+const ROUNDING: f64 = 1e-12;
+
+/// Part of the usual distance of rows that rows within [`ROUNDING`] of each other lie apart at the least: dates in seconds
+/// have rows every millisecond.
+const UNUSUAL: f64 = 1e-3;
+
+/// The first row that is no further from the one before than rounding of their times; `None` where there is none. Between
+/// such rows a history would change at a rate that nobody has given.
+///
+/// * `times`: ascending.
+pub(crate) fn closer_than_rounding(times: &[f64]) -> Option<usize> {
+    let largest = times.iter().fold(0.0f64, |most, time| most.max(time.abs()));
+    let mut apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let ulps = 4.0 * f64::EPSILON * largest;
+    let is_close =
+        |apart: f64, usual: f64| apart <= ulps || (apart < ROUNDING * largest && apart < UNUSUAL * usual);
+    let shortest = apart.iter().copied().fold(f64::INFINITY, f64::min);
+    if shortest >= ROUNDING * largest {
+        return None;
+    }
+    let middle = apart.len() / 2;
+    let usual = *apart.select_nth_unstable_by(middle, f64::total_cmp).1;
+    times.windows(2).position(|pair| is_close(pair[1] - pair[0], usual)).map(|row| row + 1)
+}
+
 /// A column of a file, by its name or by its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum ColumnKey {
@@ -376,6 +403,18 @@ impl<'r> Reading<'r> {
         }
     }
 
+    /// Complaint about a row at the time of the one before, but for rounding.
+    fn too_close(&self, row: usize) -> Diagnostic {
+        let Series { times, lines, .. } = &self.series;
+        let [before, time] = [times[row - 1], times[row]];
+        let message = format!(
+            "time {time:?} is the time of line {} ({before:?}) but for rounding: between the two rows the history would change without time",
+            lines[row - 1]
+        );
+        let help = "leave one of the two rows out; a jump needs rows that are further apart";
+        row_error(self.file, lines[row], message).with_help(help)
+    }
+
     fn finish(mut self) -> Result<Series, Vec<Diagnostic>> {
         let more = self.bad - self.shown.len();
         if let Some(line) = self.first_not_shown {
@@ -387,6 +426,9 @@ impl<'r> Reading<'r> {
             let count = if rows == 0 { "no rows" } else { "only one row" };
             let message = format!("file has {count}, a history needs two at least");
             self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));
+        }
+        if let (0, Some(row)) = (self.bad, closer_than_rounding(&self.series.times)) {
+            self.shown.push(self.too_close(row));
         }
         if self.shown.is_empty() { Ok(self.series) } else { Err(self.shown) }
     }

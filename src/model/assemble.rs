@@ -35,7 +35,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     let stiffness = order.symmetric(&mut raw.stiffness, "stiffness");
     let mass = order.symmetric(&mut raw.mass, "mass");
     let damping = raw.damping.take().and_then(|damping| order.damping(damping));
-    let geometric_stiffness = order.geometric_stiffness(std::mem::take(&mut raw.geometric_stiffness));
+    let geometric_stiffness = order.geometric_stiffness(&mut raw.geometric_stiffness);
     stop_on_error(&mut found)?;
     let (Some(stiffness), Some(mass)) = (stiffness, mass) else {
         unreachable!("an asymmetric matrix is an error")
@@ -172,16 +172,17 @@ impl InternalOrder<'_> {
         damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
     }
 
-    /// The same for geometric stiffness; a matrix of it may have negative diagonal entries.
+    /// Geometric stiffness in the internal order, which may have negative diagonal entries; files and digits stay in
+    /// `given`.
     fn geometric_stiffness(
         &mut self,
-        given: Vec<GeometricStiffness<RawMatrix>>,
+        given: &mut [GeometricStiffness<RawMatrix>],
     ) -> Vec<GeometricStiffness<SymmetricMatrix>> {
-        let ordered = |GeometricStiffness { load, mut matrix }| {
-            let matrix = self.symmetric(&mut matrix, GEOMETRIC)?;
-            Some(GeometricStiffness { load, matrix })
+        let ordered = |one: &mut GeometricStiffness<RawMatrix>| {
+            let matrix = self.symmetric(&mut one.matrix, GEOMETRIC)?;
+            Some(GeometricStiffness { load: one.load.clone(), matrix })
         };
-        given.into_iter().filter_map(ordered).collect()
+        given.iter_mut().filter_map(ordered).collect()
     }
 }
 

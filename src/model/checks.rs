@@ -11,6 +11,7 @@ use super::mass_structure::{MassForm, mass_form};
 use super::node_pairs::check_mass_pairs;
 use super::rigid::{centre_and_length, extents, rigid_residuals};
 use super::rigid_motion::{check_inertia, check_rigid_motion};
+use super::stress::check_stress;
 use super::tolerance::{block_tolerance, rounding};
 use super::unplaced_rows::{check_massless, misplaced, recover};
 use super::wording::name_some;
@@ -146,11 +147,14 @@ fn check_body(
     stop_on_error(&mut found)?;
     let mass_rounding = block_tolerance(body.raw.mass.digits);
     let mass_path = body.raw.mass.path.clone();
+    let stress_files = std::mem::take(&mut body.raw.geometric_stiffness);
     let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
     let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
     model.find_fixed_mass(mass_rounding);
     let kept = mass_that_does_not_turn(&model, mass_rounding, [first, second]);
     found.extend(kept.map(|note| note.in_file(&mass_path)));
+    check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
+    stop_on_error(&mut found)?;
     // Now, while the ordering library has not ended; the files need not stay open.
     let _ = model.sources().len();
     Ok(CheckedModel { model, diagnostics: found, plausibility })

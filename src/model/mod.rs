@@ -31,6 +31,7 @@ mod rigid;
 mod rigid_motion;
 mod rows;
 mod separate_bodies;
+mod stress;
 mod surface;
 mod tolerance;
 mod unplaced_rows;

@@ -115,9 +115,7 @@ impl Tailoring {
             let settings = self.settings_of_shapes(bodies.basis(count));
             let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
             let condensed = condense(&modal)?;
-            let mut made = modal.finish(condensed, watch)?;
-            made.body = bodies.damped(made.body)?;
-            Ok(made)
+            modal.finish(condensed, watch)
         };
         let most: Vec<f64> = lacks.iter().map(|lacks| MOST_LACKING - lacks).collect();
         let fewest = bodies

@@ -59,6 +59,13 @@ impl Case {
         self.mesh.geometric_stiffness(&self.material, &moved.col(0).iter().copied().collect::<Vec<_>>())
     }
 
+    /// K_geo of the free body under a unit force along an axis, half of it at each of two nodes.
+    fn pulled(&self, nodes: [usize; 2], axis: usize) -> CscMatrix {
+        let mut force = Mat::zeros(self.body.n_dofs(), 1);
+        nodes.iter().for_each(|node| force[(3 * node + axis, 0)] = 0.5);
+        self.stressed(&force)
+    }
+
     /// M times an acceleration of every node.
     fn inertia_load(&self, acceleration: impl Fn(Vector3<f64>) -> Vector3<f64>) -> Mat<f64> {
         let mut load = Mat::zeros(self.body.n_dofs(), 1);
@@ -83,9 +90,18 @@ impl Case {
     }
 
     fn raw(&self, geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>) -> RawModel {
-        let interfaces = vec![NodeSet::new("tip", vec![1, 2])];
+        let interfaces = vec![NodeSet::new("tip", vec![1, 2]), NodeSet::new("side", vec![3, 4])];
         RawModel { geometric_stiffness, interfaces, ..self.body.raw_model() }
     }
+}
+
+/// Blocks of a string between two nodes (indices): the multiple `size` of the identity at each, the opposite between them.
+fn string(n: usize, [a, b]: [usize; 2], size: f64) -> CscMatrix {
+    let entries = (0..3).flat_map(|k| {
+        let [a, b] = [3 * a + k, 3 * b + k].map(|row| row as u32);
+        [(a, a, size), (b, b, size), (a, b, -size), (b, a, -size)]
+    });
+    CscMatrix::from_triplets(n, n, &entries.collect::<Vec<_>>())
 }
 
 fn given(kind: LoadKind, component: usize, matrix: CscMatrix) -> GeometricStiffness<RawMatrix> {
@@ -163,20 +179,17 @@ fn entries_are_the_nodal_products_of_the_turned_load_in_every_frame() {
     for k in 0..3 {
         let e = Vector3::ith(k, 1.0);
         let turned = case.stressed(&case.inertia_load(|x| e.cross(&x)));
-        let mut force = Mat::zeros(case.body.n_dofs(), 1);
-        force[(k, 0)] = 1.0;
-        let force = case.stressed(&force);
         all.push(given(LoadKind::AngularAcceleration, k, turned));
-        all.push(given(LoadKind::Force("tip".to_owned()), k, force));
+        all.push(given(LoadKind::Force("tip".to_owned()), k, case.pulled([0, 1], k)));
     }
-    // Not the whole kind: the missing axis counts as zero.
-    all.push(given(LoadKind::Acceleration, 1, all[0].matrix.matrix.clone()));
+    // Not the whole kind: the missing axes count as zero.
+    all.push(given(LoadKind::Force("side".to_owned()), 1, case.pulled([2, 3], 1)));
     all.push(given(LoadKind::Named("heat".to_owned()), 0, all[3].matrix.matrix.clone()));
     for frame in [BodyFrame::Model, BodyFrame::Com, BodyFrame::Principal] {
         let done = run(case.raw(all.clone()), frame, BasisChoice::default()).expect("a sound body");
         let note = done.diagnostics.iter().find(|d| d.code() == Code::GeometricStiffnessPartial);
         let message = note.expect("two axes are missing").message();
-        assert_eq!(message, "geometric stiffness is taken as zero for acceleration x, acceleration z");
+        assert_eq!(message, "geometric stiffness is taken as zero for force x at `side`, force z at `side`");
         let body = done.body;
         let shapes = in_model_axes(&body);
         let direct: Vec<_> = all.iter().map(|g| (&g.load, product(&g.matrix.matrix, &shapes))).collect();
@@ -367,11 +380,7 @@ fn failed(checks: &[IdentityCheck]) -> Vec<&'static str> {
 fn file_reports_and_recomputation_hold_what_was_given() {
     let case = Case::skew_block();
     let mut raw = case.raw(case.spin());
-    raw.geometric_stiffness.push(given(
-        LoadKind::Moment("tip".to_owned()),
-        2,
-        raw.geometric_stiffness[4].matrix.matrix.clone(),
-    ));
+    raw.geometric_stiffness.push(given(LoadKind::Force("tip".to_owned()), 2, case.pulled([0, 1], 2)));
     let scaled: Vec<_> = entries(&raw.stiffness.matrix).map(|(r, c, v)| (r, c, 2e-6 * v)).collect();
     let n = case.body.n_dofs();
     let matrix = CscMatrix::from_triplets(n, n, &scaled);
@@ -394,7 +403,7 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     let told = &json["modes"]["geometric_stiffness"][0];
     assert_eq!(told["load"], "spin xx");
     assert!((told["relative_norm"].as_f64().expect("a number") / norm - 1.0).abs() < 1e-9);
-    assert!(render(&facts, Format::Html).contains("moment z at `tip`"));
+    assert!(render(&facts, Format::Html).contains("force z at `tip`"));
     assert!(render(&facts, Format::Text).contains("spin xz: up to"));
 
     let model = FeModel::from_raw(raw.clone()).expect("sound").model;
@@ -443,8 +452,12 @@ fn loads_and_matrices_that_do_not_fit_are_refused() {
     let one = |entries: &[(u32, u32, f64)]| CscMatrix::from_triplets(n, n, entries);
     let sound = || one(&[(3, 3, -1.0), (3, 40, 2.0), (40, 3, 2.0)]);
     assert!(
-        run(case.raw(vec![given(LoadKind::Spin, 3, sound())]), BodyFrame::Com, BasisChoice::default())
-            .is_ok()
+        run(
+            case.raw(vec![given(LoadKind::Named("string".to_owned()), 0, string(n, [1, 13], 2.0))]),
+            BodyFrame::Com,
+            BasisChoice::default()
+        )
+        .is_ok()
     );
     let tip = |name: &str| LoadKind::Force(name.to_owned());
     for (list, code, said) in [
@@ -480,9 +493,9 @@ fn loads_and_matrices_that_do_not_fit_are_refused() {
             "geometric stiffness matrix has NaN",
         ),
         (
-            vec![given(tip("tip"), 0, one(&[(3, 3, 1e308)]))],
+            vec![given(LoadKind::Named("string".to_owned()), 0, string(n, [1, 13], 1e300))],
             Code::MatrixNotFinite,
-            "force x at `tip` overflows",
+            "load `string` overflows",
         ),
         (
             vec![given(tip("tip"), 0, CscMatrix::from_triplets(3, 3, &[(0, 0, 1.0)]))],
@@ -503,19 +516,33 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
     raw.interfaces[0].nodes = vec![1];
     let n = case.body.n_dofs();
     let first = FeModel::bodies_from_raw(raw.clone()).expect("two bodies")[0].model.nodes().ids.clone();
-    let row = |id: i64| 3 * (id as u32 - 1);
-    let (mine, other) = (row(first[1]), row((1..=16).find(|id| !first.contains(id)).expect("another body")));
-    let both = CscMatrix::from_triplets(n, n, &[(mine, mine, 1.0), (other, other, 2.0)]);
-    let own = CscMatrix::from_triplets(n, n, &[(mine, mine, 3.0)]);
-    raw.geometric_stiffness =
-        vec![given(LoadKind::Spin, 0, both.clone()), given(LoadKind::Force("tip".to_owned()), 0, own)];
+    let others: Vec<i64> = (1..=16).filter(|id| !first.contains(id)).collect();
+    let at = |id: i64| id as usize - 1;
+    let row = |id: i64| 3 * at(id) as u32;
+    let (mine, other) = (row(first[1]), row(others[0]));
+    // A string of unit compression along x from the tip to the node one unit beside it pushes the tip along x.
+    let place = |id: i64| case.body.nodes[at(id)];
+    let beside = |id: &i64| (0..3).all(|k| place(*id)[k] == place(1)[k] + if k == 0 { 1.0 } else { 0.0 });
+    let neighbour = *first.iter().find(|id| beside(id)).expect("a unit cube");
+    let own = string(n, [0, at(neighbour)], -1.0);
+    let inside = [[first[0], first[1]], [others[0], others[1]]];
+    let both: Vec<_> = inside
+        .iter()
+        .zip([1.0, 2.0])
+        .flat_map(|(ends, size)| entries(&string(n, ends.map(at), size)).collect::<Vec<_>>())
+        .collect();
+    let both = CscMatrix::from_triplets(n, n, &both);
+    raw.geometric_stiffness = vec![
+        given(LoadKind::Named("heat".to_owned()), 0, both.clone()),
+        given(LoadKind::Force("tip".to_owned()), 0, own),
+    ];
     let bodies = FeModel::bodies_from_raw(raw.clone()).expect("two bodies");
     let kept = |b: usize| -> Vec<(String, f64)> {
         let all = bodies[b].model.geometric_stiffness().iter();
-        all.map(|g| (g.load.label(), g.matrix.as_csc().values().iter().sum())).collect()
+        all.map(|g| (g.load.label(), g.matrix.as_csc().values().iter().map(|v| v.abs()).sum())).collect()
     };
-    assert_eq!(kept(0), [("spin_xx".to_owned(), 1.0), ("force_x_tip".to_owned(), 3.0)]);
-    assert_eq!(kept(1), [("spin_xx".to_owned(), 2.0)]);
+    assert_eq!(kept(0), [("load_heat".to_owned(), 12.0), ("force_x_tip".to_owned(), 12.0)]);
+    assert_eq!(kept(1), [("load_heat".to_owned(), 24.0)]);
 
     raw.geometric_stiffness[1].matrix.matrix = both;
     let error = FeModel::bodies_from_raw(raw.clone()).expect_err("a force on another body");
@@ -523,7 +550,7 @@ fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
     raw.geometric_stiffness[0].matrix.matrix =
         CscMatrix::from_triplets(n, n, &[(mine, other, 1.0), (other, mine, 1.0)]);
     let error = FeModel::bodies_from_raw(raw).expect_err("coupled");
-    assert!(error.to_string().contains("geometric stiffness for spin xx couples node"), "{error}");
+    assert!(error.to_string().contains("geometric stiffness for load `heat` couples node"), "{error}");
 }
 
 #[test]

@@ -19,4 +19,5 @@ mod partial_conversion;
 mod residual_vectors;
 mod spinning_shaft;
 mod statements;
+mod stress_relations;
 mod turning_nodes;

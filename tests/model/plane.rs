@@ -12,7 +12,7 @@ use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::body::verification::verify;
 use flexbody::input::{ModelFiles, read_model};
-use flexbody::model::{FeModel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad, check};
+use flexbody::model::{FeModel, GeometricStiffness, LoadKind, NodeSet, RawMatrix, RawModel, UnitLoad, check};
 use flexbody::numerics::eigen::{Accuracy, Wanted};
 use flexbody::numerics::linalg::CscMatrix;
 use nalgebra::{Matrix2, Vector2};
@@ -182,30 +182,54 @@ fn what_leaves_the_plane_is_refused() {
 #[test]
 fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
     let raw = rectangle(4, 2, 0.7, [1.0, 2.0]);
-    let n = 2 * raw.nodes.len() as u32;
-    let string = [(1, 1, 2.0), (1, n - 1, -2.0), (n - 1, 1, -2.0), (n - 1, n - 1, 2.0)];
-    let matrix = CscMatrix::from_triplets(n as usize, n as usize, &string);
-    let given = |kind, component| GeometricStiffness {
+    let raw = RawModel { interfaces: vec![NodeSet::new("corner", vec![1])], ..raw };
+    let n = 2 * raw.nodes.len();
+    let last = raw.nodes.len() - 1;
+    // Strings from the first node to two others pull it along an axis with a unit force.
+    let ends = [last, 4];
+    let line = |end: usize| [0, 1].map(|k| raw.nodes.positions[end][k] - raw.nodes.positions[0][k]);
+    let ratios = |axis: usize| {
+        let lines = nalgebra::Matrix2::from_columns(&ends.map(|end| line(end).into()));
+        lines.try_inverse().expect("two directions") * nalgebra::Vector2::ith(axis, 1.0)
+    };
+    let matrix_of = |ratios: nalgebra::Vector2<f64>| {
+        let string = |(&end, &ratio): (&usize, &f64)| {
+            (0..2).flat_map(move |k| {
+                let [a, b] = [k, 2 * end + k].map(|row| row as u32);
+                [(a, a, -ratio), (b, b, -ratio), (a, b, ratio), (b, a, ratio)]
+            })
+        };
+        let all: Vec<_> = ends.iter().zip(ratios.iter()).flat_map(string).collect();
+        CscMatrix::from_triplets(n, n, &all)
+    };
+    let given = |kind: LoadKind, component: usize| GeometricStiffness {
+        matrix: RawMatrix { matrix: matrix_of(ratios(component)), ..raw.stiffness.clone() },
         load: UnitLoad { kind, component },
-        matrix: RawMatrix { matrix: matrix.clone(), ..raw.stiffness.clone() },
     };
     let with = |geometric_stiffness| RawModel { geometric_stiffness, ..raw.clone() };
-    let sound = model(with(vec![given(LoadKind::Spin, 2), given(LoadKind::Acceleration, 0)]));
+    let force = || LoadKind::Force("corner".to_owned());
+    let sound = model(with(vec![given(LoadKind::Named("strings".to_owned()), 0), given(force(), 0)]));
     let body = converted(&sound, 6, BodyFrame::Principal).body;
     let (axes, shape) = (body.frame().axes, &body.modes().shape);
-    let last = 3 * (raw.nodes.len() - 1);
-    let stroke =
-        |j: usize| -> f64 { (0..3).map(|l| axes[(1, l)] * (shape[(l, j)] - shape[(last + l, j)])).sum() };
-    // Acceleration along the model's x is axes' x of it along the body's.
-    let expected = [("spin_zz", 1.0), ("acceleration_x", axes[(0, 0)]), ("acceleration_y", axes[(0, 1)])];
+    // Displacements of the first node beside those of the end of a string, in the plane of the model.
+    let stroke = |end: usize, j: usize| -> [f64; 2] {
+        [0, 1].map(|k| (0..3).map(|l| axes[(k, l)] * (shape[(l, j)] - shape[(3 * end + l, j)])).sum())
+    };
+    // A force along the model's x is axes' x of it along the body's.
+    let expected =
+        [("load_strings", 1.0), ("force_x_corner", axes[(0, 0)]), ("force_y_corner", axes[(0, 1)])];
     assert_eq!(body.geometric_stiffness().len(), expected.len());
-    let largest = (0..6).fold(0.0f64, |m, j| m.max(stroke(j).powi(2)));
     for (one, (label, part)) in body.geometric_stiffness().iter().zip(expected) {
         assert_eq!(one.load.label(), label);
         for p in 0..6 {
             for q in 0..6 {
-                let product = 2.0 * part * stroke(p) * stroke(q);
-                assert!((one.matrix[(p, q)] - product).abs() <= 1e-13 * largest, "{label} {p} {q}");
+                let pulls = ratios(0);
+                let terms = ends.iter().zip(pulls.iter()).map(|(&end, ratio)| {
+                    let [p, q] = [stroke(end, p), stroke(end, q)];
+                    -ratio * part * (p[0] * q[0] + p[1] * q[1])
+                });
+                let (product, size) = terms.fold((0.0, 0.0), |(sum, size), t: f64| (sum + t, size + t.abs()));
+                assert!((one.matrix[(p, q)] - product).abs() <= 1e-12 * (size + 1e-3), "{label} {p} {q}");
             }
         }
     }
@@ -215,7 +239,9 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
     for (kind, component) in
         [(LoadKind::Spin, 0), (LoadKind::Acceleration, 2), (LoadKind::AngularAcceleration, 1)]
     {
-        let error = check(with(vec![given(kind, component)])).expect_err("out of the plane");
+        let load = UnitLoad { kind, component };
+        let error = check(with(vec![GeometricStiffness { load, ..given(force(), 0) }]))
+            .expect_err("out of the plane");
         assert!(error.to_string().contains("a body of dimension 2 has"), "{error}");
     }
 }

@@ -339,3 +339,59 @@ fn a_file_covers_the_run_or_the_scene_says_what_is_outside() {
     assert!(place(&unknown, "0 2\n5 4\n").expect_err("no duration").has(Code::SeriesRange));
     assert!(place(&unknown.replace("value = 2", "value = 2, outside = \"hold\""), "0 2\n5 4\n").is_ok());
 }
+
+/// Two rows whose times differ by rounding alone would be an infinite rate; every table refuses them, and where they stand
+/// is told. Rows that are close for a reason are taken: a step of a nanosecond, and dates in seconds.
+#[test]
+fn rows_that_rounding_alone_tells_apart_are_refused() {
+    let run = "[run]\nduration = 1\n";
+    let load =
+        |history: &str| format!("{run}[[load]]\nnode = 3\nforce = [1, 0, 0]\nhistory = {{ {history} }}\n");
+    let columns = |key: &str, count: usize| {
+        let names = ["\"a\"", "\"b\"", "\"c\"", "\"d\""][..count].join(", ");
+        format!("{run}[spin]\n{key} = {{ file = \"rows.csv\", time = \"t\", columns = [{names}] }}\n")
+    };
+    let of_file = |more: &str| load(&format!("file = \"rows.csv\", value = \"a\"{more}"));
+    let scenes = [
+        (load("times = [0, 0.3, T, 1], values = [0, 1, 2, 0]"), "scene.toml, line 6"),
+        (
+            load("times = [0, 0.3, T, 1], values = [0, 1, 2, 0], interpolation = \"cubic\""),
+            "scene.toml, line 6",
+        ),
+        (of_file(""), "rows.csv, line 4"),
+        (of_file(", interpolation = \"cubic\""), "rows.csv, line 4"),
+        (
+            of_file(", interpolation = \"cubic\", time_zero = -5, time_scale = 1e3, outside = \"hold\""),
+            "rows.csv, line 4",
+        ),
+        (columns("angular_velocity_from", 3), "rows.csv, line 4"),
+        (columns("attitude_from", 4), "rows.csv, line 4"),
+    ];
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = folder.path();
+    let read = |scene: &str, rows: &str| {
+        fs::write(place.join("rows.csv"), rows).expect("written");
+        fs::write(place.join("scene.toml"), scene).expect("written");
+        read_scene(place.join("scene.toml"))
+    };
+    let rows = |time: &str| {
+        let values = ["1,0,0,0", "1,1e-9,0,0", "1,2e-9,0,0", "1,3e-9,0,0"];
+        format!("t,a,b,c,d\n0,{}\n0.3,{}\n{time},{}\n1,{}\n", values[0], values[1], values[2], values[3])
+    };
+    for (scene, place) in &scenes {
+        for time in ["0.30000000000000004", "0.3000000000000001", "0.30000000000005"] {
+            let error = read(&scene.replace('T', time), &rows(time)).expect_err("close rows");
+            let text = error.to_string();
+            assert!(error.has(Code::SeriesRow) || error.has(Code::SceneSyntax), "{text}");
+            assert!(text.contains("but for rounding") && text.contains(place), "{place}: {text}");
+            assert!(text.contains(time) && text.contains("0.3"), "{text}");
+        }
+        let sound = read(&scene.replace('T', "0.300000001"), &rows("0.300000001"));
+        assert!(!sound.is_err_and(|error| error.to_string().contains("rounding")), "{scene}");
+    }
+    // A date in seconds every millisecond.
+    let date = |row: u32| 1.7e9 + 1e-3 * f64::from(row);
+    let dated = table("t,a", (0..=1100).map(|row| vec![date(row), f64::from(row)]));
+    let scene = of_file(", time_zero = 1.7e9");
+    assert!(read(&scene, &dated).is_ok());
+}

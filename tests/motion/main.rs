@@ -20,5 +20,6 @@ mod nodal_motion;
 mod nodal_turning;
 mod physics;
 mod scene_frames;
+mod settled_rates;
 mod simulate;
 mod watched;

@@ -9,6 +9,7 @@ mod output_errors;
 mod random_verdicts;
 mod reference;
 mod response;
+mod scene_damping;
 mod select_command;
 mod selection_bounds;
 mod selection_verdicts;

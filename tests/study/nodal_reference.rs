@@ -14,8 +14,8 @@ use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel, Reference};
 use flexbody::motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Scene, Scheme, Spin,
-    Stage, Trace, VectorHistory, trace, trace_at,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Requirements, Scene,
+    Scheme, Spin, Stage, Trace, VectorHistory, trace, trace_at,
 };
 use flexbody::numerics::eigen::Wanted;
 use flexbody::study::trade::{Allowed, NodalReference};
@@ -337,9 +337,17 @@ fn ratios_damp_the_modes_on_the_nodes() {
         loads: size.at_interfaces(true),
         ..size.scene(scheme)
     });
-    // A damping matrix of the model counts, not the ratio of the scene.
     let rayleigh = RawModel { damping: Some(Damping::Rayleigh { alpha: 0.1, beta: 0.02 }), ..solid() };
-    assert_same("Rayleigh", &rayleigh, scene);
+    assert_same("Rayleigh", &rayleigh, |size, scheme| Scene {
+        requirements: Requirements::default(),
+        ..scene(size, scheme)
+    });
+    // The ratio of the scene takes its place on the nodes as well.
+    assert_same("replaced", &rayleigh, |size, scheme| {
+        let mut scene = scene(size, scheme);
+        scene.requirements.replaces_damping = true;
+        scene
+    });
 }
 
 #[test]

@@ -53,6 +53,7 @@ fn over(low: f64, high: f64, solves: usize) -> Settings {
         points: 60,
         solves,
         damping: None,
+        replaces_damping: false,
         tolerance: 0.05,
         memory: None,
         longest: None,

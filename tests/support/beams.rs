@@ -70,9 +70,14 @@ pub fn elbow(parts: usize) -> RawModel {
         |leg: usize, i: usize| corners[leg] + (corners[leg + 1] - corners[leg]) * (i as f64 / parts as f64);
     let positions: Vec<[f64; 3]> =
         (0..=2 * parts).map(|i| if i <= parts { along(0, i) } else { along(1, i - parts) }.into()).collect();
-    let beams: Vec<_> = (0..2 * parts).map(|i| (i, i + 1)).collect();
+    chain("elbow of beams", &positions)
+}
+
+/// Consistent beams of rubber from each place to the next.
+pub fn chain(name: &str, positions: &[[f64; 3]]) -> RawModel {
+    let beams: Vec<_> = (1..positions.len()).map(|i| (i - 1, i)).collect();
     let section = Section { width: 0.05, youngs: 4.0, shear: 1.5, density: 1.0 };
-    frame("elbow of beams", &positions, &beams, &section, BeamMass::Consistent)
+    frame(name, positions, &beams, &section, BeamMass::Consistent)
 }
 
 /// A straight shaft of unit length along x, of `parts` beams with rotary inertia, whose square section has this width.

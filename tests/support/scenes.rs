@@ -237,6 +237,8 @@ impl Doing {
             watched: self.watched.iter().map(|&part| node(part)).collect(),
             requirements: Requirements {
                 damping: Some(self.damping).filter(|&d| d > 0.0),
+                // Bodies of some tests have it already.
+                replaces_damping: true,
                 ..Default::default()
             },
             source: None,

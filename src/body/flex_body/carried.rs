@@ -141,6 +141,7 @@ impl FlexBody {
     pub fn with_damping_ratio(&self, ratio: f64) -> Result<Self> {
         let mut parts = self.clone().into_parts();
         parts.modes.damping_ratio.fill(ratio);
+        parts.modes.modal_damping = None;
         let mass = self.invariants().modal_mass();
         let apart = |i: usize, j: usize| (mass[(i, j)] - f64::from(i == j)).abs();
         let nf = self.n_modes();

@@ -151,15 +151,34 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The body, in the frame of the scene, with the damping of the scene where it has none of its own.
+/// The body, in the frame of the scene, with the damping of the scene where the scene states one.
+///
+/// # Errors
+/// [`SceneDamping`](Code::SceneDamping) when both state one and the scene does not replace that of the body; those of
+/// [`FlexBody::new`].
 pub(crate) fn damped<'b>(body: &'b FlexBody, scene: &Scene) -> Result<Cow<'b, FlexBody>> {
-    let modes = body.modes();
-    match scene.requirements.damping {
-        Some(ratio) if modes.modal_damping.is_none() && modes.damping_ratio.iter().all(|&r| r == 0.0) => {
-            Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
-        }
-        _ => Ok(Cow::Borrowed(body)),
+    let Some(ratio) = scene.requirements.damping else { return Ok(Cow::Borrowed(body)) };
+    if body.damping().norm_max() > 0.0 {
+        scene.requirements.refuse_second_damping("body", &format!("scene `{}`", scene.name))?;
     }
+    Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
+}
+
+/// The body with the damping of the scene, and the scene without: what looks at the pair again adds none.
+///
+/// # Errors
+/// As [`damped`].
+pub(crate) fn damped_once<'b, 's>(
+    body: Cow<'b, FlexBody>,
+    scene: Cow<'s, Scene>,
+) -> Result<(Cow<'b, FlexBody>, Cow<'s, Scene>)> {
+    if scene.requirements.damping.is_none() {
+        return Ok((body, scene));
+    }
+    let body = Cow::Owned(damped(&body, &scene)?.into_owned());
+    let mut scene = scene.into_owned();
+    scene.requirements.damping = None;
+    Ok((body, Cow::Owned(scene)))
 }
 
 /// The state at time zero. What is prescribed replaces what the scene says of it.

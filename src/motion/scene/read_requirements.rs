@@ -14,7 +14,7 @@ pub(super) const TABLES: [(&str, &[&str]); 7] = [
     ("attachment", &["kind", "inertia", "axes", "first_frequency"]),
     ("limits", &["deflection", "stress", "mode_stress", "mode"]),
     ("band", &["frequency"]),
-    ("damping", &["ratio"]),
+    ("damping", &["ratio", "replace"]),
     ("tolerance", &["attitude", "deflection", "stress", "reaction", "least_deflection"]),
     ("cost", &["multiplications"]),
 ];
@@ -56,7 +56,10 @@ impl Section<'_, '_> {
             "attachment" => requirements.attachment = self.attachment()?,
             "limits" => requirements.limits = limits(self.walk, self.table, &self.span)?,
             "band" => requirements.band = Some(positive(self.walk, self.table, "frequency", &self.span)?),
-            "damping" => requirements.damping = Some(self.damping_ratio()?),
+            "damping" => {
+                let (ratio, replaces) = (self.damping_ratio(), self.replaces_damping());
+                (requirements.damping, requirements.replaces_damping) = (Some(ratio?), replaces?);
+            }
             "tolerance" => requirements.tolerance = self.tolerance()?,
             _ => requirements.multiplications = Some(self.multiplications()?),
         }
@@ -99,6 +102,15 @@ impl Section<'_, '_> {
             return None;
         }
         Some(ratio)
+    }
+
+    fn replaces_damping(&mut self) -> Option<bool> {
+        let Some(value) = self.table.get("replace") else { return Some(false) };
+        let DeValue::Boolean(replaces) = value.get_ref() else {
+            self.walk.mistyped("replace", value, "true or false");
+            return None;
+        };
+        Some(*replaces)
     }
 
     fn tolerance(&mut self) -> Option<Tolerance> {

@@ -5,7 +5,7 @@
 use super::read_columns::{COLUMN, HistoryFiles, column_history, interpolation};
 use super::read_numbers::{finite, positive};
 use super::{Axes, History, Interpolation, Point};
-use crate::input::{Table, Value, Walk, integer, real};
+use crate::input::{Table, Value, Walk, closer_than_rounding, integer, real};
 use nalgebra::Vector3;
 use std::ops::Range;
 use toml::de::DeValue;
@@ -161,6 +161,11 @@ fn points(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Hist
         "no points".to_owned()
     } else if times.windows(2).any(|pair| pair[0] >= pair[1]) {
         "times are not ascending".to_owned()
+    } else if let Some(row) = closer_than_rounding(&times) {
+        let [before, time] = [times[row - 1], times[row]];
+        format!(
+            "times {before:?} and {time:?} are the same but for rounding: leave one of the two points out"
+        )
     } else if interpolation == Interpolation::Cubic && times.len() > 1 {
         return Some(History::samples(times, &values, Interpolation::Cubic, true));
     } else {

@@ -2,6 +2,9 @@
 //! optional.
 
 use super::Axes;
+use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::error::Result;
+use crate::model::{Damping, FeModel};
 use nalgebra::{Matrix3, Vector3};
 
 /// What decides which terms and modes a body needs.
@@ -15,12 +18,44 @@ pub struct Requirements {
     pub limits: Limits,
     /// Highest frequency of interest, oscillations per time.
     pub band: Option<f64>,
-    /// Modal damping ratio of a body that has no damping of its own.
+    /// Modal damping ratio of the body in this scene; none: that of the body.
     pub damping: Option<f64>,
+    /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
+    pub replaces_damping: bool,
     /// Largest errors.
     pub tolerance: Tolerance,
     /// Multiplications that an evaluation of the equations of motion may take: instead of tolerances.
     pub multiplications: Option<usize>,
+}
+
+impl Requirements {
+    /// Refuses damping beside that of a body or model, unless it takes the place of that.
+    ///
+    /// * `of`: what has the other damping. `by`: what states this one.
+    ///
+    /// # Errors
+    /// [`SceneDamping`](Code::SceneDamping).
+    pub fn refuse_second_damping(&self, of: &str, by: &str) -> Result<()> {
+        match self.damping {
+            Some(ratio) if !self.replaces_damping => {
+                let message =
+                    format!("{by} states the damping ratio {ratio}, and the {of} has damping of its own");
+                Err(Diagnostic::new(Code::SceneDamping, message).into())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// [`Requirements::refuse_second_damping`] for a model that bodies are made of, before that is done.
+    ///
+    /// # Errors
+    /// [`SceneDamping`](Code::SceneDamping).
+    pub fn refuse_damping_beside(&self, model: &FeModel, scene: &str) -> Result<()> {
+        match model.damping() {
+            None | Some(Damping::Ratio(0.0)) => Ok(()),
+            Some(_) => self.refuse_second_damping("model", &format!("scene `{scene}`")),
+        }
+    }
 }
 
 /// Largest rotation of the body frame; `None`: what the run shows.

@@ -102,6 +102,8 @@ pub fn enrich_for_cases<B>(
     mut make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
 ) -> Result<EnrichedForCases<B>> {
+    let refuse = |scene: &Scene| scene.requirements.refuse_damping_beside(model, &scene.name);
+    scenes.iter().try_for_each(refuse)?;
     let mut loads = Mat::zeros(model.rows().len(), 0);
     let mut made = make(&loads)?;
     let mut cases = vec![Asking::default(); scenes.len()];

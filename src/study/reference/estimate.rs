@@ -8,7 +8,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
-use crate::motion::scene::{OutputErrors, Point, Scene, Stage, damped, instants, nodal_point, trace};
+use crate::motion::scene::{OutputErrors, Point, Scene, Stage, damped_once, instants, nodal_point, trace};
 use crate::numerics::linalg::not_negative;
 use faer::Mat;
 
@@ -117,13 +117,17 @@ impl Estimate {
     ) -> Result<Option<Self>> {
         let Some(duration) = scene.run.duration else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
-        let scene = &*stage.scene;
-        let body = &*damped(&stage.body, scene)?;
+        let given = scene.requirements.damping.is_some();
+        let (body, scene) = damped_once(stage.body, stage.scene)?;
+        let (body, scene) = (&*body, &*scene);
         let at = |point: &Point| Ok(nodal_point(model, point)?.unit_loads(model));
         let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
         let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
         let carrier = scene.carried.as_ref().map(|carried| nodal_point(model, &carried.by)).transpose()?;
-        let Some(view) = NodalView::new(model, body, loads, carrier.as_ref()) else { return Ok(None) };
+        let of_model = model.damping().filter(|_| !given);
+        let Some(view) = NodalView::new(model, body, loads, carrier.as_ref(), of_model) else {
+            return Ok(None);
+        };
         let (motion, _) = trace(body, scene, memory, |_| ())?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
             let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);

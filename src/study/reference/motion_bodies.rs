@@ -67,14 +67,6 @@ impl<'m> MotionBodies<'m> {
         self.shapes.basis(count)
     }
 
-    /// As [`MotionShapes::damped`].
-    ///
-    /// # Errors
-    /// Those of [`FlexBody::new`].
-    pub fn damped(&self, made: FlexBody) -> Result<FlexBody> {
-        self.shapes.damped(self.model, made)
-    }
-
     /// The fewest shapes, each number made with `make`, whose errors are in no case more than `most` of it
     /// times the tolerances. More shapes are nearly always better: the numbers worth trying are tried in
     /// turn, then twice as many each time, since reactions may take more than deformations; between the first

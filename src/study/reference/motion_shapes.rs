@@ -7,10 +7,8 @@ use crate::body::basis::{BasisChoice, ImportedShapes};
 use crate::body::flex_body::FlexBody;
 use crate::body::invariants::symmetric_part;
 use crate::model::FeModel;
-use crate::motion::scene::{Scene, Stage, Trace, damped};
-use crate::numerics::linalg::{
-    combine, dense_cholesky, gram, larger, side_by_side, solve_lower, solve_upper,
-};
+use crate::motion::scene::{Scene, Stage, Trace};
+use crate::numerics::linalg::{combine, dense_cholesky, gram, larger, side_by_side, solve_upper};
 use faer::Mat;
 
 /// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth
@@ -35,18 +33,6 @@ pub struct MotionShapes {
     /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of its
     /// motion, over what the scene of that motion allows, for r = 0 to k.
     left: Vec<f64>,
-    /// The damping that the scene, the first of several, gives the modes of the motion; `None` where the
-    /// model says it, or there is none.
-    damping: Option<GivenDamping>,
-}
-
-/// Damping of the modes Psi of a body.
-#[derive(Debug, Clone)]
-struct GivenDamping {
-    /// D of the modes (nf x nf).
-    matrix: Mat<f64>,
-    /// K Psi K_ff^-1 (N x nf): takes displacements in the span of Psi to modal coordinates.
-    dual: Mat<f64>,
 }
 
 impl MotionShapes {
@@ -58,8 +44,7 @@ impl MotionShapes {
     pub fn new(model: &FeModel, body: &FlexBody, motions: &[(&Scene, &Trace)]) -> Result<Option<Self>> {
         let Some((scene, _)) = motions.first() else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
-        let undamped = stage.body.modes().damping_ratio.iter().all(|ratio| *ratio == 0.0);
-        let body = &*damped(&stage.body, &stage.scene)?;
+        let body = &*stage.body;
         let stiffness = symmetric_part(body.invariants().modal_stiffness());
         let (Some(vectors), Some(lower)) = (body.vectors_of(model), dense_cholesky(stiffness)) else {
             return Ok(None);
@@ -74,35 +59,7 @@ impl MotionShapes {
         let all = side_by_side(&weighted.iter().map(Mat::as_ref).collect::<Vec<_>>());
         let left = left_out(&all, &directions);
         let combinations = solve_upper(&lower, &directions);
-        let given = undamped && body.modes().damping_ratio.iter().any(|ratio| *ratio != 0.0);
-        let damping = given.then(|| {
-            let identity = Mat::identity(body.n_modes(), body.n_modes());
-            let inverse = solve_upper(&lower, &solve_lower(&lower, &identity));
-            let weighted = model.pencil().apply_stiffness(vectors.as_ref());
-            GivenDamping { matrix: body.damping(), dual: combine(weighted.as_ref(), inverse.as_ref()) }
-        });
-        Ok(Some(Self { shapes: combine(vectors.as_ref(), combinations.as_ref()), left, damping }))
-    }
-
-    /// `made` of some of the shapes, with the damping that the scene gives the modes whose motion they are, D
-    /// = C'D_r C with C = K_r^-1 Psi_r'K Psi: the same ratio for its own modes, each of which is made of
-    /// several of those, would be another damping.
-    ///
-    /// # Errors
-    /// Those of [`FlexBody::new`].
-    pub fn damped(&self, model: &FeModel, made: FlexBody) -> Result<FlexBody> {
-        let (Some(GivenDamping { matrix, dual }), Some(vectors)) = (&self.damping, made.vectors_of(model))
-        else {
-            return Ok(made);
-        };
-        let seen = gram(dual.as_ref(), vectors.as_ref());
-        let product = gram(seen.as_ref(), (matrix * &seen).as_ref());
-        let damping = symmetric_part(&product);
-        let mut parts = made.into_parts();
-        let own = parts.modes.eigenvalue.iter().enumerate();
-        parts.modes.damping_ratio = own.map(|(j, lambda)| 0.5 * damping[(j, j)] / lambda.sqrt()).collect();
-        parts.modes.modal_damping = Some(damping);
-        FlexBody::new(parts)
+        Ok(Some(Self { shapes: combine(vectors.as_ref(), combinations.as_ref()), left }))
     }
 
     /// Numbers of shapes worth trying, ascending.

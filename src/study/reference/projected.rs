@@ -225,7 +225,7 @@ mod tests {
                 |node: usize| nodal_point(&model, &Point::Node(model.nodes().ids[node])).expect("a node");
             let load = at(3).unit_loads(&model);
             let carrier = carried.then(|| at(0));
-            let view = NodalView::new(&model, &body, vec![load], carrier.as_ref());
+            let view = NodalView::new(&model, &body, vec![load], carrier.as_ref(), model.damping());
             let view = view.unwrap_or_else(|| panic!("{name}: a view"));
             let motion = instants(&body.modes().eigenvalue);
             let motion = if model.dimension() == 2 { in_plane(motion) } else { motion };

@@ -6,7 +6,7 @@ use crate::model::{Damping, FeModel, InertialRows, RigidAcceleration};
 use crate::motion::dynamics::NodalPoint;
 use crate::motion::scene::Instant;
 use crate::numerics::linalg::{
-    combine, dense_cholesky, gram, multiply, solve_lower, solve_upper, subtract_combination,
+    SymmetricMatrix, combine, dense_cholesky, gram, multiply, solve_lower, solve_upper, subtract_combination,
 };
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -26,6 +26,8 @@ pub(super) struct NodalView<'m> {
     lower: Mat<f64>,
     /// D_ff of the modes.
     pub modal_damping: Mat<f64>,
+    /// Damping of the model, unless the scene replaces it.
+    damping: Option<&'m Damping<SymmetricMatrix>>,
     /// Whether the body has stiffness that depends on the motion, which nodes do not have.
     stiffens: bool,
     /// Rigid motions about the origin of the frame (N x 6, in the plane N x 3), axes of the model.
@@ -77,11 +79,14 @@ impl<'m> NodalView<'m> {
     /// `body`, with the damping of its scene, which was made of `model` and is carried by the point
     /// `carrier`; `None` when it has other rows, modes that depend on each other, or is carried by a point
     /// without an orientation.
+    ///
+    /// * `damping`: that of the model, unless the scene replaces it by that of `body`.
     pub fn new(
         model: &'m FeModel,
         body: &FlexBody,
         loads: Vec<Mat<f64>>,
         carrier: Option<&NodalPoint>,
+        damping: Option<&'m Damping<SymmetricMatrix>>,
     ) -> Option<Self> {
         let vectors = body.vectors_of(model)?;
         let weighted = model.pencil().apply_mass(vectors.as_ref());
@@ -105,6 +110,7 @@ impl<'m> NodalView<'m> {
             extended_rigid: rows.rigid(),
             extended,
             rows,
+            damping,
             damped: Mat::new(),
             vectors,
             weighted,
@@ -175,7 +181,7 @@ impl<'m> NodalView<'m> {
     /// D Psi, as the equations of all nodes have it: that of the model, else that of the modes on the nodes
     /// (theory 6.15).
     fn damping_of_modes(&self) -> Mat<f64> {
-        match self.model.damping() {
+        match self.damping {
             Some(Damping::Rayleigh { alpha, beta }) => {
                 let of_stiffness = self.model.pencil().apply_stiffness(self.vectors.as_ref());
                 Mat::from_fn(self.vectors.nrows(), self.vectors.ncols(), |i, j| {

@@ -14,6 +14,7 @@ use crate::base::units::UnitSystem;
 use crate::body::basis::rigid_modes;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
+use crate::motion::scene::Requirements;
 use crate::numerics::linalg::{gram, largest, side_by_side};
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix6, Vector3};
@@ -33,8 +34,10 @@ pub struct Settings {
     pub points: usize,
     /// At about as many of them the equations of all nodes are solved.
     pub solves: usize,
-    /// Damping ratio of a body that has no damping of its own.
+    /// Damping ratio of the modes, where it is not that of the body.
     pub damping: Option<f64>,
+    /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
+    pub replaces_damping: bool,
     /// Largest relative error.
     pub tolerance: f64,
     /// Bytes that may be allocated, and seconds that the solves may take by their estimate.
@@ -149,7 +152,7 @@ pub fn respond(
     settings: &Settings,
     watch: Watch<'_>,
 ) -> Result<Response> {
-    let body = &*damped(body, settings.damping)?;
+    let body = &*damped(body, settings)?;
     let at_centre = body.in_model_axes(body.invariants().first_moment() / body.invariants().mass())?;
     let rows =
         |places: &[Place]| places.iter().map(|place| place.rows(&at_centre)).collect::<Result<Vec<_>>>();
@@ -184,12 +187,15 @@ pub fn respond(
     })
 }
 
-/// The body with the damping ratio for its modes, where it has no damping of its own.
-fn damped(body: &FlexBody, ratio: Option<f64>) -> Result<Cow<'_, FlexBody>> {
-    match ratio.filter(|_| body.damping().norm_max() == 0.0) {
-        Some(ratio) => Ok(Cow::Owned(body.with_damping_ratio(ratio)?)),
-        None => Ok(Cow::Borrowed(body)),
+/// The body with the damping ratio of the settings for its modes, where they state one.
+fn damped<'b>(body: &'b FlexBody, settings: &Settings) -> Result<Cow<'b, FlexBody>> {
+    let Settings { damping, replaces_damping, .. } = *settings;
+    let Some(ratio) = damping else { return Ok(Cow::Borrowed(body)) };
+    if body.damping().norm_max() > 0.0 {
+        let stated = Requirements { damping, replaces_damping, ..Requirements::default() };
+        stated.refuse_second_damping("body", "--damping or the scene")?;
     }
+    Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
 }
 
 fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {

@@ -7,7 +7,7 @@ use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Groups};
 use crate::motion::dynamics::BodyPoint;
-use crate::motion::scene::{Scene, Stage, Tolerance, damped, points_of};
+use crate::motion::scene::{Scene, Stage, Tolerance, damped_once, points_of};
 use crate::study::reference::ReferenceError;
 use std::borrow::Cow;
 
@@ -23,11 +23,7 @@ pub(super) struct OnStage<'s> {
 impl<'s> OnStage<'s> {
     pub fn new(body: &'s FlexBody, scene: &'s Scene) -> Result<Self> {
         let Stage { body, scene, found } = Stage::new(body, scene)?;
-        let with_damping = match damped(&body, &scene)? {
-            Cow::Owned(own) => Some(own),
-            Cow::Borrowed(_) => None,
-        };
-        let body = with_damping.map_or(body, Cow::Owned);
+        let (body, scene) = damped_once(body, scene)?;
         let scenes = scenes(&body, &scene)?;
         Ok(Self { body, scene, found, scenes })
     }

@@ -265,7 +265,7 @@ impl<'m> Making<'m> {
     fn of_shapes(&self, bodies: &MotionBodies<'_>, count: usize, before: f64) -> Result<Source> {
         let start = Instant::now();
         let settings = ConvertSettings { basis: bodies.basis(count), ..self.settings(usize::MAX) };
-        let body = bodies.damped(convert(self.model, &settings, self.watch)?.body)?;
+        let body = convert(self.model, &settings, self.watch)?.body;
         let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
         Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
     }

@@ -86,6 +86,8 @@ pub struct NodalEquations<'m> {
     /// M^-1 C', and E = C M^-1 C', completed in the same way.
     pub(super) answered: Motions,
     pub(super) answer: Matrix6<f64>,
+    /// Damping of the model; ratios of modes are in `modal_damping`.
+    pub(super) damping: Option<&'m Damping<SymmetricMatrix>>,
     pub(super) modal_damping: Option<ModalDamping>,
     /// Nodes with rotational mass, where there are any.
     pub(super) directors: Option<Directors<'m>>,
@@ -140,10 +142,25 @@ impl<'m> NodalEquations<'m> {
         body: &FlexBody,
         conditions: &ReferenceConditions,
     ) -> Result<Self, NodalError> {
-        let mut equations = Self::undamped_modes(model, body.frame(), conditions)?;
-        if !matches!(model.damping(), Some(Damping::Rayleigh { .. } | Damping::Matrix(_))) {
-            equations.modal_damping = ModalDamping::new(model, body).ok_or(NodalError::OtherBody)?;
+        if matches!(model.damping(), Some(Damping::Rayleigh { .. } | Damping::Matrix(_))) {
+            return Self::undamped_modes(model, body.frame(), conditions);
         }
+        Self::of_damped_body(model, body, conditions)
+    }
+
+    /// The equations of `model` in the frame of `body` with the damping of the modes of the body in place of that of
+    /// the model.
+    ///
+    /// # Errors
+    /// As [`NodalEquations::of_body`].
+    pub fn of_damped_body(
+        model: &'m FeModel,
+        body: &FlexBody,
+        conditions: &ReferenceConditions,
+    ) -> Result<Self, NodalError> {
+        let mut equations = Self::undamped_modes(model, body.frame(), conditions)?;
+        equations.damping = None;
+        equations.modal_damping = ModalDamping::new(model, body).ok_or(NodalError::OtherBody)?;
         Ok(equations)
     }
 
@@ -190,6 +207,7 @@ impl<'m> NodalEquations<'m> {
             mass_rigid,
             answer: products(&columns, &answered, moving),
             answered,
+            damping: model.damping(),
             modal_damping: None,
             conditions: columns,
             is_held: *conditions != ReferenceConditions::MeanAxes,

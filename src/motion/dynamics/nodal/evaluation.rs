@@ -229,7 +229,7 @@ impl<'e> NodalEvaluation<'e> {
     fn take_internal_forces(&mut self) {
         let body = self.equations;
         self.second.copy_from_slice(&self.u);
-        match body.model.damping() {
+        match body.damping {
             None => {}
             Some(Damping::Rayleigh { alpha, beta }) => {
                 body.weigh(&self.ud, &mut self.w_rate);

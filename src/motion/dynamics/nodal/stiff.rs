@@ -109,7 +109,7 @@ impl<'m> Stiff<'m> {
         let pencil = model.pencil();
         let (mut of_mass, mut of_stiffness) = (T::ONE, z * z);
         let mut terms = Vec::new();
-        match model.damping() {
+        match self.equations.damping {
             Some(Damping::Rayleigh { alpha, beta }) => {
                 of_mass += z.times(*alpha);
                 of_stiffness += z.times(*beta);
@@ -208,7 +208,7 @@ fn factored<T: Scalar>(sum: &MatrixSum<'_, T>, equations: &NodalEquations<'_>) -
 
 /// y = D x with the damping of the model; whether there is any.
 fn damp(equations: &NodalEquations<'_>, x: &[f64], y: &mut [f64], room: &mut [f64]) -> bool {
-    match equations.model.damping() {
+    match equations.damping {
         Some(Damping::Rayleigh { alpha, beta }) => {
             equations.weigh(x, room);
             multiply_vector(equations.stiffness(), 1, x, y);

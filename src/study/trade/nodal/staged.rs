@@ -49,7 +49,11 @@ impl<'a> Staged<'a> {
             None => ReferenceConditions::MeanAxes,
         };
         let body = &*damped(body, scene)?;
-        let equations = NodalEquations::of_body(model, body, &conditions).map_err(refused)?;
+        let equations = match scene.requirements.damping {
+            Some(_) => NodalEquations::of_damped_body(model, body, &conditions),
+            None => NodalEquations::of_body(model, body, &conditions),
+        };
+        let equations = equations.map_err(refused)?;
         let loads = scene.loads.iter().map(|load| Ok((nodal_point(model, &load.at)?, load)));
         let watched = scene.watched.iter().map(|point| nodal_point(model, point));
         let mut staged = Self {
