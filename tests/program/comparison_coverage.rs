@@ -100,8 +100,11 @@ fn complete() -> FlexBody {
     FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// An entry, and a change of it.
+type Change = (&'static str, fn(&mut Parts));
+
 /// Primary entries that a comparison looks at, each with a change of it.
-const CHANGES: &[(&str, fn(&mut Parts))] = &[
+const CHANGES: &[Change] = &[
     ("/@dimension", flatten),
     ("/@units_length", |p| p.units = UnitSystem::parse("mm", "kg", "s").expect("units")),
     ("/@units_mass", |p| p.units = UnitSystem::parse("m", "t", "s").expect("units")),
@@ -321,7 +324,7 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
     }
 }
 
-/// The same body in other frames, in other bases and without common nodes.
+/// One body in other frames, in other bases and without common nodes.
 #[test]
 fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invariants() {
     let body = complete();
@@ -333,7 +336,7 @@ fn frames_signs_and_node_numbers_make_no_difference_to_what_is_beside_the_invari
     let moved = body.in_model_axes(Vector3::new(0.7, -0.3, 2.0)).expect("another frame");
     let flipped = with(&|p| {
         let nf = p.modes.eigenvalue.len();
-        let sign = |j: usize| if j % 2 == 0 { -1.0 } else { 1.0 };
+        let sign = |j: usize| if j.is_multiple_of(2) { -1.0 } else { 1.0 };
         let t = Mat::from_fn(nf, nf, |i, j| if i == j { sign(j) } else { 0.0 });
         let square = |a: &mut Mat<f64>| *a = Mat::from_fn(nf, nf, |i, j| sign(i) * sign(j) * a[(i, j)]);
         let columns = |a: &mut Mat<f64>| *a = &*a * &t;

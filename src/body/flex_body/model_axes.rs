@@ -73,7 +73,7 @@ impl FlexBody {
 }
 
 impl InternalRows {
-    /// The same rows with their vectors along the columns of `axes`; rows that are no vectors, which come last,
+    /// Returns the rows with their vectors along the columns of `axes`; rows that are no vectors, which come last,
     /// stay.
     pub fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
         let shape = turned(self.shape.as_ref(), &axes.transpose(), vectors(self));
