@@ -133,12 +133,12 @@ fn spectrum(series: &[f64]) -> Vec<Complex<f64>> {
 /// The median of a spectrum around a line.
 fn around(level: &[f64], line: usize) -> f64 {
     let from = (AROUND * line as f64) as usize;
-    let to = ((line as f64 / AROUND) as usize).min(level.len() - 1).max(line + WIDTH);
+    let to = ((line as f64 / AROUND) as usize).max(line + 2 * WIDTH).min(level.len() - 1);
     let beside = |other: &usize| other.abs_diff(line) > WIDTH;
     let mut values: Vec<f64> =
-        (from..=to.min(level.len() - 1)).filter(beside).map(|other| level[other]).collect();
+        (from..=to).filter(beside).map(|other| level[other]).collect();
     values.sort_by(f64::total_cmp);
-    values.get(values.len() / 2).copied().unwrap_or(0.0)
+    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
 /// Fourier transform of the increments of every amplitude at the circular frequency `rate`, real and imaginary part,
