@@ -167,7 +167,7 @@ codes! {
     MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass";
     InterfaceFar = "FB439", Warning, Done, "reference point of an interface is far from its nodes", "reference points are in model axes and in the unit of length of the nodes";
     GeometricStiffnessMotion = "FB440", Error, BadInput, "geometric stiffness is not that of a stress: it breaks a relation with rigid motion", "give the stress stiffness alone: the difference of the stiffness matrices with and without prestress holds the stiffness of the initial displacements as well";
-    GeometricStiffnessLoad = "FB441", Error, BadInput, "geometric stiffness is not that of the load that it is given for", "check load, axis, sign and units, and divide the matrix by the size of the load (spin: by the square of the rate in radians per unit of time)";
+    GeometricStiffnessLoad = "FB441", Error, BadInput, "geometric stiffness is not that of the load that it is given for", "check load, axis, sign and units, and divide the matrix by the size of the load (of spin about the centre of mass or the origin of the model: by the square of the rate in radians per unit of time)";
     GeometricStiffnessRough = "FB442", Warning, Done, "geometric stiffness fulfils its relations with rigid motion roughly", "nothing to do where elements of reduced integration explain it; else check that the matrix holds the stress stiffness alone";
     // FB5xx: numerics
     NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";

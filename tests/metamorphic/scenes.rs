@@ -263,6 +263,8 @@ impl Scales<'_> {
     /// Damping of the scene, and tolerances.
     fn demands(&mut self, scene: &mut Scene) {
         scene.requirements.damping = one_in(self.random, 3).then_some(0.02);
+        // The models may have a damping of their own.
+        scene.requirements.replaces_damping = true;
         if one_in(self.random, 4) {
             // Above the rates of all scenes.
             scene.requirements.motion.angular_velocity = Some(Range::Any(0.15 * self.rate));

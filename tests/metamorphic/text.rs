@@ -102,7 +102,7 @@ impl Text {
         }
         let demands = &scene.requirements;
         if let Some(ratio) = demands.damping {
-            self.line(&format!("[damping]\nratio = {ratio:?}"));
+            self.line(&format!("[damping]\nratio = {ratio:?}\nreplace = {}", demands.replaces_damping));
         }
         if let Some(Range::Any(length)) = demands.motion.angular_velocity {
             self.line(&format!("[motion]\nangular_velocity = {length:?}"));

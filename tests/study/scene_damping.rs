@@ -45,7 +45,7 @@ fn folder(damping: &str) -> TempDir {
 }
 
 fn scene(place: &Path, name: &str) -> Scene {
-    read_scene(&place.join(name)).expect("a scene")
+    read_scene(place.join(name)).expect("a scene")
 }
 
 fn body(place: &Path) -> FlexBody {
@@ -141,7 +141,7 @@ fn a_body_keeps_the_damping_of_its_model_alone() {
 fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     let folder = folder("");
     let place = folder.path();
-    let raw = read_model(&read_manifest(&place.join("model.toml")).expect("a manifest")).expect("a model");
+    let raw = read_model(&read_manifest(place.join("model.toml")).expect("a manifest")).expect("a model");
     let scene = scene(place, "replacing.toml");
     let mut settings = ConvertSettings { lumped: Vec::new(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(8);

@@ -7,14 +7,20 @@ use crate::numerics::linalg::{gram, larger};
 use faer::Mat;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+/// Part of the acceleration that balances a load by which inertia relief may differ from it.
+const NEARLY_BALANCED: f64 = 1e-3;
+
 /// Nodes with the least differences that have to carry a load: the others may be supported.
 const FREE_NODES: f64 = 0.5;
+
+/// A node is supported where its difference, relative to its force, is more than so many times the usual one.
+const SUPPORTED: f64 = 10.0;
 
 /// Part of the load that these nodes carry at the least.
 const FREE_LOAD: f64 = 0.25;
 
 /// Forces below this part of the inertia of the body are rounding.
-const SMALL_LOAD: f64 = 1e-9;
+const SMALL_LOAD: f64 = 1e-6;
 
 /// Unit loads of a model.
 pub(super) struct UnitLoads<'m> {
@@ -67,8 +73,8 @@ impl<'m> UnitLoads<'m> {
         let axis = load.component;
         match &load.kind {
             LoadKind::Named(_) => None,
-            LoadKind::Acceleration => Some(self.of_motion(forces, axis)),
-            LoadKind::AngularAcceleration => Some(self.of_motion(forces, 3 + axis)),
+            LoadKind::Acceleration => Some(self.of_acceleration(forces, axis)),
+            LoadKind::AngularAcceleration => Some(self.of_angular_acceleration(forces, axis)),
             LoadKind::Spin => Some(self.of_spin(forces, axis)),
             LoadKind::Force(at) | LoadKind::Moment(at) => {
                 let set = self.model.interfaces().iter().find(|set| set.name == *at)?;
@@ -79,30 +85,77 @@ impl<'m> UnitLoads<'m> {
         }
     }
 
-    /// Inertia forces of a unit rigid acceleration.
-    fn of_motion(&self, forces: &[Vector3<f64>], motion: usize) -> f64 {
-        let unit = Vector6::ith(motion, 1.0);
-        let load: Vec<_> = self.relief.iter().map(|relief| force(relief, &unit)).collect();
-        let fitted = unit + least_lengths(&differences(forces, &load), &self.relief);
-        // What carries the load does no work on the motion that is left: it is a projection of the unit motion.
-        let [own, with_unit] = [fitted, unit].map(|other| fitted.dot(&(self.mass * other)));
-        let scale = larger(own, with_unit.abs());
-        let error = if scale > 0.0 { (own - with_unit).abs() / scale } else { 0.0 };
+    /// Inertia forces of a unit acceleration.
+    fn of_acceleration(&self, forces: &[Vector3<f64>], axis: usize) -> f64 {
+        let none = vec![Vector3::zeros(); forces.len()];
+        self.of_inertia(forces, &none, &Vector6::ith(axis, 1.0))
+    }
+
+    /// Inertia forces of a unit angular acceleration about the origin of a frame.
+    fn of_angular_acceleration(&self, forces: &[Vector3<f64>], axis: usize) -> f64 {
+        let none = vec![Vector3::zeros(); forces.len()];
+        let about_centre = Vector6::ith(3 + axis, 1.0);
+        let shift = Vector3::ith(axis, 1.0).cross(&self.rows.centre());
+        let about_origin = about_centre + translation(&shift);
+        let error = |motion: &Vector6<f64>| self.of_inertia(forces, &none, motion);
+        error(&about_centre).min(error(&about_origin))
+    }
+
+    /// Centrifugal forces about the origin of a frame.
+    fn of_spin(&self, forces: &[Vector3<f64>], component: usize) -> f64 {
+        let load = self.centrifugal(component);
+        let (k, l) = LoadKind::SPIN[component];
+        let twice =
+            |k: usize, l: usize| Vector3::ith(k, 1.0).cross(&Vector3::ith(l, 1.0).cross(&self.rows.centre()));
+        let shift = if k == l { twice(k, l) } else { twice(k, l) + twice(l, k) };
+        let error = |motion: &Vector6<f64>| self.of_inertia(forces, &load, motion);
+        error(&Vector6::zeros()).min(error(&translation(&shift)))
+    }
+
+    /// Least error of what may carry the `load` with the inertia forces of a rigid acceleration: supports, the inertia
+    /// relief of a free body, or both.
+    fn of_inertia(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], motion: &Vector6<f64>) -> f64 {
+        let load: Vec<_> =
+            load.iter().zip(&self.relief).map(|(f, relief)| f + force(relief, motion)).collect();
+        let whole = self.balance(&load);
+        let partly = least_lengths(&differences(forces, &load), &self.relief);
+        // Supports do no work on the motion that they leave: it is M-orthogonal to what they take of the load.
+        let taken = whole - partly;
+        let product = |a: &Vector6<f64>, b: &Vector6<f64>| a.dot(&(self.mass * b));
+        let size = product(&taken, &taken).min(product(&partly, &partly));
+        // Moments at rotations of nodes are not among the forces: relief that nearly balances the load is all of it.
+        let is_balanced = self.rows.have_directors()
+            && product(&taken, &taken) <= NEARLY_BALANCED.powi(2) * product(&partly, &partly);
+        let error = if is_balanced || size == 0.0 { 0.0 } else { product(&taken, &partly).abs() / size };
         let all = [
             Explained { acceleration: Vector6::zeros(), error: 0.0 },
-            Explained { acceleration: -unit, error: 0.0 },
-            Explained { acceleration: fitted - unit, error },
+            Explained { acceleration: whole, error: 0.0 },
+            Explained { acceleration: partly, error },
         ];
         self.least(forces, &load, &all)
     }
 
-    /// Centrifugal forces; about another point than the centre of mass they differ by those of a translation.
-    fn of_spin(&self, forces: &[Vector3<f64>], component: usize) -> f64 {
-        let load = self.centrifugal(component);
-        let fitted = least_lengths(&differences(forces, &load), &self.relief);
-        let all = [Vector6::zeros(), self.balance(&load), fitted]
-            .map(|acceleration| Explained { acceleration, error: 0.0 });
-        self.least(forces, &load, &all)
+    /// Rigid acceleration whose inertia forces balance forces at the nodes.
+    fn balance(&self, load: &[Vector3<f64>]) -> Vector6<f64> {
+        let mut normal = Matrix6::zeros();
+        let mut right = Vector6::zeros();
+        let motions = self.model.nodes().positions.iter().map(|x| self.motions_of(x));
+        for ((motions, relief), f) in motions.zip(&self.relief).zip(load) {
+            for a in 0..6 {
+                right[a] += motions[a].dot(f);
+                (0..6).for_each(|b| normal[(a, b)] -= motions[a].dot(&relief[b]));
+            }
+        }
+        solve(0.5 * (normal + normal.transpose()), &right)
+    }
+
+    /// Displacements of a place under the six unit rigid motions.
+    fn motions_of(&self, place: &[f64; 3]) -> Relief {
+        let arm = Vector3::from(*place) - self.rows.centre();
+        std::array::from_fn(|motion| match motion {
+            0..3 => Vector3::ith(motion, 1.0),
+            _ => Vector3::ith(motion - 3, 1.0).cross(&arm),
+        })
     }
 
     /// Forces at the nodes of an interface with a unit resultant.
@@ -181,13 +234,6 @@ impl<'m> UnitLoads<'m> {
         all.iter().map(error).fold(f64::INFINITY, f64::min)
     }
 
-    /// Rigid acceleration whose inertia forces balance a load.
-    fn balance(&self, load: &[Vector3<f64>]) -> Vector6<f64> {
-        let at = |(x, f): (&[f64; 3], &Vector3<f64>)| self.resultant_of(&force_only(f), Vector3::from(*x));
-        let resultant = self.model.nodes().positions.iter().zip(load).map(at).sum();
-        solve(self.mass, &resultant)
-    }
-
     /// Difference of `forces` from `load` with the relief by an acceleration, at the nodes where it is least, relative to
     /// the forces there.
     fn unexplained(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], by: &Vector6<f64>) -> f64 {
@@ -197,14 +243,22 @@ impl<'m> UnitLoads<'m> {
         nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
         let all: f64 = net.iter().map(Vector3::norm).sum();
         let floor = SMALL_LOAD * self.inertia();
+        let size_of = |i: usize| larger(net[i].norm(), forces[i].norm());
+        let largest = (0..net.len()).map(size_of).fold(0.0, larger);
+        let loaded = nodes.iter().filter(|one| size_of(one.1) > SMALL_LOAD * largest);
+        let mut ratios: Vec<f64> = loaded.map(|&(rest, i)| rest / size_of(i)).collect();
+        ratios.sort_by(f64::total_cmp);
+        let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
         let (mut difference, mut size, mut carried) = (0.0, 0.0, 0.0);
         for (count, &(rest, i)) in nodes.iter().enumerate() {
-            if count as f64 >= FREE_NODES * net.len() as f64 && carried >= FREE_LOAD * all {
-                break;
+            let own = size_of(i);
+            let is_enough = count as f64 >= FREE_NODES * net.len() as f64 && carried >= FREE_LOAD * all;
+            if is_enough && rest > SUPPORTED * usual * own {
+                continue;
             }
             carried += net[i].norm();
             difference += rest;
-            size += larger(net[i].norm(), forces[i].norm());
+            size += own;
         }
         difference / larger(size, floor)
     }
@@ -234,8 +288,9 @@ fn motions(dimension: usize) -> &'static [usize] {
     if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
 }
 
-fn force_only(f: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(f.x, f.y, f.z, 0.0, 0.0, 0.0)
+/// The rigid motion of a translation.
+fn translation(by: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(by.x, by.y, by.z, 0.0, 0.0, 0.0)
 }
 
 fn differences(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Vec<Vector3<f64>> {

@@ -135,8 +135,7 @@ fn around(level: &[f64], line: usize) -> f64 {
     let from = (AROUND * line as f64) as usize;
     let to = ((line as f64 / AROUND) as usize).max(line + 2 * WIDTH).min(level.len() - 1);
     let beside = |other: &usize| other.abs_diff(line) > WIDTH;
-    let mut values: Vec<f64> =
-        (from..=to).filter(beside).map(|other| level[other]).collect();
+    let mut values: Vec<f64> = (from..=to).filter(beside).map(|other| level[other]).collect();
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }

@@ -17,13 +17,13 @@ const BEYOND: f64 = 2.0;
 /// Outputs of a selection among so many modes.
 ///
 /// Bodies that are enriched with responses to the residual forces of one another follow ways that rounding chooses:
-/// their groups correspond, their modes and what depends on them is open.
+/// their modes and what depends on them is open.
 fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
     let is_enriched = matches!(subject.basis, Basis::Lowest(count) if modes > count);
     let name = |name: &str| if is_enriched { format!("{name} {ENRICHED}") } else { name.to_owned() };
     let Selection { groups, guideline, chosen, n_modes, .. } = selection;
     let mut all = vec![
-        facts("groups", format!("{groups:?}, {guideline}")),
+        facts(&name("groups"), format!("{groups:?}, {guideline}")),
         facts(&name("verdict"), format!("{}", selection.holds())),
         facts(&name("modes"), format!("{:?} of {n_modes}, at first {modes}", selection.modes)),
     ];
