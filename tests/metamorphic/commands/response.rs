@@ -25,7 +25,7 @@ pub fn response(subject: &Subject) -> Result<Outputs> {
         points: 40,
         solves: 8,
         damping: Some(RATIO),
-        replaces_damping: false,
+        replaces_damping: true,
         tolerance: Settings::TOLERANCE,
         memory: None,
         longest: None,
