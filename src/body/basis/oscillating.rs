@@ -35,21 +35,19 @@ pub fn oscillating_responses(
     let no_conditions = Mat::zeros(loads.nrows(), 0);
     let conditions = conditions.unwrap_or(&no_conditions);
     // What holds the model takes C'm such that C x = 0: the response to C' is found beside the others.
-    let mut to_conditions = Mat::zeros(loads.nrows(), 0);
+    let (mut x, mut to_conditions) = (Mat::new(), Mat::new());
     let further = |all: &Mat<f64>| {
         to_conditions = all.as_ref().subcols(count, conditions.ncols()).to_owned();
-        let mut x = all.as_ref().subcols(0, count).to_owned();
+        x = all.as_ref().subcols(0, count).to_owned();
         hold(&mut x, conditions, &to_conditions);
         model.pencil().apply_mass(x.as_ref())
     };
     let all = side_by_side(&[loads.as_ref(), conditions.as_ref()]);
-    let [x, mut y] = match dynamic_responses_twice(&problem, all, further, square, &mut Counters::default()) {
+    let [_, mut y] = match dynamic_responses_twice(&problem, all, further, square, &mut Counters::default()) {
         Ok(responses) => responses,
         Err(EigenFailure::Inaccurate { .. }) => return Ok(None),
         Err(failure) => return Err(explain(model, failure)),
     };
-    let mut x = x.as_ref().subcols(0, count).to_owned();
-    hold(&mut x, conditions, &to_conditions);
     hold(&mut y, conditions, &to_conditions);
     let both = side_by_side(&[x.as_ref(), y.as_ref()]);
     Ok(both.is_all_finite().then_some(both))

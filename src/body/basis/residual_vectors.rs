@@ -42,7 +42,7 @@ pub fn free_static_responses(model: &FeModel, loads: Mat<f64>, first: f64) -> Re
     Ok(responses)
 }
 
-/// The same, and the responses to `further` loads that these tell.
+/// The responses of [`free_static_responses`], and those to `further` loads that these tell.
 ///
 /// # Errors
 /// As [`free_static_responses`].

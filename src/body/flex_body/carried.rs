@@ -229,8 +229,9 @@ impl FlexBody {
 
     /// Whether the place with `motion` moves in no mode.
     fn rests(&self, motion: &Mat<f64>) -> bool {
+        let extent = self.extent();
         (0..self.n_modes()).all(|j| {
-            let (size, extent) = (AT_REST * self.largest_displacement(j), self.extent());
+            let size = AT_REST * self.largest_displacement(j);
             (0..3).all(|k| motion[(k, j)].abs() <= size && motion[(3 + k, j)].abs() * extent <= size)
         })
     }

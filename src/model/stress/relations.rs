@@ -1,4 +1,4 @@
-//! What a geometric stiffness does to rigid motion of the body.
+//! Relations of a geometric stiffness with rigid motion of the body.
 
 use crate::model::FeModel;
 use crate::model::rigid::centre_and_length;

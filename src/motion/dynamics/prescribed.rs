@@ -21,7 +21,7 @@ impl std::error::Error for NotPositiveDefinite {}
 pub struct AlongFrame(pub Vector3<f64>);
 
 impl AlongFrame {
-    /// The same vector along the axes of the world, A v.
+    /// This vector along the axes of the world, A v.
     ///
     /// * `axes`: A, the axes of the frame in the world, in columns.
     pub fn in_world(&self, axes: &Matrix3<f64>) -> Vector3<f64> {

@@ -157,11 +157,7 @@ impl<'a> Prepared<'a> {
 /// [`SceneDamping`](Code::SceneDamping) when both state one and the scene does not replace that of the body; those of
 /// [`FlexBody::new`].
 pub(crate) fn damped<'b>(body: &'b FlexBody, scene: &Scene) -> Result<Cow<'b, FlexBody>> {
-    let Some(ratio) = scene.requirements.damping else { return Ok(Cow::Borrowed(body)) };
-    if body.damping().norm_max() > 0.0 {
-        scene.requirements.refuse_second_damping("body", &format!("scene `{}`", scene.name))?;
-    }
-    Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
+    scene.requirements.damped(body, &format!("scene `{}`", scene.name))
 }
 
 /// The body with the damping of the scene, and the scene without: what looks at the pair again adds none.

@@ -4,8 +4,10 @@
 use super::Axes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
+use crate::body::flex_body::FlexBody;
 use crate::model::{Damping, FeModel};
 use nalgebra::{Matrix3, Vector3};
+use std::borrow::Cow;
 
 /// What decides which terms and modes a body needs.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -29,13 +31,28 @@ pub struct Requirements {
 }
 
 impl Requirements {
+    /// `body` with this damping, where there is one.
+    ///
+    /// * `by`: what states it.
+    ///
+    /// # Errors
+    /// [`SceneDamping`](Code::SceneDamping) when the body has one of its own that this does not replace; those of
+    /// [`FlexBody::new`].
+    pub fn damped<'b>(&self, body: &'b FlexBody, by: &str) -> Result<Cow<'b, FlexBody>> {
+        let Some(ratio) = self.damping else { return Ok(Cow::Borrowed(body)) };
+        if body.damping().norm_max() > 0.0 {
+            self.refuse_second_damping("body", by)?;
+        }
+        Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
+    }
+
     /// Refuses damping beside that of a body or model, unless it takes the place of that.
     ///
     /// * `of`: what has the other damping. `by`: what states this one.
     ///
     /// # Errors
     /// [`SceneDamping`](Code::SceneDamping).
-    pub fn refuse_second_damping(&self, of: &str, by: &str) -> Result<()> {
+    fn refuse_second_damping(&self, of: &str, by: &str) -> Result<()> {
         match self.damping {
             Some(ratio) if !self.replaces_damping => {
                 let message =
@@ -46,7 +63,7 @@ impl Requirements {
         }
     }
 
-    /// [`Requirements::refuse_second_damping`] for a model that bodies are made of, before that is done.
+    /// Refuses damping beside that of a model that bodies are made of, before that is done.
     ///
     /// # Errors
     /// [`SceneDamping`](Code::SceneDamping).

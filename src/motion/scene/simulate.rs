@@ -158,6 +158,9 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
 
 /// A warning where spin takes more than a hundredth of the stiffness of some motion.
 fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
+    if extremes.spins.is_empty() {
+        return None;
+    }
     let (_, worst) = body.worst_spin()?;
     if worst * extremes.spin.powi(2) <= SOFTENING {
         return None;

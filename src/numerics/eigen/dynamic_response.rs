@@ -5,6 +5,7 @@ use super::complement::Complement;
 use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
+use super::static_response::twice;
 use crate::numerics::linalg::{Analysis, Indefinite, Pencil, largest};
 use faer::{Mat, MatRef, Scale};
 
@@ -52,9 +53,7 @@ pub fn dynamic_responses_twice(
 ) -> Result<[Mat<f64>; 2], EigenFailure> {
     let none = Mat::zeros(problem.pencil.n(), 0);
     let respond = |responses: &Responses<'_>, counters: &mut Counters| {
-        let x = responses.of(loads, counters)?;
-        let loads = further(&x);
-        Ok([x, responses.of(loads, counters)?])
+        twice(|loads| responses.of(loads, counters), loads, further)
     };
     with_responses(problem, none.as_ref(), square, counters, respond)
 }

@@ -71,11 +71,20 @@ pub fn static_responses_twice(
 ) -> Result<[Mat<f64>; 2], EigenFailure> {
     let none = Mat::zeros(problem.pencil.n(), 0);
     let respond = |responses: &Responses<'_>, counters: &mut Counters| {
-        let x = responses.of(loads, counters)?;
-        let loads = further(&x);
-        Ok([x, responses.of(loads, counters)?])
+        twice(|loads| responses.of(loads, counters), loads, further)
     };
     with_responses(problem, none.as_ref(), first, precision, accuracy, counters, respond)
+}
+
+/// The responses `of` loads, and those of further loads that these tell.
+pub(super) fn twice(
+    mut of: impl FnMut(Mat<f64>) -> Result<Mat<f64>, EigenFailure>,
+    loads: Mat<f64>,
+    further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
+) -> Result<[Mat<f64>; 2], EigenFailure> {
+    let first = of(loads)?;
+    let loads = further(&first);
+    Ok([first, of(loads)?])
 }
 
 fn with_responses<T>(

@@ -2,8 +2,9 @@
 
 use super::grid::Grid;
 use super::lack::{Found, Lack, energy_scale};
-use super::missed::{Missed, Question};
+use super::missed::Missed;
 use super::residual::NodalView;
+use super::resonance::Question;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
@@ -50,7 +51,7 @@ pub struct ReferenceError {
 }
 
 impl ReferenceError {
-    /// Of a body of so many modes of whose errors nothing is known.
+    /// The errors of a body of so many modes of which nothing is known.
     fn unknown(modes: usize, reason: &'static str) -> Self {
         let all = f64::INFINITY;
         let errors = OutputErrors { attitude: all, deflection: Some(all), stress: Some(all), reaction: None };

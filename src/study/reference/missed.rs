@@ -6,7 +6,7 @@ use super::grid::Grid;
 use super::held::Held;
 use super::projected::{Projected, UnbalancedAmplitudes};
 use super::residual::NodalView;
-use super::resonance::{Resonance, resonances};
+use super::resonance::{Question, resonances};
 use crate::base::error::Result;
 use crate::body::basis::{free_static_responses_twice, oscillating_responses};
 use crate::body::flex_body::FlexBody;
@@ -47,16 +47,6 @@ pub(super) struct Missed {
     pub energy: Mat<f64>,
 }
 
-/// What is asked about the forces that a motion leaves unbalanced.
-pub(super) struct Question {
-    /// Whether the motion starts in equilibrium.
-    pub settled: bool,
-    /// Root of the elastic energy that does not count.
-    pub negligible: f64,
-    /// Circular frequency below which the body lacks no mode.
-    pub complete_below: f64,
-}
-
 impl Missed {
     /// Of a body in the `motion` that it makes at the instants of `grid`.
     ///
@@ -80,14 +70,17 @@ impl Missed {
             return Ok(Self { forces, amplitudes, in_modes, responses, energy: Mat::zeros(0, 0) });
         };
         let forces = compressed.basis;
-        let beside = Beside { view, eigenvalues: &body.modes().eigenvalue };
-        let inertia = |responses: &Mat<f64>| beside.inertia(responses.clone(), &amplitudes);
+        let beside = Beside::new(view, &body.modes().eigenvalue);
+        let (mut responses, mut energy) = (Mat::new(), Mat::new());
+        let inertia = |static_responses: &Mat<f64>| {
+            responses = beside.of(static_responses.clone());
+            energy = beside.energy(&responses);
+            beside.inertia(&responses, &energy, &amplitudes)
+        };
         let first = body.modes().eigenvalue[0];
-        let [own, of_inertia] = free_static_responses_twice(model, forces.clone(), inertia, first)?;
-        let own = beside.of(own);
-        let energy = beside.energy(&own);
-        let mut missed = Self { forces, amplitudes, in_modes, responses: own, energy };
-        let resonances = missed.resonances(grid, question);
+        let [_, of_inertia] = free_static_responses_twice(model, forces.clone(), inertia, first)?;
+        let resonances = resonances(grid, &amplitudes, &energy, question);
+        let mut missed = Self { forces, amplitudes, in_modes, responses, energy };
         missed.add(&beside, of_inertia);
         for resonance in resonances {
             let forces = combine(
@@ -97,12 +90,6 @@ impl Missed {
             missed.add_resonance(&beside, forces, resonance.rate)?;
         }
         Ok(missed)
-    }
-
-    /// Frequencies at which the forces drive a mode that is lacking.
-    fn resonances(&self, grid: &Grid, question: &Question) -> Vec<Resonance> {
-        let &Question { settled, negligible, complete_below } = question;
-        resonances(grid, &self.amplitudes, &self.energy, settled, negligible, complete_below)
     }
 
     /// Adds what the `forces` make the model do that oscillate at a circular frequency.
@@ -121,7 +108,7 @@ impl Missed {
 
     /// Adds responses to forces that have no amplitude of their own.
     fn add(&mut self, beside: &Beside<'_>, responses: Mat<f64>) {
-        let more = beside.more(&self.responses, responses);
+        let more = beside.more(&self.responses, &self.energy, responses);
         let forces = beside.view.model.pencil().apply_stiffness(more.as_ref());
         let mut amplitudes = Mat::zeros(self.amplitudes.nrows() + more.ncols(), self.amplitudes.ncols());
         amplitudes.as_mut().subrows_mut(0, self.amplitudes.nrows()).copy_from(&self.amplitudes);
@@ -184,17 +171,22 @@ fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
 struct Beside<'v> {
     view: &'v NodalView<'v>,
     eigenvalues: &'v [f64],
+    /// K Psi.
+    stiff: Mat<f64>,
 }
 
-impl Beside<'_> {
+impl<'v> Beside<'v> {
+    fn new(view: &'v NodalView<'v>, eigenvalues: &'v [f64]) -> Self {
+        Self { view, eigenvalues, stiff: view.model.pencil().apply_stiffness(view.vectors.as_ref()) }
+    }
+
     /// `responses` with what carries the body at rest, and without their part in the modes.
     fn of(&self, mut responses: Mat<f64>) -> Mat<f64> {
         if let Some(held) = &self.view.held {
             held.hold(&mut responses);
         }
         // The part in the modes is that of rounding.
-        let weighted = self.view.model.pencil().apply_stiffness(self.view.vectors.as_ref());
-        let shared = gram(weighted.as_ref(), responses.as_ref());
+        let shared = gram(self.stiff.as_ref(), responses.as_ref());
         let part = Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / self.eigenvalues[p]);
         subtract_combination(responses.as_mut(), self.view.vectors.as_ref(), part.as_ref());
         responses
@@ -206,10 +198,11 @@ impl Beside<'_> {
         symmetric_part(&gram(responses.as_ref(), weighted.as_ref()))
     }
 
-    /// The forces M E y of the few E y that have nearly all of the elastic energy of E c(t). `amplitudes`: c.
-    fn inertia(&self, responses: Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
-        let responses = self.of(responses);
-        let Some((turned, roots)) = principal(self.energy(&responses), ROUNDING, usize::MAX) else {
+    /// The forces M E y of the few E y that have nearly all of the elastic energy of E c(t).
+    ///
+    /// * `responses`: E; `energy`: E'K E; `amplitudes`: c.
+    fn inertia(&self, responses: &Mat<f64>, energy: &Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
+        let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else {
             return Mat::zeros(responses.nrows(), 0);
         };
         let moving = gram(turned.as_ref(), amplitudes.as_ref());
@@ -225,12 +218,13 @@ impl Beside<'_> {
 
     /// What `further` responses add to `known` ones: K-orthogonal to these and to each other, of an energy as large
     /// as the largest of these.
-    fn more(&self, known: &Mat<f64>, further: Mat<f64>) -> Mat<f64> {
+    ///
+    /// * `energy`: that of the known ones, E'K E.
+    fn more(&self, known: &Mat<f64>, energy: &Mat<f64>, further: Mat<f64>) -> Mat<f64> {
         let mut further = self.of(further);
         let own = self.energy(&further);
         let sizes: Vec<f64> = (0..own.nrows()).map(|j| own[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
         further = Mat::from_fn(further.nrows(), further.ncols(), |i, j| further[(i, j)] / sizes[j]);
-        let energy = self.energy(known);
         let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else { return further };
         let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
         let orthonormal = combine(known.as_ref(), unit.as_ref());

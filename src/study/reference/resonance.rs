@@ -28,6 +28,16 @@ const WIDTH: usize = 6;
 /// Instants of the uniform series at the most.
 const MOST_INSTANTS: usize = 1 << 20;
 
+/// The motion whose forces are looked at for resonances, and the size of one that counts.
+pub(super) struct Question {
+    /// True if the motion starts in equilibrium.
+    pub settled: bool,
+    /// Root of the elastic energy that does not count.
+    pub negligible: f64,
+    /// Circular frequency below which the body lacks no mode.
+    pub complete_below: f64,
+}
+
 /// A frequency with much of the forces.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Resonance {
@@ -37,22 +47,20 @@ pub(super) struct Resonance {
     pub amplitudes: Mat<f64>,
 }
 
-/// Frequencies at which forces with the amplitudes c(t) drive an oscillator of unit static response so far that it has
-/// more than `enough` of the root of the elastic energy, strongest first.
+/// Frequencies at which forces with the amplitudes c(t) drive an oscillator of unit static response so far that its
+/// elastic energy is not negligible, strongest first.
 ///
 /// An oscillator x'' + w^2 x = w^2 c without damping swings about its static response by the integral of c' cos w (t -
 /// s) ds: at most by |C'(w)|, the Fourier transform of c' over the run, a step at its beginning with it.
 ///
 /// * `amplitudes`: c (k x m) at the instants of `grid`; `energy`: E'K E of their static responses (k x k).
-/// * `above`: circular frequency below which nothing is lacking.
 pub(super) fn resonances(
     grid: &Grid,
     amplitudes: &Mat<f64>,
     energy: &Mat<f64>,
-    settled: bool,
-    enough: f64,
-    above: f64,
+    question: &Question,
 ) -> Vec<Resonance> {
+    let &Question { settled, negligible, complete_below } = question;
     let Some(duration) = grid.times.last().copied().filter(|last| *last > 0.0) else { return Vec::new() };
     let count = (2 * grid.times.len()).next_power_of_two().min(MOST_INSTANTS);
     let step = duration / count as f64;
@@ -65,9 +73,9 @@ pub(super) fn resonances(
     }
     level.iter_mut().for_each(|level| *level = (0.5 * *level).sqrt());
     let rate = |line: usize| TAU * line as f64 / (2.0 * duration);
-    let first = (above / rate(1)).ceil().max(1.0) as usize;
+    let first = (complete_below / rate(1)).ceil().max(1.0) as usize;
     let mut peaks: Vec<usize> = (first.max(1)..count / 2)
-        .filter(|&line| level[line] > enough && level[line] >= level[line - 1].max(level[line + 1]))
+        .filter(|&line| level[line] > negligible && level[line] >= level[line - 1].max(level[line + 1]))
         .collect();
     peaks.sort_by(|&a, &b| level[b].total_cmp(&level[a]));
     let mut chosen: Vec<usize> = Vec::new();
@@ -173,11 +181,12 @@ mod tests {
         Grid { times, pieces: Vec::from([whole]) }
     }
 
-    fn found(force: impl Fn(f64) -> f64, enough: f64) -> Vec<f64> {
+    fn found(force: impl Fn(f64) -> f64, negligible: f64) -> Vec<f64> {
         let grid = grid(4000, 10.0);
         let amplitudes = Mat::from_fn(1, grid.times.len(), |_, i| force(grid.times[i]));
         let energy = Mat::full(1, 1, 2.0);
-        let all = resonances(&grid, &amplitudes, &energy, false, enough, 0.0);
+        let question = Question { settled: false, negligible, complete_below: 0.0 };
+        let all = resonances(&grid, &amplitudes, &energy, &question);
         all.into_iter().map(|resonance| resonance.rate / TAU).collect()
     }
 

@@ -190,12 +190,8 @@ pub fn respond(
 /// The body with the damping ratio of the settings for its modes, where they state one.
 fn damped<'b>(body: &'b FlexBody, settings: &Settings) -> Result<Cow<'b, FlexBody>> {
     let Settings { damping, replaces_damping, .. } = *settings;
-    let Some(ratio) = damping else { return Ok(Cow::Borrowed(body)) };
-    if body.damping().norm_max() > 0.0 {
-        let stated = Requirements { damping, replaces_damping, ..Requirements::default() };
-        stated.refuse_second_damping("body", "--damping or the scene")?;
-    }
-    Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
+    let stated = Requirements { damping, replaces_damping, ..Requirements::default() };
+    stated.damped(body, "--damping or the scene")
 }
 
 fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {
