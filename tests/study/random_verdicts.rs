@@ -26,6 +26,7 @@ use flexbody::study::selection::select_from;
 use flexbody::study::tailoring::Tailoring;
 use flexbody::study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
@@ -442,6 +443,18 @@ fn outcome(case: &Case) -> Result<Outcome> {
     Ok(Outcome { seed: *seed, what: what.clone(), start: *start, effectivity, verdict, output })
 }
 
+/// Judges one scene, and prints the result as soon as it is there.
+fn told(case: &Case) -> Result<Outcome> {
+    let result = outcome(case);
+    match &result {
+        Ok(one) => {
+            println!("{} {}: {:?} {} {:?}", one.seed, one.what, one.verdict, one.output, one.effectivity)
+        }
+        Err(error) => println!("{} {}: {error}", case.seed, case.what),
+    }
+    result
+}
+
 /// Quantiles of numbers: the least, 5 %, the median, 95 % and the largest.
 fn quantiles(mut values: Vec<f64>) -> Option<[f64; 5]> {
     values.sort_by(f64::total_cmp);
@@ -519,20 +532,16 @@ fn page(outcomes: &[Outcome], not_run: &[String]) -> String {
 #[ignore = "slow"]
 fn estimates_and_verdicts_hold_against_the_motion_of_all_nodes() {
     let asked = std::env::var("FLEXBODY_VERDICTS").ok().and_then(|count| count.parse().ok());
-    let (mut outcomes, mut not_run) = (Vec::new(), Vec::new());
     let seeds: Vec<u64> = (1..=asked.unwrap_or(FEW)).collect();
     let driven = if asked.is_some() { &seeds[..] } else { &FEW_DRIVEN };
-    for case in seeds.iter().map(|&seed| case(seed)).chain(driven.iter().map(|&seed| driven_case(seed))) {
-        let seed = case.seed;
-        match outcome(&case) {
-            Ok(one) => {
-                println!("{seed} {}: {:?} {} {:?}", one.what, one.verdict, one.output, one.effectivity);
-                outcomes.push(one);
-            }
-            Err(error) => {
-                println!("{seed} {}: {error}", case.what);
-                not_run.push(format!("seed {seed} {}", error.diagnostics()[0].code().id()));
-            }
+    let cases: Vec<Case> =
+        seeds.iter().map(|&seed| case(seed)).chain(driven.iter().map(|&seed| driven_case(seed))).collect();
+    let results: Vec<_> = cases.par_iter().map(|case| (case, told(case))).collect();
+    let (mut outcomes, mut not_run) = (Vec::new(), Vec::new());
+    for (case, result) in results {
+        match result {
+            Ok(one) => outcomes.push(one),
+            Err(error) => not_run.push(format!("seed {} {}", case.seed, error.diagnostics()[0].code().id())),
         }
     }
     let page = page(&outcomes, &not_run);
