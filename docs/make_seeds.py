@@ -41,7 +41,7 @@ BODIES = [
 ]
 BEAM_CELLS, BEAM_SIZE = (24, 1, 1), (1.0, 0.02, 0.01)
 GUIDELINES = [("I", ()), ("II", ("II",)), ("III", ("II", "III")), ("III, free", ("II", "III", "III, free slender bodies"))]
-# Terms of `select`, as the tables call them. Its last one, a bound of the Coriolis torque across all axes, has the unit of a rate; `Body.coriolis_torque`
+# Terms of `select`, as the tables call them. Its last one is a bound of the Coriolis torque across all axes; `Body.coriolis_torque`
 # takes its place.
 NAMES = {
     "linear inertia W1 Q": "W1 Q", "quadratic inertia Q'W2 Q": "Q'W2 Q", "inertia coupling Q'W3": "Q'W3", "constant centrifugal load W1'w w / 2": "W1'w w / 2",

@@ -208,6 +208,7 @@ codes! {
     MotionWithoutBasis = "FB552", Note, Done, "a motion that no few shapes make", "nothing to do: the modes are those without --basis scene";
     RateUnsettled = "FB554", Warning, Done, "a rate that still changes with the steps of the integration", "give a smaller `tolerance` (a shorter `step`) in [run], and take the rate for settled when it no longer changes";
     SelectionUnjudged = "FB557", Error, CheckFailed, "a body for a scene that it does not hold, or where nothing can be said of it", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body all the same";
+    CouplingEffect = "FB558", Note, Done, "rigid interfaces that the body and the model it is compared with have in common", "nothing to do where a stiff part is mounted at the interface; else state coupling = \"averaging\", which lets it deform";
     // FB6xx: resources
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";

@@ -40,6 +40,8 @@ pub struct ResponseFacts<'a> {
     passed: Option<bool>,
     body_modes_in_band: usize,
     solved: Option<SolvedFacts>,
+    /// `None` where no interface of the body is rigid.
+    coupling: Option<CouplingFacts<'a>>,
     frequencies_hz: &'a [f64],
     pairs: Vec<PairFacts>,
     diagnostics: &'a [Diagnostic],
@@ -57,6 +59,31 @@ struct SolvedFacts {
     solves: usize,
     flops: f64,
     modes_in_band: usize,
+}
+
+/// Rigid interfaces, which the model has in the comparison as well, and their effect on its response.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct CouplingFacts<'a> {
+    interfaces: &'a [String],
+    largest: Option<At>,
+}
+
+impl CouplingFacts<'_> {
+    fn in_words(&self) -> String {
+        let names = self.interfaces.iter().map(|name| format!("`{}`", plain(name))).collect::<Vec<_>>();
+        let which = match names.as_slice() {
+            [one] => format!("interface {one} is"),
+            all => format!("interfaces {} are", all.join(", ")),
+        };
+        let effect = self.largest.map_or_else(
+            || "the effect of it is not known".to_owned(),
+            |at| {
+                let hertz = significant(at.hertz, 4);
+                format!("it changes the response of the model by up to {} (at {hertz} Hz)", percent(at.value))
+            },
+        );
+        format!("{which} rigid, in the body and in the model it is compared with; {effect}")
+    }
 }
 
 /// From one place to another.
@@ -173,6 +200,10 @@ impl<'a> ResponseFacts<'a> {
                 flops: solved.flops,
                 modes_in_band: solved.modes_in_band,
             }),
+            coupling: response.coupling.as_ref().map(|coupling| CouplingFacts {
+                interfaces: &coupling.interfaces,
+                largest: coupling.largest,
+            }),
             frequencies_hz: &response.frequencies,
             pairs,
             diagnostics: &run.diagnostics,
@@ -207,6 +238,7 @@ impl<'a> ResponseFacts<'a> {
         };
         entries.push(("Damping", damping.to_owned()));
         entries.push(("All nodes", self.solved_in_words()));
+        entries.extend(self.coupling.map(|coupling| ("Coupling", coupling.in_words())));
         let (wall, cpu) = (duration(self.wall_seconds), duration(self.cpu_seconds));
         entries.push(("Time", format!("{wall} wall, {cpu} CPU, {}", counted(self.threads, "thread"))));
         entries

@@ -124,7 +124,14 @@ impl Tailoring {
         if let Some(Fewest { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
             let modes = made.body.n_modes();
             let own = errors.into_iter().zip(worst).zip(lacks).map(|((errors, worst), lacks)| {
-                vec![ReferenceError { modes, errors, worst: lacks + worst, time: 0.0, unknown: None }]
+                vec![ReferenceError {
+                    modes,
+                    errors,
+                    worst: lacks + worst,
+                    time: 0.0,
+                    unknown: None,
+                    coupling: None,
+                }]
             });
             return Ok(EnrichedForCases { rounds: own.collect(), made });
         }

@@ -6,16 +6,17 @@ use crate::support::mesh::{Mesh, grid};
 use crate::support::scenes::nothing_happens;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
-use flexbody::body::basis::ModeSettings;
+use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::verification::accept;
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody::motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, ModeStart, OutputErrors, Point, Scene, Scheme,
-    Spin, Stage, VectorHistory, simulate, trace,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, Measure, ModeStart, OtherModes, OutputErrors,
+    Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate, trace, trace_at,
 };
 use flexbody::numerics::eigen::{Resume, Wanted};
+use flexbody::numerics::linalg::gram;
 use flexbody::study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, ReferenceError, enrich};
 use flexbody::study::tailoring::{Tailoring, convert_for_cases, convert_for_scene};
 use flexbody::study::trade::{Allowed, NodalReference};
@@ -32,6 +33,10 @@ fn beam(cells: [i32; 3]) -> FeModel {
 }
 
 fn beam_of(element: Element, rule: MassRule, cells: [i32; 3]) -> FeModel {
+    rooted_beam(element, rule, cells, Coupling::Averaging)
+}
+
+fn rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> FeModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(element, &grid(cells), |[x, y, z]| {
         [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
@@ -39,7 +44,7 @@ fn beam_of(element: Element, rule: MassRule, cells: [i32; 3]) -> FeModel {
     let raw = mesh.assemble(&rubber, rule).raw_model();
     let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.1);
     let root = NodeSet::new("root", nodes.map(|(id, _)| *id).collect());
-    let interfaces = vec![NodeSet { coupling: Some(Coupling::Averaging), ..root }];
+    let interfaces = vec![NodeSet { coupling: Some(coupling), ..root }];
     FeModel::from_raw(RawModel { interfaces, ..raw }).expect("a sound model").model
 }
 
@@ -416,4 +421,57 @@ fn a_static_start_stays_as_it_is() {
     assert!(calm[0] > 0.0 && spread(&calm) < 1e-6, "{calm:?}");
     scene.initial.settled = false;
     assert!(spread(&energies(&scene)) > 0.5);
+}
+
+/// Errors of the motion of `body` against that of `whole`, both of one model.
+fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Scene) -> OutputErrors {
+    let [of_whole, own] = [whole, body].map(|body| Stage::new(body, scene).expect("a stage"));
+    let (motion, _) = trace(&of_whole.body, &of_whole.scene, None, |_| ()).expect("a motion");
+    let mut same_steps = own.scene.clone().into_owned();
+    same_steps.run.scheme = motion.scheme;
+    let moved = trace_at(&own.body, &same_steps, &motion.time, None).expect("a motion");
+    let [psi, all] = [&own, &of_whole].map(|stage| stage.body.vectors_of(model).expect("of this model"));
+    let shared = gram(psi.as_ref(), model.pencil().apply_stiffness(all.as_ref()).as_ref());
+    let modes = OtherModes::new(&own.body, &of_whole.body, shared.as_ref()).expect("of one model");
+    Measure::new(&of_whole.body, &motion).of_other(&moved, &modes).largest()
+}
+
+/// A Craig-Bampton body keeps its rigid root rigid, and lacks nothing of a model whose root is rigid when it has all
+/// fixed-interface modes: with few of them it lacks what that body does differently. The model whose root deforms is
+/// another one, by far.
+#[test]
+fn a_rigid_interface_is_rigid_in_the_model_that_the_body_is_compared_with() {
+    let model = rooted_beam(Element::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Rigid);
+    let basis = BasisChoice::CraigBampton(CraigBampton);
+    let of = |modes: usize| {
+        let settings = ConvertSettings { basis: basis.clone(), ..settings(modes) };
+        convert(&model, &settings, SILENT).expect("a body").body
+    };
+    let (whole, few) = (of(usize::MAX), of(4));
+    let force = Vector3::new(2e-4, 5e-4, -3e-4);
+    let free = pulled(&model, 16, force, 0.4, Vector3::new(0.02, 0.01, 0.03));
+    let scenes =
+        [free, driven(&model, Given::Spin, 16, force, 0.3), driven(&model, Given::Swing, 16, force, 0.3)];
+    for (at, scene) in scenes.iter().enumerate() {
+        let estimate = estimated(&model, &few, scene);
+        let found = errors_beside(&model, &whole, &few, scene);
+        for (name, estimate, found) in [
+            ("deflection", estimate.errors.deflection, found.deflection),
+            ("stress", estimate.errors.stress, found.stress),
+        ] {
+            let (estimate, found) = (estimate.expect(name), found.expect(name));
+            assert!((0.8..1.25).contains(&(estimate / found)), "{at}: {name} {estimate:.2e}, {found:.2e}");
+        }
+        let nothing = estimated(&model, &whole, scene);
+        assert!(nothing.errors.stress.is_some_and(|error| error < 1e-4), "{at}: {:?}", nothing.errors);
+        let coupling = estimate.coupling.expect("a rigid root");
+        assert_eq!(coupling.interfaces, ["root"]);
+        let of_coupling = nothing.coupling.expect("a rigid root").errors.stress.expect("a deformed body");
+        assert!(
+            of_coupling > 10.0 * nothing.errors.stress.expect("a deformed body"),
+            "{at}: {of_coupling:.2e}"
+        );
+    }
+    // Free modes deform the root.
+    assert!(estimated(&model, &body(&model, 4), &scenes[0]).coupling.is_none());
 }

@@ -4,16 +4,18 @@
 use crate::support::elements::{Kind as Element, MassRule, Material};
 use crate::support::mesh::Mesh;
 use crate::support::program::{fixtures, flexbody};
+use crate::support::turning::dense;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::{BasisChoice, CraigBampton, FreeSurface, Loads, ModeSettings};
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::input::{read_manifest, read_model};
-use flexbody::model::{Damping, FeModel, NodeSet, RawMatrix, RawModel};
+use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawMatrix, RawModel};
 use flexbody::motion::scene::Point;
 use flexbody::numerics::eigen::Wanted;
 use flexbody::study::response::{Band, Complex, Direction, Pair, Place, Response, Settings, respond};
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde_json::Value;
 use std::fs;
 
@@ -380,4 +382,82 @@ fn the_command_writes_what_its_schema_says() {
     let (alone, _) = with(&["response", "b.flex.h5"], "2");
     assert_eq!((&alone["results"]["passed"], &alone["exit_code"]), (&Value::Null, &0.into()));
     assert!(alone["results"]["verdict"].as_str().is_some_and(|verdict| verdict.contains("not known")));
+}
+
+/// The same block with the stated coupling of both ends.
+fn coupled_block(coupling: Coupling) -> RawModel {
+    let mesh = Mesh::block(Element::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
+    let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    for (name, x) in [("left", 0.0), ("right", 0.4)] {
+        let nodes = raw.nodes.positions.iter().zip(&raw.nodes.ids);
+        let nodes = nodes.filter(|(position, _)| (position[0] - x).abs() < 1e-9).map(|(_, &id)| id).collect();
+        raw.interfaces.push(NodeSet { coupling: Some(coupling), ..NodeSet::new(name, nodes) });
+    }
+    raw
+}
+
+/// G (N x m) of u = G y with the displacements of all nodes that no interface has and of the six motions of each rigid
+/// interface about its mean, written down from the positions alone.
+fn motions_under_coupling(raw: &RawModel) -> DMatrix<f64> {
+    let n = 3 * raw.nodes.ids.len();
+    let mut columns: Vec<DVector<f64>> = Vec::new();
+    let index = |id: &i64| raw.nodes.ids.iter().position(|own| own == id).expect("a node");
+    let held: Vec<usize> = raw.interfaces.iter().flat_map(|set| set.nodes.iter().map(index)).collect();
+    for node in (0..raw.nodes.ids.len()).filter(|node| !held.contains(node)) {
+        columns
+            .extend((0..3).map(|k| DVector::from_fn(n, |row, _| f64::from(u8::from(row == 3 * node + k)))));
+    }
+    for set in &raw.interfaces {
+        let places: Vec<usize> = set.nodes.iter().map(index).collect();
+        let position = |node: usize| Vector3::from(raw.nodes.positions[node]);
+        let mean = places.iter().map(|&node| position(node)).sum::<Vector3<f64>>() / places.len() as f64;
+        for motion in 0..6 {
+            let mut column = DVector::zeros(n);
+            for &node in &places {
+                let axis = Vector3::ith(motion % 3, 1.0);
+                let u = if motion < 3 { axis } else { axis.cross(&(position(node) - mean)) };
+                column.fixed_rows_mut::<3>(3 * node).copy_from(&u);
+            }
+            columns.push(column);
+        }
+    }
+    DMatrix::from_columns(&columns)
+}
+
+#[test]
+fn a_body_with_rigid_interfaces_is_compared_with_the_model_under_the_same_coupling() {
+    let raw = coupled_block(Coupling::Rigid);
+    let g = motions_under_coupling(&raw);
+    let [k, m] = [&raw.stiffness, &raw.mass].map(|raw| g.transpose() * dense(&raw.matrix) * &g);
+    let model = FeModel::from_raw(raw).expect("a model").model;
+    let body = body_of(&model, 6, BasisChoice::CraigBampton(CraigBampton));
+    let response = study(&model, &body, "left", "right", &over(100.0, 9000.0, 30));
+    // Translations of the mean of `left` are its columns, and those of `right`.
+    let [from, to] = [g.ncols() - 12, g.ncols() - 6];
+    let mut compared = 0;
+    for (i, hertz) in response.frequencies.iter().enumerate() {
+        let square = (std::f64::consts::TAU * hertz).powi(2);
+        let inverse = (&k - &m * square).try_inverse().expect("no natural frequency");
+        for function in &response.pairs[0].functions {
+            let axis = |direction: Direction| {
+                Direction::ALL.iter().position(|own| *own == direction).expect("one of six")
+            };
+            let Some(full) = function.full[i] else { continue };
+            let exact = inverse[(to + axis(function.to), from + axis(function.from))];
+            let scale = inverse.column(from + axis(function.from)).rows(to, 6).amax();
+            assert!((full.re - exact).abs() < 1e-7 * scale, "{hertz} Hz: {} {exact}", full.re);
+            compared += 1;
+        }
+    }
+    assert!(compared > 200, "{compared}");
+    // The modes of the body are right for the coupled model where they are enough, and nowhere for one whose ends deform.
+    let errors = measured(&response);
+    assert!(errors[0] < 1e-3, "{errors:?}");
+    let coupling = response.coupling.expect("rigid ends");
+    assert_eq!(coupling.interfaces, ["left", "right"]);
+    assert!(coupling.largest.is_some_and(|at| at.value > 0.1), "{:?}", coupling.largest);
+    let averaging = FeModel::from_raw(coupled_block(Coupling::Averaging)).expect("a model").model;
+    let body = body_of(&averaging, 6, BasisChoice::CraigBampton(CraigBampton));
+    let plain = study(&averaging, &body, "left", "right", &over(100.0, 9000.0, 4));
+    assert!(plain.coupling.is_none());
 }

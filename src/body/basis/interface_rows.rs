@@ -3,7 +3,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference, rigid_count};
+use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference, centre_and_length, rigid_count};
 use crate::numerics::eigen::EigenFailure;
 use crate::numerics::linalg::{Dependents, Elimination};
 use faer::{Mat, MatRef};
@@ -33,6 +33,13 @@ pub(super) struct CoupledInterface {
     /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference
     /// point costs no digits.
     centred: Mat<f64>,
+    /// R about the mean of the nodes, rotations by one over their extent, rows of rotations times it: all of the size of
+    /// one.
+    balanced: Mat<f64>,
+    /// Extent of the nodes about their mean.
+    length: f64,
+    /// Number of rows that are displacements; rotations follow.
+    displaced: usize,
     /// Number of coordinates that are displacements; rotations follow.
     pub displacements: usize,
     /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its
@@ -67,6 +74,9 @@ impl CoupledInterface {
             coordinates: rows.iter().map(|&row| model.label(row).to_string()).collect(),
             loads: rows.iter().map(load).collect(),
             displacements: displaced.len(),
+            displaced: displaced.len(),
+            balanced: unit.clone(),
+            length: 1.0,
             motion: unit.clone(),
             measure: unit.clone(),
             centred: unit,
@@ -101,7 +111,15 @@ impl CoupledInterface {
         };
         // Of all rows, also where some nodes have a part of the rotations only.
         let fields = model.rigid_fields(motion.reference(), 1.0);
+        let (centre, length) = centre_and_length(&positions);
+        let length = if length > 0.0 { length } else { 1.0 };
+        let about_mean = model.rigid_fields(centre, length);
+        let count = d * nodes.len();
+        let size = |row: usize| if row < count { 1.0 } else { length };
         Self {
+            balanced: Mat::from_fn(rows.len(), about_mean.ncols(), |i, j| size(i) * about_mean[(rows[i], j)]),
+            length,
+            displaced: count,
             name: set.name.clone(),
             coupling,
             coordinates: along_axes(d, "u", "r"),
@@ -120,6 +138,11 @@ impl CoupledInterface {
     /// R (rows x r): displacements of the nodes for unit coordinates, nothing deformed at the interface.
     pub fn motion(&self) -> MatRef<'_, f64> {
         self.motion.as_ref()
+    }
+
+    /// Number of rows that are displacements, the first ones.
+    pub fn displaced_rows(&self) -> usize {
+        self.displaced
     }
 
     /// A (rows x r), A'R = I: weights that take the coordinates from the displacements, and nodal forces of
@@ -190,8 +213,13 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
             .with_help("name node sets as [[interface]] in the manifest")
             .into());
     }
+    Ok(coupled_sets(model, model.interfaces()))
+}
+
+/// Node sets of a model as interfaces.
+pub(super) fn coupled_sets(model: &FeModel, sets: &[NodeSet]) -> Vec<CoupledInterface> {
     let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
-    Ok(model.interfaces().iter().map(|set| CoupledInterface::new(model, set, &places)).collect())
+    sets.iter().map(|set| CoupledInterface::new(model, set, &places)).collect()
 }
 
 /// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are
@@ -300,32 +328,73 @@ pub(super) fn hold(
 /// the size of one.
 fn without_mean(joint: &CoupledInterface) -> Dependents {
     let measure = joint.centred.as_ref();
-    let (rows, r) = (measure.nrows(), measure.ncols());
     // Rows of one size: rotations are in other units than displacements.
-    let mut a = Mat::from_fn(r, rows, |i, j| measure[(j, i)] / measure.col(i).norm_l2());
-    let mut pivots: Vec<usize> = Vec::new();
-    for step in 0..r {
-        let places = (step..r).flat_map(|i| (0..rows).map(move |j| (i, j)));
-        let (i, j) = places
-            .filter(|(_, j)| !pivots.contains(j))
-            .max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs()))
-            .expect("an averaging interface has more rows than coordinates");
-        for column in 0..rows {
-            let (upper, lower) = (a[(step, column)], a[(i, column)]);
-            (a[(step, column)], a[(i, column)]) = (lower, upper);
-        }
-        let pivot = a[(step, j)];
-        (0..rows).for_each(|column| a[(step, column)] /= pivot);
-        for other in (0..r).filter(|&other| other != step) {
-            let factor = a[(other, j)];
-            (0..rows).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
-        }
-        pivots.push(j);
-    }
-    let others: Vec<usize> = (0..rows).filter(|j| !pivots.contains(j)).collect();
+    let rows =
+        Mat::from_fn(measure.ncols(), measure.nrows(), |i, j| measure[(j, i)] / measure.col(i).norm_l2());
+    let Echelon { pivots, others, weights } = Echelon::new(rows);
     Dependents {
         rows: pivots.iter().map(|&j| joint.rows[j]).collect(),
         on: others.iter().map(|&j| joint.rows[j]).collect(),
-        weights: Mat::from_fn(r, others.len(), |i, j| -a[(i, others[j])]),
+        weights: weights * faer::Scale(-1.0),
+    }
+}
+
+/// u = R q of a rigid interface solved for its other rows: as many rows as it has rigid motions determine them, chosen
+/// by complete pivoting (three nodes that lie far apart, one of them held in all directions).
+pub(super) fn rigid_rows(joint: &CoupledInterface) -> Dependents {
+    let Echelon { pivots, others, weights } = Echelon::new(joint.balanced.transpose().to_owned());
+    // From displacements and turns of one size to those in the units of the model.
+    let size = |row: usize| if row < joint.displaced { 1.0 } else { joint.length };
+    let weight = |i: usize, j: usize| weights[(j, i)] * size(pivots[j]) / size(others[i]);
+    Dependents {
+        rows: others.iter().map(|&j| joint.rows[j]).collect(),
+        on: pivots.iter().map(|&j| joint.rows[j]).collect(),
+        weights: Mat::from_fn(others.len(), pivots.len(), weight),
+    }
+}
+
+/// The reduced echelon form \[1, W\] of a matrix A (r x n) with its columns in another order: of the rank of A, with
+/// pivots that are the largest entries left.
+struct Echelon {
+    /// Columns of A of the unit matrix, and all others.
+    pivots: Vec<usize>,
+    others: Vec<usize>,
+    /// W (rank x others).
+    weights: Mat<f64>,
+}
+
+impl Echelon {
+    /// Pivots below this part of the first one are rounding.
+    const ROUNDING: f64 = 1e-9;
+
+    fn new(mut a: Mat<f64>) -> Self {
+        let (r, columns) = (a.nrows(), a.ncols());
+        let mut pivots: Vec<usize> = Vec::new();
+        let mut first = 0.0;
+        for step in 0..r.min(columns) {
+            let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
+            let open = places.filter(|(_, j)| !pivots.contains(j));
+            let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
+            if step == 0 {
+                first = a[(i, j)].abs();
+            }
+            if a[(i, j)].abs() <= Self::ROUNDING * first {
+                break;
+            }
+            for column in 0..columns {
+                let (upper, lower) = (a[(step, column)], a[(i, column)]);
+                (a[(step, column)], a[(i, column)]) = (lower, upper);
+            }
+            let pivot = a[(step, j)];
+            (0..columns).for_each(|column| a[(step, column)] /= pivot);
+            for other in (0..r).filter(|&other| other != step) {
+                let factor = a[(other, j)];
+                (0..columns).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
+            }
+            pivots.push(j);
+        }
+        let others: Vec<usize> = (0..columns).filter(|j| !pivots.contains(j)).collect();
+        let weights = Mat::from_fn(pivots.len(), others.len(), |i, j| a[(i, others[j])]);
+        Self { pivots, others, weights }
     }
 }

@@ -2,6 +2,7 @@
 
 mod choice;
 mod columns;
+mod coupled_model;
 mod craig_bampton;
 mod craig_chang;
 mod failure;
@@ -23,6 +24,7 @@ mod solved;
 /// What is asked for.
 pub use crate::numerics::eigen::EigenSettings as ModeSettings;
 pub use choice::BasisChoice;
+pub use coupled_model::CoupledModel;
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;

@@ -1,11 +1,9 @@
 //! Responses of a model to forces that oscillate, for estimates.
 
+use super::coupled_model::CoupledModel;
 use super::failure::explain;
-use super::modal_basis::problem_of_span;
-use super::rigid_modes::rigid_modes;
 use crate::base::error::Result;
-use crate::model::FeModel;
-use crate::numerics::eigen::{Counters, EigenFailure, Resume, dynamic_responses_twice};
+use crate::numerics::eigen::{Counters, EigenFailure, dynamic_responses_twice};
 use crate::numerics::linalg::{combine, gram, side_by_side, subtract_combination};
 use faer::Mat;
 use nalgebra::DMatrix;
@@ -21,36 +19,36 @@ use nalgebra::DMatrix;
 /// # Errors
 /// Failures of the factorisation: exit code 3.
 pub fn oscillating_responses(
-    model: &FeModel,
+    model: &CoupledModel<'_>,
     loads: Mat<f64>,
     conditions: Option<&Mat<f64>>,
     square: f64,
 ) -> Result<Option<Mat<f64>>> {
     let rigid = match conditions {
-        Some(_) => Mat::zeros(loads.nrows(), 0),
-        None => rigid_modes(model, &model.pencil())?,
+        Some(_) => Mat::zeros(model.pencil().n(), 0),
+        None => model.rigid_modes()?,
     };
-    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+    let problem = model.problem(rigid.as_ref());
     let count = loads.ncols();
     let no_conditions = Mat::zeros(loads.nrows(), 0);
-    let conditions = conditions.unwrap_or(&no_conditions);
+    let conditions = model.restrict(conditions.unwrap_or(&no_conditions).clone());
     // What holds the model takes C'm such that C x = 0: the response to C' is found beside the others.
     let (mut x, mut to_conditions) = (Mat::new(), Mat::new());
     let further = |all: &Mat<f64>| {
         to_conditions = all.as_ref().subcols(count, conditions.ncols()).to_owned();
         x = all.as_ref().subcols(0, count).to_owned();
-        hold(&mut x, conditions, &to_conditions);
+        hold(&mut x, &conditions, &to_conditions);
         model.pencil().apply_mass(x.as_ref())
     };
-    let all = side_by_side(&[loads.as_ref(), conditions.as_ref()]);
+    let all = side_by_side(&[model.restrict(loads).as_ref(), conditions.as_ref()]);
     let [_, mut y] = match dynamic_responses_twice(&problem, all, further, square, &mut Counters::default()) {
         Ok(responses) => responses,
         Err(EigenFailure::Inaccurate { .. }) => return Ok(None),
-        Err(failure) => return Err(explain(model, failure)),
+        Err(failure) => return Err(explain(model.model(), failure)),
     };
-    hold(&mut y, conditions, &to_conditions);
+    hold(&mut y, &conditions, &to_conditions);
     let both = side_by_side(&[x.as_ref(), y.as_ref()]);
-    Ok(both.is_all_finite().then_some(both))
+    Ok(both.is_all_finite().then(|| model.expand(&both).into_owned()))
 }
 
 /// x <- x - X_C (C X_C)^-1 C x, with the responses X_C to the `conditions` C'. Not a number where these depend on each

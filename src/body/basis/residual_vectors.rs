@@ -2,12 +2,12 @@
 //! chosen frequencies (theory section 8).
 
 use super::columns::columns;
+use super::coupled_model::CoupledModel;
 use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::massless::on_mass;
-use super::modal_basis::{ModalBasis, problem_of_span};
+use super::modal_basis::ModalBasis;
 use super::pseudo_free_surface::{independent, part_in_words};
-use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -15,8 +15,8 @@ use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
 use crate::model::{Coupling, FeModel, InertialRows, RawShapes};
 use crate::numerics::eigen::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Resume,
-    Wanted, dynamic_responses, modes_of_span, static_responses, static_responses_twice,
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Wanted,
+    dynamic_responses, modes_of_span, static_responses, static_responses_twice,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
 use faer::{Mat, MatRef};
@@ -36,27 +36,31 @@ const SELF_EQUILIBRATED: f64 = 1e-10;
 ///
 /// # Errors
 /// Failures of the factorisation, and responses that are not accurate: exit code 3.
-pub fn free_static_responses(model: &FeModel, loads: Mat<f64>, first: f64) -> Result<Mat<f64>> {
+pub fn free_static_responses(model: &CoupledModel<'_>, loads: Mat<f64>, first: f64) -> Result<Mat<f64>> {
     let nothing = Mat::zeros(loads.nrows(), 0);
     let [responses, _] = free_static_responses_twice(model, loads, |_| nothing, first)?;
     Ok(responses)
 }
 
-/// The responses of [`free_static_responses`], and those to `further` loads that these tell.
+/// The responses of [`free_static_responses`], and those to the loads that `further` returns for these.
 ///
 /// # Errors
 /// As [`free_static_responses`].
 pub fn free_static_responses_twice(
-    model: &FeModel,
+    model: &CoupledModel<'_>,
     loads: Mat<f64>,
     further: impl FnOnce(&Mat<f64>) -> Mat<f64>,
     first: f64,
 ) -> Result<[Mat<f64>; 2]> {
-    let rigid = rigid_modes(model, &model.pencil())?;
-    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+    let rigid = model.rigid_modes()?;
+    let problem = model.problem(rigid.as_ref());
     let (precision, accuracy) = (Precision::Double, ResponseAccuracy::ROUGH);
-    static_responses_twice(&problem, loads, further, first, precision, accuracy, &mut Counters::default())
-        .map_err(|failure| explain(model, failure))
+    let further = |x: &Mat<f64>| model.restrict(further(&model.expand(x)));
+    let loads = model.restrict(loads);
+    let counters = &mut Counters::default();
+    let found = static_responses_twice(&problem, loads, further, first, precision, accuracy, counters);
+    let both = found.map_err(|failure| explain(model.model(), failure))?;
+    Ok(both.map(|x| model.expand(&x).into_owned()))
 }
 
 /// Nodal forces (N x 6, in the plane N x 3) of unit forces and unit torques along the model axes at the

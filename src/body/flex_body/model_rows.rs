@@ -1,9 +1,10 @@
 //! The modes of a body in the rows and axes of the model that it was made of.
 
-use super::FlexBody;
-use crate::model::FeModel;
+use super::{FlexBody, Interface};
+use crate::body::basis::CoupledModel;
+use crate::model::{FeModel, NodeSet};
 use crate::numerics::linalg::gram;
-use faer::Mat;
+use faer::{Mat, MatRef};
 
 impl FlexBody {
     /// The modes Psi (N x nf) in the rows and axes of the model that the body was made of; `None` when it
@@ -30,6 +31,19 @@ impl FlexBody {
                     .map_or(0.0, |internal| internal.shape[(split + row - massless, j)]),
             }
         }))
+    }
+
+    /// The model under the couplings that every mode keeps: rigid interfaces of a Craig-Bampton body move as rigid bodies
+    /// there too.
+    ///
+    /// * `vectors`: the modes in the rows of the model, as [`FlexBody::vectors_of`] returns them.
+    pub fn coupled_model<'m>(&self, model: &'m FeModel, vectors: MatRef<'_, f64>) -> CoupledModel<'m> {
+        let set = |interface: &Interface| NodeSet {
+            coupling: interface.coupling,
+            ..NodeSet::new(&interface.name, interface.nodes.iter().map(|&at| self.nodes().ids[at]).collect())
+        };
+        let sets: Vec<NodeSet> = self.interfaces().iter().map(set).collect();
+        CoupledModel::of_modes(model, &sets, vectors)
     }
 
     /// Psi'K Psi_r (nf x nr) with the modes Psi_r of another body of the same model: how each sees the

@@ -74,6 +74,17 @@ impl OutputErrors {
         there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
     }
 
+    /// The larger of each error of two motions.
+    pub fn larger_of(self, other: Self) -> Self {
+        let larger_of = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(larger);
+        Self {
+            attitude: larger(self.attitude, other.attitude),
+            deflection: larger_of(self.deflection, other.deflection),
+            stress: larger_of(self.stress, other.stress),
+            reaction: larger_of(self.reaction, other.reaction),
+        }
+    }
+
     /// Whether every error is within its tolerance.
     pub fn within(&self, tolerance: &Tolerance) -> bool {
         self.worst(tolerance) <= 1.0

@@ -7,9 +7,12 @@ use super::residual::NodalView;
 use super::resonance::Question;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
+use crate::body::basis::CoupledModel;
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
-use crate::motion::scene::{OutputErrors, Point, Scene, Stage, damped_once, instants, nodal_point, trace};
+use crate::motion::scene::{
+    Instant, OutputErrors, Point, Scene, Stage, Trace, damped_once, instants, nodal_point, trace,
+};
 use crate::numerics::linalg::not_negative;
 use faer::Mat;
 
@@ -48,6 +51,47 @@ pub struct ReferenceError {
     pub time: f64,
     /// The reason why nothing is known of the errors; `None` where they are known.
     pub unknown: Option<&'static str>,
+    /// Effect of the rigid interfaces of the body, which the model has as well where the errors are estimated; `None`
+    /// for a body without.
+    pub coupling: Option<CouplingEffect>,
+}
+
+/// The difference that rigid interfaces make in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CouplingEffect {
+    /// Names of the interfaces that no mode of the body deforms.
+    pub interfaces: Vec<String>,
+    /// Estimated errors of the body against the model whose interfaces deform: of its coupling and of the modes that it
+    /// lacks together.
+    pub errors: OutputErrors,
+    /// The largest of them over its tolerance.
+    pub worst: f64,
+}
+
+impl CouplingEffect {
+    /// The remark about the effect of the coupling in `scene`.
+    fn remark(&self) -> Diagnostic {
+        let names: Vec<String> = self.interfaces.iter().map(|name| format!("`{name}`")).collect();
+        let percent = |error: f64| format!("{:.2} %", 100.0 * error);
+        let parts = [
+            ("deflection", self.errors.deflection),
+            ("stress", self.errors.stress),
+            ("reaction", self.errors.reaction),
+        ];
+        let parts: Vec<String> = parts
+            .into_iter()
+            .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))))
+            .collect();
+        let message = format!(
+            "the body is compared with the model under the same coupling: {} rigid. Against the model whose interfaces deform its errors are {}",
+            match names.as_slice() {
+                [one] => format!("interface {one} is"),
+                all => format!("interfaces {} are", all.join(", ")),
+            },
+            parts.join(", ")
+        );
+        Diagnostic::new(Code::CouplingEffect, message)
+    }
 }
 
 impl ReferenceError {
@@ -55,12 +99,17 @@ impl ReferenceError {
     fn unknown(modes: usize, reason: &'static str) -> Self {
         let all = f64::INFINITY;
         let errors = OutputErrors { attitude: all, deflection: Some(all), stress: Some(all), reaction: None };
-        Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason) }
+        Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason), coupling: None }
     }
 
     /// Whether others may be measured against the body: against what is left of the tolerances.
     pub fn is_reference(&self) -> bool {
         self.worst <= MOST_LACKING
+    }
+
+    /// The remark about rigid interfaces that the body and the model it is compared with have in common.
+    pub fn coupling_remark(&self) -> Option<Diagnostic> {
+        self.coupling.as_ref().map(CouplingEffect::remark)
     }
 
     /// The warning about a body that lacks more than `enough` of the tolerances.
@@ -121,14 +170,16 @@ impl Estimate {
         let given = scene.requirements.damping.is_some();
         let (body, scene) = damped_once(stage.body, stage.scene)?;
         let (body, scene) = (&*body, &*scene);
+        let Some(vectors) = body.vectors_of(model) else { return Ok(None) };
+        let coupled = body.coupled_model(model, vectors.as_ref());
+        let interfaces = coupled.rigid_interfaces();
         let at = |point: &Point| Ok(nodal_point(model, point)?.unit_loads(model));
         let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
         let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
         let carrier = scene.carried.as_ref().map(|carried| nodal_point(model, &carried.by)).transpose()?;
         let of_model = model.damping().filter(|_| !given);
-        let Some(view) = NodalView::new(model, body, loads, carrier.as_ref(), of_model) else {
-            return Ok(None);
-        };
+        let view = |coupled| NodalView::new(coupled, body, loads.clone(), carrier.as_ref(), of_model);
+        let Some(own) = view(coupled) else { return Ok(None) };
         let (motion, _) = trace(body, scene, memory, |_| ())?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
             let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);
@@ -137,21 +188,50 @@ impl Estimate {
         let mut same_steps = scene.clone();
         same_steps.run.scheme = motion.scheme;
         let looked_at = instants(body, &same_steps, &grid.times)?;
+        let beside =
+            Beside { body, scene, motion: &motion, grid: &grid, looked_at: &looked_at, watched: &watched };
+        let mut estimate = beside.estimate(&own, allowed)?;
+        let deforms = || view(CoupledModel::uncoupled(model));
+        if let Some(view) = (!interfaces.is_empty()).then(deforms).flatten() {
+            let ReferenceError { errors, worst, .. } = beside.estimate(&view, allowed)?.error;
+            estimate.error.coupling = Some(CouplingEffect { interfaces, errors, worst });
+        }
+        Ok(Some(estimate))
+    }
+}
+
+/// A motion of a body that is compared with that of a model.
+struct Beside<'a> {
+    body: &'a FlexBody,
+    scene: &'a Scene,
+    motion: &'a Trace,
+    grid: &'a Grid,
+    /// The motion at the instants of the grid.
+    looked_at: &'a [Instant],
+    /// Weights of the points whose deflections count.
+    watched: &'a [Mat<f64>],
+}
+
+impl Beside<'_> {
+    /// Estimates what the body lacks of the model of `view`.
+    fn estimate(&self, view: &NodalView<'_>, allowed: f64) -> Result<Estimate> {
+        let &Self { body, scene, motion, grid, looked_at, watched } = self;
         let tolerance = &scene.requirements.tolerance;
         let least = tolerance.stress.min(tolerance.deflection);
         let question = Question {
             settled: scene.initial.settled,
-            negligible: PART_OF_RESONANCE * least * energy_scale(&motion),
-            complete_below: if carrier.is_some() { 0.0 } else { complete_below(body) },
+            negligible: PART_OF_RESONANCE * least * energy_scale(motion),
+            complete_below: if view.held.is_some() { 0.0 } else { complete_below(body) },
         };
-        let missed = Missed::new(&view, body, &looked_at, &grid, &question)?;
-        let lack = Lack::new(&view, body, &missed, &looked_at, &grid, scene.initial.settled);
-        let Found { errors, time } = lack.errors(scene, &motion, &watched);
+        let missed = Missed::new(view, body, looked_at, grid, &question)?;
+        let lack = Lack::new(view, body, &missed, looked_at, grid, scene.initial.settled);
+        let Found { errors, time } = lack.errors(scene, motion, watched);
         let worst = errors.worst(tolerance);
-        let error = ReferenceError { modes: body.n_modes(), worst, time, errors, unknown: None };
+        let modes = body.n_modes();
+        let error = ReferenceError { modes, worst, time, errors, unknown: None, coupling: None };
         let enough = PART_OF_RESPONSES * allowed * least;
-        let missing = missed.dominant(&lack.of_responses(), enough * energy_scale(&motion));
-        Ok(Some(Self { error, missing }))
+        let missing = missed.dominant(&lack.of_responses(), enough * energy_scale(motion));
+        Ok(Estimate { error, missing })
     }
 }
 

@@ -78,7 +78,7 @@ impl Missed {
             beside.inertia(&responses, &energy, &amplitudes)
         };
         let first = body.modes().eigenvalue[0];
-        let [_, of_inertia] = free_static_responses_twice(model, forces.clone(), inertia, first)?;
+        let [_, of_inertia] = free_static_responses_twice(&view.coupled, forces.clone(), inertia, first)?;
         let resonances = resonances(grid, &amplitudes, &energy, question);
         let mut missed = Self { forces, amplitudes, in_modes, responses, energy };
         missed.add(&beside, of_inertia);
@@ -97,8 +97,8 @@ impl Missed {
         let conditions = beside.view.held.as_ref().map(Held::conditions);
         for nudge in NUDGES {
             let square = (rate * nudge).powi(2);
-            if let Some(more) = oscillating_responses(beside.view.model, forces.clone(), conditions, square)?
-            {
+            let coupled = &beside.view.coupled;
+            if let Some(more) = oscillating_responses(coupled, forces.clone(), conditions, square)? {
                 self.add(beside, more);
                 return Ok(());
             }

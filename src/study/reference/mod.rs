@@ -18,5 +18,5 @@ mod resonance;
 mod turning;
 
 pub use enrich::{Enriched, EnrichedForCases, Enrichment, enrich, enrich_for_cases};
-pub use estimate::{MOST_LACKING, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};
+pub use estimate::{CouplingEffect, MOST_LACKING, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};
 pub use motion_bodies::{Fewest, MotionBodies};

@@ -162,7 +162,7 @@ fn above(upper: &Mat<f64>, lower: &Mat<f64>) -> Mat<f64> {
 mod tests {
     use super::*;
     use crate::base::progress::SILENT;
-    use crate::body::basis::ModeSettings;
+    use crate::body::basis::{CoupledModel, ModeSettings};
     use crate::body::convert::{ConvertSettings, convert};
     use crate::input::{read_manifest, read_model};
     use crate::model::FeModel;
@@ -225,7 +225,13 @@ mod tests {
                 |node: usize| nodal_point(&model, &Point::Node(model.nodes().ids[node])).expect("a node");
             let load = at(3).unit_loads(&model);
             let carrier = carried.then(|| at(0));
-            let view = NodalView::new(&model, &body, vec![load], carrier.as_ref(), model.damping());
+            let view = NodalView::new(
+                CoupledModel::uncoupled(&model),
+                &body,
+                vec![load],
+                carrier.as_ref(),
+                model.damping(),
+            );
             let view = view.unwrap_or_else(|| panic!("{name}: a view"));
             let motion = instants(&body.modes().eigenvalue);
             let motion = if model.dimension() == 2 { in_plane(motion) } else { motion };

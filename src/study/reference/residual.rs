@@ -1,6 +1,7 @@
 //! The forces that the equations of all nodes leave unbalanced in the motion of a body.
 
 use super::held::Held;
+use crate::body::basis::CoupledModel;
 use crate::body::flex_body::FlexBody;
 use crate::model::{Damping, FeModel, InertialRows, RigidAcceleration};
 use crate::motion::dynamics::NodalPoint;
@@ -17,6 +18,8 @@ pub(super) const BLOCK: usize = 32;
 /// A body in its frame, seen from the rows of its model.
 pub(super) struct NodalView<'m> {
     pub model: &'m FeModel,
+    /// The model that answers forces: under the couplings of the body, or without.
+    pub coupled: CoupledModel<'m>,
     /// Psi (N x nf), M Psi and D Psi, rows and axes of the model.
     pub vectors: Mat<f64>,
     pub weighted: Mat<f64>,
@@ -80,14 +83,16 @@ impl<'m> NodalView<'m> {
     /// `carrier`; `None` when it has other rows, modes that depend on each other, or is carried by a point
     /// without an orientation.
     ///
+    /// * `coupled`: the model under the couplings of `body`.
     /// * `damping`: that of the model, unless the scene replaces it by that of `body`.
     pub fn new(
-        model: &'m FeModel,
+        coupled: CoupledModel<'m>,
         body: &FlexBody,
         loads: Vec<Mat<f64>>,
         carrier: Option<&NodalPoint>,
         damping: Option<&'m Damping<SymmetricMatrix>>,
     ) -> Option<Self> {
+        let model = coupled.model();
         let vectors = body.vectors_of(model)?;
         let weighted = model.pencil().apply_mass(vectors.as_ref());
         let modal_mass = gram(vectors.as_ref(), weighted.as_ref());
@@ -106,6 +111,7 @@ impl<'m> NodalView<'m> {
         });
         let mut view = Self {
             model,
+            coupled,
             centre: rows.centre() - origin,
             extended_rigid: rows.rigid(),
             extended,
@@ -157,6 +163,7 @@ impl<'m> NodalView<'m> {
         if let Some(held) = &self.held {
             held.balance(&mut forces);
         }
+        self.coupled.without_inner_forces(&mut forces);
         if self.stiffens {
             in_modes.fill(0.0);
         }

@@ -2,7 +2,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::model::FeModel;
+use crate::body::basis::CoupledModel;
 use crate::numerics::linalg::{
     Analysis, Indefinite, Pencil, add_combination, gram, largest_entry, side_by_side, subtract_combination,
 };
@@ -21,16 +21,17 @@ const ACCEPTED: f64 = 1e-6;
 /// Operations per second that estimates of time assume.
 const PACE: f64 = 4e9;
 
-/// A free body that is loaded at places and watched at others: H(w) = L'(K + i w D - w^2 M)^-1 B.
+/// A free body that is loaded at places and watched at others: H(w) = L'(K + i w D - w^2 M)^-1 B; matrices, loads and
+/// N rows are those of the model under the couplings of the body.
 pub(super) struct DirectSolver<'m> {
     pencil: Pencil<'m>,
     analysis: Analysis,
     /// Phi (N x 6), orthonormal in M, and M Phi.
-    rigid: &'m Mat<f64>,
+    rigid: Mat<f64>,
     rigid_products: Mat<f64>,
     /// B without what accelerates the body as a whole (N x inputs), and L (N x outputs).
     loads: Mat<f64>,
-    measured: &'m Mat<f64>,
+    measured: Mat<f64>,
     /// L'Phi Phi'B: rigid accelerations.
     rigid_gain: Mat<f64>,
     /// U (N x m) and C (m x m) of D = U C U', in columns that have damping; `None` without.
@@ -49,15 +50,16 @@ pub(super) struct DirectSolution {
 type Parts = Mat<f64>;
 
 impl<'m> DirectSolver<'m> {
-    /// Prepares `solves` solutions. `damping` are the products M Psi and the matrix of the modes, D = M Psi C
-    /// (M Psi)'.
+    /// Prepares `solves` solutions.
+    ///
+    /// * `loads`, `measured`: B and L in all rows of the model.
+    /// * `damping`: the products M Psi and the matrix of the modes, D = M Psi C (M Psi)'.
     ///
     /// # Errors
     /// [`MemoryShort`](Code::MemoryShort) and [`WorkLong`](Code::WorkLong), before the work.
     pub fn new(
-        model: &'m FeModel,
-        rigid: &'m Mat<f64>,
-        [loads, measured]: [&'m Mat<f64>; 2],
+        model: &'m CoupledModel<'_>,
+        [loads, measured]: [&Mat<f64>; 2],
         damping: Option<(&Mat<f64>, &Mat<f64>)>,
         solves: usize,
         (memory, longest): (Option<u64>, Option<f64>),
@@ -66,12 +68,13 @@ impl<'m> DirectSolver<'m> {
         let ordering =
             || Diagnostic::new(Code::MemoryShort, "the ordering of the equations runs out of memory");
         let analysis = Analysis::new(&pencil).ok_or_else(ordering)?;
+        let rigid = model.rigid_modes()?;
+        let [mut loads, measured] = [loads, measured].map(|columns| model.restrict(columns.clone()));
         let rigid_products = pencil.apply_mass(rigid.as_ref());
         let rigid_loads = gram(rigid.as_ref(), loads.as_ref());
         let rigid_gain = gram(gram(rigid.as_ref(), measured.as_ref()).as_ref(), rigid_loads.as_ref());
-        let mut loads = loads.clone();
         subtract_combination(loads.as_mut(), rigid_products.as_ref(), rigid_loads.as_ref());
-        let damping = damping.and_then(|(u, c)| damped_columns(u, c));
+        let damping = damping.and_then(|(u, c)| damped_columns(&model.restrict(u.clone()), c));
         let solver = Self { pencil, analysis, rigid, rigid_products, loads, measured, rigid_gain, damping };
         solver.refuse_too_much(solves, memory, longest)?;
         Ok(solver)

@@ -4,9 +4,8 @@
 use super::modal_sum::ModalSum;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::body::basis::free_static_responses;
+use crate::body::basis::{CoupledModel, free_static_responses};
 use crate::body::flex_body::FlexBody;
-use crate::model::FeModel;
 use crate::numerics::linalg::{
     combine, dense_cholesky, gram, side_by_side, solve_lower, solve_upper, subtract_combination,
     symmetric_eigen,
@@ -25,7 +24,7 @@ const INDEPENDENT: f64 = 1e-9;
 
 /// A body seen from the rows of its model.
 pub(super) struct NodalModes<'m> {
-    pub model: &'m FeModel,
+    pub model: CoupledModel<'m>,
     /// Phi (N x 6), orthonormal in M.
     pub rigid: Mat<f64>,
     /// Psi (N x nf), M Psi and K Psi.
@@ -60,27 +59,29 @@ impl NodalModes<'_> {
 
     /// E (N x k): orthonormal in K.
     fn static_responses(&self, body: &FlexBody) -> Result<Option<Mat<f64>>> {
-        let unbalanced =
-            side_by_side(&[self.unbalanced_loads().as_ref(), self.unbalanced_modes(body).as_ref()]);
+        let [loads, modes] = [self.unbalanced_loads(), self.unbalanced_modes(body)];
+        let unbalanced = side_by_side(&[loads.as_ref(), modes.as_ref()]);
         if unbalanced.ncols() == 0 {
             return Ok(None);
         }
-        let mut responses = free_static_responses(self.model, unbalanced, body.modes().eigenvalue[0])?;
+        let mut responses = free_static_responses(&self.model, unbalanced, body.modes().eigenvalue[0])?;
         let along = gram(self.inertial.as_ref(), responses.as_ref());
         subtract_combination(responses.as_mut(), self.vectors.as_ref(), along.as_ref());
-        let responses = normalised(&responses, &self.model.pencil().apply_stiffness(responses.as_ref()));
-        Ok(orthonormal(&responses, &self.model.pencil().apply_stiffness(responses.as_ref())))
+        let responses =
+            normalised(&responses, &self.model.model().pencil().apply_stiffness(responses.as_ref()));
+        Ok(orthonormal(&responses, &self.model.model().pencil().apply_stiffness(responses.as_ref())))
     }
 
     /// What rigid motions and modes leave of the loads B and L.
     fn unbalanced_loads(&self) -> Mat<f64> {
         let loads = side_by_side(&[self.loads.as_ref(), self.measured.as_ref()]);
         let mut left = loads.clone();
-        let rigid = self.model.pencil().apply_mass(self.rigid.as_ref());
+        let rigid = self.model.model().pencil().apply_mass(self.rigid.as_ref());
         for (vectors, products) in [(&self.rigid, &rigid), (&self.vectors, &self.inertial)] {
             let along = gram(vectors.as_ref(), left.as_ref());
             subtract_combination(left.as_mut(), products.as_ref(), along.as_ref());
         }
+        self.model.without_inner_forces(&mut left);
         let kept = (0..loads.ncols()).filter(|&j| left.col(j).norm_l2() > LEFT * loads.col(j).norm_l2());
         columns(&left, &kept.collect::<Vec<_>>())
     }
@@ -92,12 +93,13 @@ impl NodalModes<'_> {
         let mut left = columns(&self.elastic, &kept);
         let along = gram(self.vectors.as_ref(), left.as_ref());
         subtract_combination(left.as_mut(), self.inertial.as_ref(), along.as_ref());
+        self.model.without_inner_forces(&mut left);
         left
     }
 
     /// The transfer function of the motion in the span of rigid motions and the columns of `span`.
     fn in_span(&self, span: &Mat<f64>, damping: Option<&Mat<f64>>) -> Option<ModalSum> {
-        let pencil = self.model.pencil();
+        let pencil = self.model.model().pencil();
         let stiffness = gram(span.as_ref(), pencil.apply_stiffness(span.as_ref()).as_ref());
         let mass = gram(span.as_ref(), pencil.apply_mass(span.as_ref()).as_ref());
         // K = T T' is definite on the span, and M may be singular: T^-1 M T^-T = Y diag(m) Y'.

@@ -4,14 +4,14 @@ use super::Complex;
 use super::band::{Band, Frequency, Resonance};
 use super::direct::{DirectSolution, DirectSolver};
 use super::enriched::NodalModes;
-use super::errors::{Compared, PairErrors};
+use super::errors::{At, Compared, PairErrors};
 use super::modal_sum::ModalSum;
 use super::place::{Direction, Place, PlaceRows};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::base::units::UnitSystem;
-use crate::body::basis::rigid_modes;
+use crate::body::basis::{CoupledModel, rigid_modes};
 use crate::body::flex_body::FlexBody;
 use crate::model::FeModel;
 use crate::motion::scene::Requirements;
@@ -74,6 +74,18 @@ pub struct Response {
     pub body_modes_in_band: usize,
     /// What was solved; `None` without a model, and then no error is known.
     pub solved: Option<Solved>,
+    /// Effect of rigid interfaces of the body, which the model has in the comparison as well; `None` without.
+    pub coupling: Option<CouplingEffect>,
+}
+
+/// The difference that rigid interfaces make in a frequency response.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CouplingEffect {
+    /// Names of the interfaces that no mode of the body deforms.
+    pub interfaces: Vec<String>,
+    /// The largest relative difference of the model under the coupling from the model whose interfaces deform, over all
+    /// pairs; `None` where no frequency could be solved for both.
+    pub largest: Option<At>,
 }
 
 /// The equations of all nodes.
@@ -159,7 +171,7 @@ pub fn respond(
     let damping = Some(body.damping()).filter(|c| c.norm_max() > 0.0);
     let reduced = reduced_sum(&at_centre, &rows(from)?, &rows(to)?, damping.clone());
     let known = match model {
-        Some(model) => Some(Known::new(model, body, from, to, damping.as_ref(), settings, watch)?),
+        Some(model) => Some(Known::new(model, body, [from, to], damping.as_ref(), settings, watch)?),
         None => None,
     };
     let resonances =
@@ -183,6 +195,7 @@ pub fn respond(
         pairs: blocks.iter().map(|block| curves.pair(block, settings.tolerance)).collect(),
         body_modes_in_band: body.frequencies_hz().iter().filter(|f| in_band(f)).count(),
         solved: known.as_ref().map(|known| curves.solved(known, low)),
+        coupling: known.as_ref().and_then(|known| curves.coupling_effect(known, &blocks, settings.tolerance)),
         frequencies: curves.frequencies.iter().map(|f| f.hertz).collect(),
     })
 }
@@ -252,8 +265,7 @@ impl<'m> Known<'m> {
     fn new(
         model: &'m FeModel,
         body: &FlexBody,
-        from: &[Place],
-        to: &[Place],
+        [from, to]: [&[Place]; 2],
         damping: Option<&Mat<f64>>,
         settings: &Settings,
         watch: Watch<'_>,
@@ -264,10 +276,17 @@ impl<'m> Known<'m> {
         Ok(Self { nodal, enriched, damping: damping.cloned(), limits: (settings.memory, settings.longest) })
     }
 
-    fn direct_solver(&self, solves: usize) -> Result<DirectSolver<'_>> {
-        let NodalModes { model, rigid, inertial, loads, measured, .. } = &self.nodal;
+    /// The equations of all nodes of `model`, under the couplings of the body or without, for `solves` frequencies.
+    fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
+        let NodalModes { inertial, loads, measured, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
-        DirectSolver::new(model, rigid, [loads, measured], damping, solves, self.limits)
+        DirectSolver::new(model, [loads, measured], damping, solves, self.limits)
+    }
+
+    /// The model whose interfaces deform; `None` where no interface of the body is rigid.
+    fn deforming(&self) -> Option<CoupledModel<'m>> {
+        let coupled = &self.nodal.model;
+        (!coupled.rigid_interfaces().is_empty()).then(|| CoupledModel::uncoupled(coupled.model()))
     }
 }
 
@@ -301,10 +320,9 @@ fn nodal_modes<'m>(
         let loads = places.iter().map(|place| place.loads(model)).collect::<Result<Vec<_>>>()?;
         Ok(side_by_side(&loads.iter().map(|load| load.as_ref()).collect::<Vec<_>>()))
     };
-    let rigid = rigid_modes(model, &pencil)?;
     Ok(NodalModes {
-        model,
-        rigid,
+        model: body.coupled_model(model, vectors.as_ref()),
+        rigid: rigid_modes(model, &pencil)?,
         vectors,
         inertial,
         elastic,
@@ -320,6 +338,8 @@ struct Curves {
     /// Empty without a model.
     enriched: Vec<DMatrix<Complex<f64>>>,
     full: Vec<Option<DirectSolution>>,
+    /// The same of the model whose interfaces deform, where some of the body are rigid.
+    deforming: Vec<Option<DirectSolution>>,
     flops: f64,
 }
 
@@ -338,8 +358,8 @@ impl Curves {
             Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), responses),
             None => Vec::new(),
         };
-        let full = frequencies.iter().map(|_| None).collect();
-        Self { frequencies, reduced: own, enriched, full, flops: 0.0 }
+        let [full, deforming] = [0; 2].map(|_| frequencies.iter().map(|_| None).collect());
+        Self { frequencies, reduced: own, enriched, full, deforming, flops: 0.0 }
     }
 
     /// Has the equations of all nodes solved also where the estimate of a block is largest and where it first
@@ -362,25 +382,85 @@ impl Curves {
         }
     }
 
-    /// Solves the equations of all nodes. Frequencies where the solution has too few digits, at a natural
-    /// frequency, are left out.
+    /// Solves the equations of all nodes, under the couplings of the body and, where these hold something, without.
     fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, watch: Watch<'_>) -> Result<()> {
         watch(Event::Phase("equations of all nodes"));
-        let solver = known.direct_solver(self.frequencies.iter().filter(|f| f.solved).count())?;
+        let deforming = known.deforming();
+        let studies = if deforming.is_some() { 2 } else { 1 };
+        let count = studies * self.frequencies.iter().filter(|f| f.solved).count();
+        let solver = known.direct_solver(&known.nodal.model, count)?;
         self.flops = solver.flops();
+        let part = |from: f64| move |done: f64| watch(Event::Fraction((from + done) / studies as f64));
+        self.full = self.solutions(&solver, units, &part(0.0))?;
+        if let Some(model) = &deforming {
+            watch(Event::Phase("equations of all nodes, interfaces that deform"));
+            self.deforming = self.solutions(&known.direct_solver(model, count)?, units, &part(1.0))?;
+        }
+        Ok(())
+    }
+
+    /// Solutions at the frequencies that are to be solved. Those with too few digits, at a natural frequency, are left
+    /// out.
+    ///
+    /// * `done`: hears the part that is done.
+    fn solutions(
+        &self,
+        solver: &DirectSolver<'_>,
+        units: &UnitSystem,
+        done: &dyn Fn(f64),
+    ) -> Result<Vec<Option<DirectSolution>>> {
+        let mut solutions: Vec<Option<DirectSolution>> = self.frequencies.iter().map(|_| None).collect();
         let (count, mut failed) = (self.frequencies.len() as f64, None);
         for (i, frequency) in self.frequencies.iter().enumerate().filter(|(_, f)| f.solved) {
             match solver.at(units.eigenvalue_of(frequency.hertz).sqrt()) {
-                Ok(solution) => self.full[i] = Some(solution),
+                Ok(solution) => solutions[i] = Some(solution),
                 Err(error) if error.has(Code::FactorizationFailed) => failed = Some(error),
                 Err(error) => return Err(error),
             }
-            watch(Event::Fraction((i + 1) as f64 / count));
+            done((i + 1) as f64 / count);
         }
         match failed {
-            Some(error) if self.full.iter().all(Option::is_none) => Err(error),
-            _ => Ok(()),
+            Some(error) if solutions.iter().all(Option::is_none) => Err(error),
+            _ => Ok(solutions),
         }
+    }
+
+    /// How far the model under the couplings of the body is from the model whose interfaces deform.
+    fn coupling_effect(
+        &self,
+        known: &Known<'_>,
+        blocks: &[(&Place, &Place, Block)],
+        tolerance: f64,
+    ) -> Option<CouplingEffect> {
+        let interfaces = known.nodal.model.rigid_interfaces();
+        if interfaces.is_empty() {
+            return None;
+        }
+        let of_block = |(_, _, block): &(&Place, &Place, Block)| {
+            let both = self.full.iter().zip(&self.deforming).enumerate();
+            let both: Vec<_> = both
+                .filter_map(|(i, (coupled, deforming))| {
+                    let [coupled, deforming] = [coupled.as_ref()?, deforming.as_ref()?];
+                    Some((
+                        self.frequencies[i].hertz,
+                        block.of(&coupled.response),
+                        block.of(&deforming.response),
+                    ))
+                })
+                .collect();
+            let compared: Vec<Compared<'_>> = both
+                .iter()
+                .map(|(hertz, coupled, deforming)| Compared {
+                    hertz: *hertz,
+                    reduced: coupled,
+                    enriched: coupled,
+                    full: Some(deforming),
+                })
+                .collect();
+            PairErrors::new(&compared, tolerance).largest
+        };
+        let largest = blocks.iter().filter_map(of_block).max_by(|a, b| a.value.total_cmp(&b.value));
+        Some(CouplingEffect { interfaces, largest })
     }
 
     fn solved(&self, known: &Known<'_>, low: f64) -> Solved {
@@ -388,7 +468,7 @@ impl Curves {
         let first = below.next().unwrap_or(0);
         let last = below.next_back().unwrap_or(first);
         Solved {
-            rows: known.nodal.model.rows().len(),
+            rows: known.nodal.model.pencil().n(),
             solves: self.full.iter().flatten().count(),
             flops: self.flops,
             // A band that begins above some modes does not have them.

@@ -7,7 +7,7 @@ use super::variation::Variation;
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Group, Groups};
 use crate::motion::dynamics::BodyPoint;
-use crate::motion::scene::{Range, Scene, points_of};
+use crate::motion::scene::{OutputErrors, Range, Scene, points_of};
 use nalgebra::Vector3;
 
 /// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
@@ -143,9 +143,13 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     Ok(trials)
 }
 
-/// The trial with the largest errors, one at least.
+/// The trial with the largest error over its tolerance, one at least, with the larger of each error of all trials that
+/// have errors.
 pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
-    trials.max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in")
+    let trials: Vec<Trial> = trials.collect();
+    let errors = trials.iter().filter_map(|trial| trial.errors).reduce(OutputErrors::larger_of);
+    let worst = trials.into_iter().max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in");
+    Trial { errors: worst.errors.and(errors), ..worst }
 }
 
 /// The trial of a model in all load cases: that of the case in which its errors take the largest part of what

@@ -11,7 +11,7 @@ use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::flex_body::Groups;
 use crate::motion::scene::{Measure, Trace};
-use crate::study::reference::PART_OF_REFERENCE;
+use crate::study::reference::{PART_OF_REFERENCE, ReferenceError};
 
 /// What was tried and what is chosen so far.
 pub(super) struct Deciding<'s> {
@@ -34,7 +34,8 @@ impl<'s> Deciding<'s> {
         for (at, demand) in demands.iter().enumerate() {
             diagnostics.extend(demand.found.iter().cloned().map(|said| demand.about(said)));
             let warning = demand.lacks.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
-            diagnostics.extend(warning.map(|said| demand.about(said)));
+            let remark = demand.lacks.last().and_then(ReferenceError::coupling_remark);
+            diagnostics.extend(remark.into_iter().chain(warning).map(|said| demand.about(said)));
             let case = (demands.len() > 1).then_some(at);
             trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
         }

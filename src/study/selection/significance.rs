@@ -73,8 +73,8 @@ const TERMS: [Term; 8] = [
     term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "III"),
     term(
         "Coriolis torque 2 w (sqrt(tr J) + |q|) |qd|",
-        "I0 w per unit of time",
-        "2 Omega_1 |q| (sqrt(tr J) + |q|) / I0",
+        "I0 w Omega_1",
+        "2 |q| (sqrt(tr J) + |q|) / I0",
         Group::W1,
         "IV",
     ),
@@ -98,7 +98,7 @@ fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] 
         norms.softening * w * w,
         2.0 * norms.coupling * w / situation.first_rate.value,
         norms.coupling * alpha / (norms.first * norms.first),
-        2.0 * norms.first * q * (trace + q) / about,
+        2.0 * q * (trace + q) / about,
     ]
 }
 
@@ -115,7 +115,7 @@ pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance
 }
 
 /// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation
-/// or the body axis where they are largest.
+/// or the principal axis of inertia where they are largest.
 ///
 /// With eta = |q| / sqrt(e'I0 e), Omega_1 the first circular frequency of the body (of the assembly for
 /// Coriolis forces), w and alpha the largest angular velocity and acceleration.
@@ -125,7 +125,10 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
     let axes = match driven {
         Some(axis) => vec![axis],
         None if body.dimension() == 2 => vec![Vector3::z()],
-        None => vec![Vector3::x(), Vector3::y(), Vector3::z()],
+        None => {
+            let principal = situation.inertia.symmetric_eigen().eigenvectors;
+            principal.column_iter().map(|axis| axis.into_owned()).collect()
+        }
     };
     let largest = |norms: &dyn Fn(&Vector3<f64>) -> Option<Norms>| -> Option<[f64; 8]> {
         axes.iter().try_fold([0.0; 8], |most: [f64; 8], axis| {

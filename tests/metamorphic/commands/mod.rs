@@ -57,11 +57,10 @@ const ERRORS: f64 = 1e4;
 /// Outputs that are known not to correspond, by a part of their name. Their differences are counted and shown, and fail
 /// nothing; an entry goes as soon as its cause does.
 ///
-/// * The largest deflection of any node is found among a few places that were looked at (to 0.3 %), the sizes of
-///   terms (significances, the Coriolis torque) are taken about the axes of the frame.
+/// * The largest deflection of any node is found among a few places that were looked at (to 0.3 %).
 /// * Enriched bodies: the responses that join a body are chosen by rounding where its basis is nearly complete, and a
 ///   limit of the estimate decides whether more rounds follow.
-pub const OPEN: [&str; 4] = ["largest deflection of the body", "significances", "Coriolis torque", ENRICHED];
+pub const OPEN: [&str; 2] = ["largest deflection of the body", ENRICHED];
 
 /// End of the name of what depends on the modes of an enriched body.
 const ENRICHED: &str = "of an enriched body";

@@ -30,11 +30,8 @@ fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
     if let Some(chosen) = chosen {
         all.push(error(&name("errors of the selected body"), vec![chosen.worst]));
     }
-    // The last is a torque beside a rate of the angular momentum "per unit of time".
-    let (last, others) = selection.significances.split_last().expect("terms");
-    let sizes = others.iter().flat_map(|one| [Some(one.bound), one.of_body]);
+    let sizes = selection.significances.iter().flat_map(|one| [Some(one.bound), one.of_body]);
     all.push(error(&name("significances"), sizes.flatten().collect()));
-    all.push(Output { unit: [0, 0, -1], ..error(&name("Coriolis torque"), vec![last.bound]) });
     let told = findings(&selection.diagnostics);
     all.extend(told.into_iter().map(|output| Output { name: name(&output.name), ..output }));
     Outputs { times: Vec::new(), all }
