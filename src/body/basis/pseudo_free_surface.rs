@@ -3,7 +3,9 @@
 //! whatever the shapes were.
 
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::numerics::linalg::{Pencil, column_products, gram, subtract_combination};
+use crate::numerics::linalg::{
+    Pencil, column_products, combine, gram, side_by_side, subtract_combination, symmetric_eigen,
+};
 use faer::{Mat, MatRef};
 
 /// A shape of which rigid motion leaves less than this part of its M-norm is a rigid motion: those that
@@ -18,6 +20,10 @@ const MASSLESS: f64 = 1e-12;
 /// of shapes that it sees. Below, such a shape would be so large, and its eigenvalue so high, that the others
 /// lose their digits beside it.
 const NEARLY_MASSLESS: f64 = 1e-4;
+
+/// Elastic energy of what is left of a shape beside others, relative to its own, above which it is a motion without mass
+/// and not the rounding of a shape that depends on others.
+const ELASTIC: f64 = 1e-10;
 
 /// The part of a set of shapes that spans deformations, and what became of the rest (indices from 0).
 #[derive(Debug, Clone)]
@@ -50,7 +56,9 @@ pub(super) fn independent(
     set.remove_rigid(rigid);
     set.leave_out_rigid(RIGID.max(dependent));
     set.remove_rigid(rigid);
-    Some(set.orthonormalised(dependent))
+    let (mut found, without_mass) = set.orthonormalised(dependent);
+    found.vectors = in_equilibrium(pencil, rigid, found.vectors, &without_mass);
+    Some(found)
 }
 
 /// Shapes on the way to be independent.
@@ -60,6 +68,8 @@ struct ShapeSet<'a> {
     shapes: Mat<f64>,
     /// Whether each shape is still in the set.
     is_in: Vec<bool>,
+    /// What moves no mass, or next to none, of shapes that are left out.
+    without_mass: Vec<Mat<f64>>,
     outcome: Independent,
 }
 
@@ -73,7 +83,8 @@ impl<'a> ShapeSet<'a> {
             dependent: Vec::new(),
         };
         let is_in = vec![true; shapes.ncols()];
-        Self { pencil, mass_diagonal: pencil.mass_diagonal(), shapes, is_in, outcome }
+        let (mass_diagonal, without_mass) = (pencil.mass_diagonal(), Vec::new());
+        Self { pencil, mass_diagonal, shapes, is_in, without_mass, outcome }
     }
 
     /// Unit size first: squares of shapes in any unit stay in range.
@@ -100,6 +111,7 @@ impl<'a> ShapeSet<'a> {
             }
             if square <= MASSLESS * bound {
                 self.outcome.massless.push(j);
+                self.without_mass.push(self.shapes.as_ref().subcols(j, 1).to_owned());
                 self.is_in[j] = false;
             } else {
                 scale(&mut self.shapes, j, 1.0 / square.sqrt());
@@ -127,16 +139,19 @@ impl<'a> ShapeSet<'a> {
         }
     }
 
-    /// The Gram-Schmidt process. The vectors found so far are the first columns of the shapes and of their
-    /// products.
-    fn orthonormalised(self, dependent: f64) -> Independent {
-        let Self { pencil, mass_diagonal, mut shapes, is_in, mut outcome } = self;
+    /// The Gram-Schmidt process, and what it leaves out that moves no mass. The vectors found so far are the first columns
+    /// of the shapes and of their products.
+    fn orthonormalised(self, dependent: f64) -> (Independent, Vec<Mat<f64>>) {
+        let Self { pencil, mass_diagonal, mut shapes, is_in, mut without_mass, mut outcome } = self;
         let mut products = pencil.apply_mass(shapes.as_ref());
         for j in (0..shapes.ncols()).filter(|&j| is_in[j]) {
             let found = outcome.kept.len();
             let (vector, product) = beside_first(found, &shapes, &products, j);
             let left = column_products(vector.as_ref(), product.as_ref())[0].max(0.0).sqrt();
             if left < dependent {
+                if is_elastic(pencil, &vector, shapes.as_ref().subcols(j, 1)) {
+                    without_mass.push(vector);
+                }
                 outcome.dependent.push((j, left));
                 continue;
             }
@@ -144,8 +159,12 @@ impl<'a> ShapeSet<'a> {
             let product = pencil.apply_mass(vector.as_ref());
             let square = column_products(vector.as_ref(), product.as_ref())[0];
             // A singular M: what is left of shapes with mass may have none.
-            if square <= NEARLY_MASSLESS * diagonal_square(&mass_diagonal, &vector, 0) {
+            let bound = diagonal_square(&mass_diagonal, &vector, 0);
+            if square <= NEARLY_MASSLESS * bound {
                 outcome.massless.push(j);
+                if square <= MASSLESS * bound {
+                    without_mass.push(vector);
+                }
                 continue;
             }
             let norm = square.sqrt();
@@ -156,8 +175,54 @@ impl<'a> ShapeSet<'a> {
             outcome.kept.push(j);
         }
         outcome.vectors = shapes.as_ref().subcols(0, outcome.kept.len()).to_owned();
-        outcome
+        (outcome, without_mass)
     }
+}
+
+/// True if what is `left` of a shape beside others has elastic energy of its own.
+fn is_elastic(pencil: &Pencil<'_>, left: &Mat<f64>, shape: MatRef<'_, f64>) -> bool {
+    let energy = |x: MatRef<'_, f64>| column_products(x, pencil.apply_stiffness(x).as_ref())[0];
+    energy(left.as_ref()) > ELASTIC * energy(shape)
+}
+
+/// The vectors V with the motions Z `without_mass` where their elastic forces hold them, V - Z (Z'K Z)^-1 Z'K V, and
+/// M-orthonormal again, to the `rigid` motions as well: Ritz vectors of finite frequency in the span of both have no other
+/// part of Z.
+fn in_equilibrium(
+    pencil: &Pencil<'_>,
+    rigid: MatRef<'_, f64>,
+    mut vectors: Mat<f64>,
+    without_mass: &[Mat<f64>],
+) -> Mat<f64> {
+    if without_mass.is_empty() || vectors.ncols() == 0 {
+        return vectors;
+    }
+    let motions = side_by_side(&without_mass.iter().map(Mat::as_ref).collect::<Vec<_>>());
+    let forces = pencil.apply_stiffness(motions.as_ref());
+    let energy = gram(motions.as_ref(), forces.as_ref());
+    let sizes: Vec<f64> = (0..energy.nrows()).map(|j| energy[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = Mat::from_fn(sizes.len(), sizes.len(), |i, j| energy[(i, j)] / (sizes[i] * sizes[j]));
+    let Some(eigen) = symmetric_eigen(scaled.as_ref()) else { return vectors };
+    let kept: Vec<usize> = (0..sizes.len()).filter(|&k| eigen.values[k] > ELASTIC).collect();
+    let unit = |j: usize, k: usize| eigen.vectors[(j, kept[k])] / (sizes[j] * eigen.values[kept[k]].sqrt());
+    let unit = Mat::from_fn(sizes.len(), kept.len(), unit);
+    let (motions, forces) =
+        (combine(motions.as_ref(), unit.as_ref()), combine(forces.as_ref(), unit.as_ref()));
+    let part = gram(forces.as_ref(), vectors.as_ref());
+    subtract_combination(vectors.as_mut(), motions.as_ref(), part.as_ref());
+    let along = gram(rigid, pencil.apply_mass(vectors.as_ref()).as_ref());
+    subtract_combination(vectors.as_mut(), rigid, along.as_ref());
+    let mut products = pencil.apply_mass(vectors.as_ref());
+    for j in 0..vectors.ncols() {
+        let (vector, _) = beside_first(j, &vectors, &products, j);
+        let product = pencil.apply_mass(vector.as_ref());
+        let norm = column_products(vector.as_ref(), product.as_ref())[0].sqrt();
+        for i in 0..vectors.nrows() {
+            vectors[(i, j)] = vector[(i, 0)] / norm;
+            products[(i, j)] = product[(i, 0)] / norm;
+        }
+    }
+    vectors
 }
 
 /// What is left of shape j beside the first `found` columns, and its product with M.
