@@ -266,8 +266,9 @@ impl Scales<'_> {
         // The models may have a damping of their own.
         scene.requirements.replaces_damping = true;
         if one_in(self.random, 4) {
-            // Above the rates of all scenes.
-            scene.requirements.motion.angular_velocity = Some(Range::Any(0.15 * self.rate));
+            // Above the rates of all scenes, and below those that take the stiffness of a body that is held.
+            let part = if scene.carried.is_some() { 0.06 } else { 0.15 };
+            scene.requirements.motion.angular_velocity = Some(Range::Any(part * self.rate));
         }
         if one_in(self.random, 4) {
             let attachment = &mut scene.requirements.attachment;

@@ -14,6 +14,10 @@ const SETTLED: f64 = 1e-12;
 /// Steps below this part that no longer shrink are rounding of K u.
 const NEAR_ROUNDING: f64 = 1e-6;
 
+/// Steps that are rounding where nothing acts, relative to the extent of the body and the way that it flies while it
+/// swings by a radian.
+const NOTHING: f64 = 1e-14;
+
 /// The shift of K, relative to the square of the first circular frequency: steps of a free body leave a tenth
 /// of the way to go, or less.
 const SHIFT: f64 = 0.1;
@@ -79,6 +83,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         let (mut step, mut acceleration, mut scratch) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut settled = start.clone();
         settled.ud.fill(0.0);
+        let least = NOTHING * (body.length + start.velocity.norm() / softest.sqrt());
         let mut before = f64::INFINITY;
         for _ in 0..MOST_STEPS {
             let state = body
@@ -87,8 +92,11 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
             self.accelerations(time, &state, &mut acceleration)?;
             body.weigh(&acceleration, &mut step);
             steps.solve(body, &mut step, &mut scratch);
-            settled.u.iter_mut().zip(&step).for_each(|(u, step)| *u += step);
             let size = |x: &[f64]| x.iter().fold(0.0, |largest: f64, x| larger(largest, x.abs()));
+            if size(&step) <= least {
+                return Ok(settled);
+            }
+            settled.u.iter_mut().zip(&step).for_each(|(u, step)| *u += step);
             let (size, largest) = (size(&step), size(&settled.u));
             if size <= SETTLED * largest || (size <= NEAR_ROUNDING * largest && size > 0.5 * before) {
                 return Ok(settled);

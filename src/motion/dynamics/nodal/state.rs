@@ -10,6 +10,9 @@ use nalgebra::Vector3;
 /// Largest rigid motion in displacements that is rounding, relative to the largest of them.
 const ROUNDING: f64 = 1e-8;
 
+/// Rigid motion in displacements, relative to the extent of the body, that is the rounding of positions.
+const ROUNDING_OF_POSITIONS: f64 = 1e-12;
+
 /// Where in a state y = (G, D, e, P, L, u, w) each part but the first begins.
 pub(super) const OFFSET: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -65,8 +68,9 @@ impl NodalEquations<'_> {
         let taken = self.take_rigid(&mut u);
         let largest = u.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         let moved = taken.fixed_rows::<3>(0).amax().max(taken.fixed_rows::<3>(3).amax() * self.length);
+        let allowed = (ROUNDING * largest).max(ROUNDING_OF_POSITIONS * self.length);
         // The sizes ignore what is no number, which is no displacement.
-        if taken.iter().any(|part| part.is_nan()) || moved > ROUNDING * largest {
+        if taken.iter().any(|part| part.is_nan()) || moved > allowed {
             return Err(NodalError::ConditionsViolated { part: moved / largest });
         }
         let attitude = attitude.normalised();
