@@ -266,9 +266,11 @@ impl Scales<'_> {
         // The models may have a damping of their own.
         scene.requirements.replaces_damping = true;
         if one_in(self.random, 4) {
-            // Above the rates of all scenes, and below those that take the stiffness of a body that is held.
-            let part = if scene.carried.is_some() { 0.06 } else { 0.15 };
-            scene.requirements.motion.angular_velocity = Some(Range::Any(part * self.rate));
+            // Above the rates of all scenes; a body that is held has no stiffness left at far higher ones.
+            let spin = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+            let carried = spin.map(|spin| 1.3 * spin.velocity.largest_until(f64::INFINITY).0);
+            let allowed = carried.unwrap_or(0.15 * self.rate);
+            scene.requirements.motion.angular_velocity = Some(Range::Any(allowed));
         }
         if one_in(self.random, 4) {
             let attachment = &mut scene.requirements.attachment;

@@ -59,8 +59,19 @@ const ERRORS: f64 = 1e4;
 ///
 /// * The largest deflection of any node is found among a few places that were looked at (to 0.3 %).
 /// * Enriched bodies: the responses that join a body are chosen by rounding where its basis is nearly complete, and a
-///   limit of the estimate decides whether more rounds follow.
-pub const OPEN: [&str; 2] = ["largest deflection of the body", ENRICHED];
+///   limit of the estimate decides whether more rounds follow. FB548 tells the estimate of a body that enrichment did not
+///   pay for.
+pub const OPEN: [&str; 3] = ["largest deflection of the body", "percentages of FB548", ENRICHED];
+
+/// Outputs that a transformation changes by rights, by a part of their names.
+///
+/// * What loads can do to a free body until the end of its motion is more where the motion ends later.
+pub const CHANGED: [(&str, &str); 4] = [
+    ("significances", "start later"),
+    ("FB542", "start later"),
+    ("FB543", "start later"),
+    ("findings", "start later"),
+];
 
 /// End of the name of what depends on the modes of an enriched body.
 const ENRICHED: &str = "of an enriched body";
