@@ -218,9 +218,9 @@ pub struct JobArguments {
     /// Units of length, mass and time where no manifest states them [default: m,kg,s, not checked]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
-    /// Node set of the job as an interface: NAME=SET, SET for both, and a coupling after a comma as in
-    /// bore=SET_BORE,rigid (repeatable)
-    #[arg(long, value_name = "NAME=SET[,COUPLING]")]
+    /// Node set of the job as an interface: NAME=SET, SET for both, then a coupling and a reference point in model axes,
+    /// each after a comma, as in bore=SET_BORE,rigid,0/0/12.5 (repeatable) [default point: the centre of its faces]
+    #[arg(long, value_name = "NAME=SET[,COUPLING][,X/Y/Z]")]
     pub interface: Vec<String>,
 }
 

@@ -32,6 +32,11 @@ pub(super) struct MassProperties {
 }
 
 impl MassProperties {
+    /// Returns the largest radius of gyration: coordinates that are rounding beside it are shown as zero.
+    pub fn size(&self) -> f64 {
+        self.radii_of_gyration.iter().copied().fold(0.0, f64::max)
+    }
+
     pub fn of(body: &FlexBody) -> Self {
         let (invariants, frame) = (body.invariants(), body.frame());
         let inertia = inertia_about_com(invariants);

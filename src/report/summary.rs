@@ -5,8 +5,8 @@ use super::Facts;
 use super::facts::{InterfaceFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped_effect::scheme_in_words;
-use super::numbers::{bytes, counted, duration, plain, significant};
-use super::text::{LABEL, WIDTH, coordinates, entry_lines, own_modes, triple};
+use super::numbers::{bytes, coordinates, counted, duration, plain, significant, triple};
+use super::text::{LABEL, WIDTH, entry_lines, own_modes};
 use crate::base::diagnostic::Severity;
 
 /// Entries of a list that are shown.
@@ -156,23 +156,25 @@ fn body(summary: &mut Summary, facts: &Facts<'_>) {
         summary.entry(Tone::Warning, "storage", rounded, 2);
     }
     if !model.interfaces.is_empty() {
-        let all: Vec<String> = model.interfaces.iter().map(interface).collect();
+        let (size, unit) = (facts.body.size(), model.units.length());
+        let all: Vec<String> = model.interfaces.iter().map(|one| interface(one, size, &unit)).collect();
         let bends = model.interfaces.iter().any(InterfaceFacts::breaks_its_word);
         let tone = if bends { Tone::Warning } else { Tone::Plain };
-        summary.entry(tone, "interfaces", &all.join("; "), if bends { 4 } else { 2 });
+        summary.entry(tone, "interfaces", &all.join("; "), if bends { 6 } else { 4 });
     }
 }
 
-/// `bore: 80 nodes, rigid`.
-fn interface(interface: &InterfaceFacts) -> String {
+/// `bore: 80 nodes, rigid, at 0, 0, 12.5 mm`; the point in model axes.
+fn interface(interface: &InterfaceFacts, size: f64, unit: &str) -> String {
     let coupling = interface.coupling.map_or(String::new(), |name| format!(", {name}"));
     let bends = if interface.breaks_its_word() { " but DEFORMS" } else { "" };
-    format!("{}: {}{coupling}{bends}", plain(&interface.name), counted(interface.n_nodes, "node"))
+    let place = interface.place_in_words(size, unit);
+    format!("{}: {}{coupling}{place}{bends}", plain(&interface.name), counted(interface.n_nodes, "node"))
 }
 
 fn mass_properties(summary: &mut Summary, facts: &Facts<'_>) {
     let (body, units) = (&facts.body, &facts.model.units);
-    let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
+    let size = body.size();
     let centre = coordinates(&body.centre_of_mass, size, &units.length());
     let inertia = triple(&body.principal_inertia, &units.inertia());
     let mass = format!("{} {} at {centre} (model axes)", significant(body.mass, 6), units.mass());

@@ -4,7 +4,7 @@ use super::Facts;
 use super::facts::RunFacts;
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
-use super::numbers::{bytes, counted, duration, percent, plain, significant};
+use super::numbers::{bytes, coordinates, counted, duration, percent, plain, significant, triple};
 use crate::base::diagnostic::{Diagnostic, Severity};
 
 /// Columns of a terminal that every terminal has.
@@ -110,16 +110,6 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-pub(super) fn triple(values: &[f64; 3], unit: &str) -> String {
-    let [x, y, z] = values.map(|v| significant(v, 6));
-    format!("{x}, {y}, {z} {unit}")
-}
-
-/// Three coordinates; what is rounding compared with `size` is zero.
-pub(super) fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
-    triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
-}
-
 fn heading(page: &mut Page, facts: &Facts<'_>) {
     let (model, body) = (&facts.model, &facts.body);
     let units = &model.units;
@@ -138,13 +128,16 @@ fn heading(page: &mut Page, facts: &Facts<'_>) {
         page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
     }
     page.entry("mass", &format!("{} {}", significant(body.mass, 6), units.mass()));
-    let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
+    let size = body.size();
     let centre = coordinates(&body.centre_of_mass, size, &units.length());
     page.entry("centre", &format!("{centre} (of mass, model axes)"));
     page.entry("inertia", &format!("{} (principal)", triple(&body.principal_inertia, &units.inertia())));
     page.entry("gyration", &format!("{} (radii)", triple(&body.radii_of_gyration, &units.length())));
     page.entry("frame", &body.frame);
-    page.list("interface", &model.interfaces, |i| format!("{}: {}", plain(&i.name), i.in_words()));
+    let length = units.length();
+    page.list("interface", &model.interfaces, |i| {
+        format!("{}: {}", plain(&i.name), i.in_words(size, &length))
+    });
 }
 
 fn modes(page: &mut Page, facts: &Facts<'_>) {

@@ -38,7 +38,8 @@ fn bracket(couplings: [Coupling; 2]) -> RawModel {
     let turned = mesh.moved(&crate::support::random::Random(3).rotation(), [0.7, -0.2, 1.1]);
     let mut raw = turned.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let far = Reference::Point([0.5, 0.3, 0.9]);
-    let references = [Reference::Mean, if couplings[1] == Coupling::Free { Reference::Mean } else { far }];
+    let references =
+        [Reference::Centre, if couplings[1] == Coupling::Free { Reference::Centre } else { far }];
     raw.interfaces = ["first", "second"]
         .into_iter()
         .zip(sets)
@@ -499,7 +500,7 @@ fn the_span_does_not_depend_on_the_reference_points() {
         let near = craig_bampton(&model(bracket(*couplings)), 5).solution;
         let mut raw = bracket(*couplings);
         raw.interfaces[0].reference = Reference::Node(raw.nodes.ids[0]);
-        raw.interfaces[1].reference = Reference::Mean;
+        raw.interfaces[1].reference = Reference::Centre;
         let far = craig_bampton(&model(raw), 5).solution;
         for (a, b) in near.eigenvalues.iter().zip(&far.eigenvalues) {
             close(*a, *b, 1e-10, "lambda");

@@ -19,7 +19,7 @@ pub(crate) fn set(name: &str, set: &str) -> InterfaceSource {
         name: name.to_owned(),
         nodes,
         coupling: Some(Coupling::Rigid),
-        reference: Reference::Mean,
+        reference: Reference::Centre,
     }
 }
 

@@ -103,7 +103,8 @@ def model(
         node. Without: x, y, z of every node, node by node (in the plane x, y).
     interfaces
         Sets of nodes that joints and loads act on: name to node numbers, or to a tuple of these with a
-        coupling ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes.
+        coupling ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes; without one
+        it is the mean of the nodes.
     units
         Units of length, mass and time, as in ("mm", "t", "s"); a number is a factor to SI. Without, they are
         m, kg, s and plausibility is not checked.

@@ -3,7 +3,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference, rigid_count};
+use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, rigid_count};
 use crate::numerics::eigen::EigenFailure;
 use crate::numerics::linalg::{Dependents, Elimination};
 use faer::{Mat, MatRef};
@@ -83,10 +83,7 @@ impl CoupledInterface {
         let Members { nodes, displaced, turned, all_turn } = members;
         let (coupling, d) = (set.coupling(), model.dimension());
         let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| model.nodes().positions[i]).collect();
-        let reference = match set.reference {
-            Reference::Point(x) => Some(x),
-            _ => None,
-        };
+        let reference = set.reference.point();
         let by_place = InterfaceMotion::new(&positions, false, d, reference);
         // The mean motion leaves the rotations of the nodes alone, unless nothing else tells its own.
         let rows = match coupling {
