@@ -418,7 +418,7 @@ pub struct ConvertArguments {
     #[arg(long)]
     pub allow_long: bool,
     /// Frame of the body
-    #[arg(long, value_enum, default_value_t = FrameName::Principal)]
+    #[arg(long, value_enum, default_value_t = FrameName::Com)]
     pub frame: FrameName,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
@@ -622,10 +622,10 @@ fn memory_size(text: &str) -> Result<u64, String> {
 /// Names of the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FrameName {
+    /// Origin at the centre of mass, axes of the model
+    Com,
     /// Origin at the centre of mass, principal axes
     Principal,
-    /// Origin at the centre of mass, model axes
-    Com,
     /// The model's own frame
     Model,
 }

@@ -63,9 +63,10 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
         (false, true) => "origin of the model",
         (false, false) => "origin off the centre of mass",
     };
-    let axes = match (largest_product(inertia) <= PRINCIPAL, frame.axes == Matrix3::identity()) {
-        (true, _) => "principal axes",
-        (false, true) => "axes of the model",
+    let axes = match (frame.axes == Matrix3::identity(), largest_product(inertia) <= PRINCIPAL) {
+        (true, true) => "axes of the model, which are principal",
+        (true, false) => "axes of the model",
+        (false, true) => "principal axes",
         (false, false) => "axes neither principal nor of the model",
     };
     let turned = turned_degrees(&frame.axes);

@@ -32,11 +32,8 @@ fn plate() -> (RawModel, Vec<i64>) {
     };
     let mesh = Mesh::from_cells(Kind::Tet10, &grid([1, AROUND, 2]), map).welded(1e-9);
     let middle = 0.004;
-    let bore: Vec<i64> = (1..)
-        .zip(&mesh.nodes)
-        .filter(|(_, x)| x[0].hypot(x[1]) < 1.001 * RADIUS)
-        .map(|(id, _)| id)
-        .collect();
+    let bore: Vec<i64> =
+        (1..).zip(&mesh.nodes).filter(|(_, x)| x[0].hypot(x[1]) < 1.001 * RADIUS).map(|(id, _)| id).collect();
     let mesh = mesh.moved(&nalgebra::Matrix3::identity(), [CENTRE[0], CENTRE[1], CENTRE[2] - middle]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let mut elements = Elements::default();
@@ -58,7 +55,9 @@ fn away(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 fn body_of(model: &FeModel, basis: BasisChoice) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(3), ..ModeSettings::default() };
-    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT).expect("a body").body
+    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT)
+        .expect("a body")
+        .body
 }
 
 /// The mean of the nodes is half of the radius beside the axis, the centre of the faces is on it; the coupling is about
@@ -134,7 +133,9 @@ fn cube_model(folder: &Path) -> FeModel {
 #[test]
 fn a_cylinder_has_its_point_on_its_axis() {
     let region = |coupling: &str| {
-        format!("[[interface]]\nname = \"pin\"\ncylinder = {{ from = [0, 0, -1], to = [0, 0, 2], radius = 0.09 }}\n{coupling}")
+        format!(
+            "[[interface]]\nname = \"pin\"\ncylinder = {{ from = [0, 0, -1], to = [0, 0, 2], radius = 0.09 }}\n{coupling}"
+        )
     };
     let folder = cube(&region(""));
     let model = cube_model(folder.path());
@@ -180,10 +181,14 @@ fn the_point_of_a_set_is_stated_and_told() {
         let entry = entry.expect("an entry");
         fs::copy(entry.path(), folder.path().join(entry.file_name())).expect("a copy");
     }
-    let convert = ["convert", "job.inp", "--units", "m,kg,s", "--modes", "4", "-o", "b.flex.h5", "--interface"];
+    let convert =
+        ["convert", "job.inp", "--units", "m,kg,s", "--modes", "4", "-o", "b.flex.h5", "--interface"];
     let run = |interface: &str| {
         let output = flexbody(folder.path(), &[&convert[..], &[interface]].concat());
-        (output.status.success(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
+        (
+            output.status.success(),
+            String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned(),
+        )
     };
     for interface in ["end=RIGHT,averaging,0.25/0.04/0.03", "end=RIGHT,0.25/0.04/0.03"] {
         let (done, text) = run(interface);

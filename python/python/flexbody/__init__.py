@@ -180,7 +180,7 @@ def convert(
     max_frequency: float | None = None,
     basis: str = "free",
     accuracy: str = "standard",
-    frame: str = "principal",
+    frame: str = "com",
     comparators: bool = True,
     scene: Any = None,
     **of_model: Any,
@@ -202,8 +202,8 @@ def convert(
     accuracy
         "fast"; "standard" proves that no mode is missing; "certified" guarantees bounds.
     frame
-        Body frame: "principal" (at the centre of mass, along the principal axes), "com" (there, along the
-        axes of the model), "model".
+        Body frame: "com" (at the centre of mass, along the axes of the model), "principal" (there, along the
+        principal axes of inertia), "model".
     comparators
         Whether to compute what lumped masses would have given.
     scene
