@@ -6,7 +6,7 @@ use super::facts::{InterfaceFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped_effect::scheme_in_words;
 use super::numbers::{bytes, coordinates, counted, duration, plain, significant, triple};
-use super::text::{LABEL, WIDTH, entry_lines, own_modes};
+use super::text::{LABEL, WIDTH, entry_lines, first_and_last, own_modes};
 use crate::base::diagnostic::Severity;
 
 /// Entries of a list that are shown.
@@ -169,7 +169,7 @@ fn interface(interface: &InterfaceFacts, size: f64, unit: &str) -> String {
     let coupling = interface.coupling.map_or(String::new(), |name| format!(", {name}"));
     let bends = if interface.breaks_its_word() { " but DEFORMS" } else { "" };
     let place = interface.place_in_words(size, unit);
-    format!("{}: {}{coupling}{place}{bends}", plain(&interface.name), counted(interface.n_nodes, "node"))
+    format!("{}: {}{coupling}{bends}{place}", plain(&interface.name), counted(interface.n_nodes, "node"))
 }
 
 fn mass_properties(summary: &mut Summary, facts: &Facts<'_>) {
@@ -190,10 +190,19 @@ fn modes(summary: &mut Summary, facts: &Facts<'_>) {
         [first, .., last] => format!(", {} to {} Hz", significant(*first, 5), significant(*last, 5)),
     };
     let origins = modes.origins();
-    let kinds: Vec<String> =
-        origins.iter().map(|(origin, count)| format!("{count} x {}", plain(origin))).collect();
-    let kinds = if kinds.is_empty() { String::new() } else { format!(" ({})", kinds.join(", ")) };
+    let kinds = match &modes.craig_bampton {
+        // Modes of the body are mixtures of fixed-interface modes and motions of the interfaces.
+        Some(own) => format!(": {}", own.made_of()),
+        None if origins.is_empty() => String::new(),
+        None => {
+            let kinds = origins.iter().map(|(origin, count)| format!("{count} x {}", plain(origin)));
+            format!(" ({})", kinds.collect::<Vec<_>>().join(", "))
+        }
+    };
     summary.entry(Tone::Plain, "modes", &format!("{} flexible{range}{kinds}", modes.count), 3);
+    if let Some(hz) = modes.craig_bampton.as_ref().and_then(|own| own.held_hz()) {
+        summary.entry(Tone::Plain, "held", &format!("{} (fixed-interface modes)", first_and_last(hz)), 2);
+    }
     let proof = completeness.sentence.strip_prefix("proved: ");
     match (completeness.verdict, proof) {
         ("proved", Some(proof)) => summary.entry(Tone::Good, "proved", proof, 4),

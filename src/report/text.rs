@@ -140,26 +140,36 @@ fn heading(page: &mut Page, facts: &Facts<'_>) {
     });
 }
 
-fn modes(page: &mut Page, facts: &Facts<'_>) {
-    let modes = &facts.modes;
-    let hz = &modes.frequency_hz;
+/// `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
+pub(super) fn first_and_last(hz: &[f64]) -> String {
     let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
     let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
     let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
     let last = last.map_or(String::new(), |f| format!("{dots} {}", significant(*f, 5)));
+    format!("{}{last} Hz", shown.join(" "))
+}
+
+fn modes(page: &mut Page, facts: &Facts<'_>) {
+    let modes = &facts.modes;
+    let hz = &modes.frequency_hz;
     let accuracy = facts.run.as_ref().map(|run| plain(&run.accuracy)).filter(|name| !name.is_empty());
     let accuracy = accuracy.map_or(String::new(), |name| format!(", {name} accuracy"));
     let residual = significant(modes.worst_residual, 2);
     let whose = modes.whose_residual();
     page.entry("modes", &format!("{} flexible, worst residual {residual}{whose}{accuracy}", modes.count));
-    page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
+    page.entry("frequency", &first_and_last(hz));
     if let Some(basis) = facts.model.settings["basis"].as_str().filter(|basis| *basis != "free") {
         let made_of = modes.craig_bampton.as_ref().map_or(String::new(), |cb| format!(": {}", cb.made_of()));
         page.entry("basis", &format!("{}{made_of}", plain(basis)));
     }
+    if let Some(hz) = modes.craig_bampton.as_ref().and_then(|own| own.held_hz()) {
+        page.entry("held", &format!("{} (fixed-interface modes)", first_and_last(hz)));
+    }
     let origins = modes.origins();
-    page.list("origin", &origins, |(origin, count)| {
-        format!("{}: {}", counted(*count, "mode"), plain(origin))
+    page.list("origin", &origins, |(origin, count)| match modes.craig_bampton {
+        // The modes of the body are mixtures.
+        Some(_) => format!("{} with the largest share of a {}", counted(*count, "mode"), plain(origin)),
+        None => format!("{}: {}", counted(*count, "mode"), plain(origin)),
     });
     page.list("static", &modes.truncation, |t| {
         let (before, after) = (significant(t.before, 2), significant(t.after, 2));

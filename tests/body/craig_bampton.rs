@@ -23,6 +23,7 @@ use flexbody::input::{read_manifest, read_model};
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
 use flexbody::numerics::linalg::{CscMatrix, gram};
+use std::collections::HashSet;
 use std::path::Path;
 
 const CELL: f64 = 0.05;
@@ -75,8 +76,27 @@ const COUPLINGS: [[Coupling; 2]; 5] = [
     [Coupling::Free, Coupling::Rigid],
 ];
 
+/// Couplings of interfaces that share nodes; at least one of two averages.
+const SHARING: [[Coupling; 2]; 4] = [
+    [Coupling::Averaging, Coupling::Averaging],
+    [Coupling::Rigid, Coupling::Averaging],
+    [Coupling::Averaging, Coupling::Rigid],
+    [Coupling::Averaging, Coupling::Free],
+];
+
+/// The bracket or the strip with nodes of its second interface, and some more, in the first as well.
+fn sharing(couplings: [Coupling; 2], raw: RawModel) -> RawModel {
+    let mut raw = raw;
+    let taken: Vec<i64> = raw.interfaces[1].nodes.iter().copied().take(2).collect();
+    raw.interfaces[0].nodes.extend(taken);
+    assert_eq!(raw.interfaces.iter().map(|set| set.coupling).collect::<Vec<_>>(), couplings.map(Some));
+    raw
+}
+
 fn models() -> Vec<RawModel> {
-    COUPLINGS.into_iter().flat_map(|c| [bracket(c), strip(c)]).collect()
+    let apart = COUPLINGS.into_iter().flat_map(|c| [bracket(c), strip(c)]);
+    let sharing = SHARING.into_iter().flat_map(|c| [sharing(c, bracket(c)), sharing(c, strip(c))]);
+    apart.chain(sharing).collect()
 }
 
 /// The same from definitions, dense: K, M, D, a basis Z of what leaves the interface coordinates zero, and
@@ -98,6 +118,13 @@ impl Dense {
         let mut motion: Vec<Vec<f64>> = Vec::new();
         let mut weights: Vec<Vec<f64>> = Vec::new();
         let mut constraints: Vec<Vec<f64>> = Vec::new();
+        // Nodes whose displacements an interface prescribes do not follow the mean of another.
+        let prescribed: HashSet<i64> = raw
+            .interfaces
+            .iter()
+            .filter(|set| set.coupling != Some(Coupling::Averaging))
+            .flat_map(|set| set.nodes.iter().copied())
+            .collect();
         for set in &raw.interfaces {
             let nodes: Vec<usize> = set.nodes.iter().map(|id| (*id - 1) as usize).collect();
             let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |c| d * i + c)).collect();
@@ -122,8 +149,10 @@ impl Dense {
                 let r = rigid(&nodes.iter().map(|&i| x[i]).collect::<Vec<_>>(), d, reference);
                 let normal = r.transpose() * &r;
                 let a = normal.partial_piv_lu().solve(r.transpose()).transpose().to_owned();
+                let follows =
+                    |i: usize| coupling == Coupling::Rigid || !prescribed.contains(&set.nodes[i / d]);
                 for j in 0..r.ncols() {
-                    motion.push(column(&|i| r[(i, j)]));
+                    motion.push(column(&|i| if follows(i) { r[(i, j)] } else { 0.0 }));
                     weights.push(column(&|i| a[(i, j)]));
                 }
             }
@@ -506,6 +535,31 @@ fn the_span_does_not_depend_on_the_reference_points() {
             close(*a, *b, 1e-10, "lambda");
         }
     }
+}
+
+/// Motions that follow from those of other interfaces are refused, with the node that both have.
+#[test]
+fn interfaces_whose_motions_follow_from_others_are_refused() {
+    use Coupling::{Averaging, Free, Rigid};
+    let told = |couplings: [Coupling; 2], nodes: &dyn Fn(&[i64]) -> Vec<i64>| {
+        let mut raw = bracket(couplings);
+        raw.interfaces[1].reference = Reference::Centre;
+        raw.interfaces[1].nodes = nodes(&raw.interfaces[0].nodes);
+        let error = modes_of(&model(raw), &CraigBampton, &lowest(3)).expect_err("not independent");
+        assert!(error.has(Code::InterfaceShared), "{couplings:?}: {error}");
+        assert!(error.to_string().contains("with `first`"), "{couplings:?}: {error}");
+    };
+    for couplings in [[Averaging, Averaging], [Rigid, Averaging], [Free, Averaging], [Rigid, Free]] {
+        told(couplings, &|first| first.to_vec());
+    }
+    // Some nodes of its own leave a rigid interface, or a mean, as little independent of another rigid one.
+    told([Rigid, Rigid], &|first| [&first[..1], &[1, 2, 3]].concat());
+    told([Rigid, Averaging], &|first| [first, &[1]].concat());
+    let other = |first: &[i64]| (1..).filter(|id| !first.contains(id)).take(6).collect::<Vec<i64>>();
+    let mut raw = bracket([Averaging, Averaging]);
+    let first = raw.interfaces[0].nodes.clone();
+    raw.interfaces[1].nodes = [first.as_slice(), &other(&first)].concat();
+    assert_eq!(craig_bampton(&model(raw), 3).solution.eigenvalues.len(), 9);
 }
 
 /// Interfaces that state nothing are averaging ones.

@@ -2,10 +2,8 @@
 //! measure of them.
 
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
+use crate::base::error::Result;
 use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, rigid_count};
-use crate::numerics::eigen::EigenFailure;
-use crate::numerics::linalg::{Dependents, Elimination};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
 
@@ -30,16 +28,15 @@ pub(super) struct CoupledInterface {
     /// r).
     motion: Mat<f64>,
     measure: Mat<f64>,
-    /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference
-    /// point costs no digits.
+    /// The weights about the mean of the nodes (rows x r).
     centred: Mat<f64>,
     /// Number of coordinates that are displacements; rotations follow.
     pub displacements: usize,
     /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its
     /// rotations or none has one.
-    determined: bool,
+    pub determined: bool,
     /// Whether it holds the body by itself, not only together with others.
-    holds: bool,
+    pub holds: bool,
 }
 
 impl CoupledInterface {
@@ -125,6 +122,12 @@ impl CoupledInterface {
         self.measure.as_ref()
     }
 
+    /// Returns the weights of [`measure`](Self::measure) about the mean of the nodes: what they leave zero is the same, and
+    /// a far reference point costs no digits.
+    pub fn centred(&self) -> MatRef<'_, f64> {
+        self.centred.as_ref()
+    }
+
     /// Adds the columns of `part` (rows x r) to `whole` (N x c) from column `first` on.
     pub fn scatter(&self, part: MatRef<'_, f64>, whole: &mut Mat<f64>, first: usize) {
         for (i, &row) in self.rows.iter().enumerate() {
@@ -189,140 +192,4 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
     }
     let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     Ok(model.interfaces().iter().map(|set| CoupledInterface::new(model, set, &places)).collect())
-}
-
-/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are
-/// zero.
-///
-/// # Errors
-/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that
-/// are found.
-pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -> Result<()> {
-    let mut found: Vec<Diagnostic> =
-        joints.iter().filter(|joint| !joint.determined).map(|joint| undetermined(model, joint)).collect();
-    found.extend(shared_nodes(model, joints));
-    if found.is_empty() {
-        found.extend(body_not_held(model, joints));
-    }
-    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
-}
-
-/// Where nodes must not lie that are to determine every rotation, and how many of them do.
-fn determining(dimension: usize) -> (&'static str, &'static str) {
-    if dimension == 2 {
-        ("one point", "two nodes")
-    } else {
-        ("one line", "three nodes that do not lie on one line")
-    }
-}
-
-/// The nodes of a joint do not determine its coordinates.
-fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
-    if joint.coupling == Coupling::Free {
-        let message =
-            format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
-        let help = "give it nodes with all rotations, nodes with none, or another coupling";
-        return Diagnostic::new(Code::InterfaceCoupling, message).with_help(help);
-    }
-    let (place, least) = determining(model.dimension());
-    let message = format!(
-        "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
-        joint.name,
-        joint.nodes.len()
-    );
-    let help = format!("give the interface {least}, or coupling = \"free\"");
-    Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
-}
-
-/// Nodes that belong to several joints.
-fn shared_nodes(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    let mut owner: HashMap<usize, &str> = HashMap::new();
-    for joint in joints {
-        let shared: Vec<(i64, &str)> = joint
-            .nodes
-            .iter()
-            .filter_map(|&i| owner.insert(i, &joint.name).map(|other| (model.nodes().ids[i], other)))
-            .collect();
-        if let Some((node, other)) = shared.first() {
-            let message = format!(
-                "interface `{}` shares {} nodes with others, node {node} with `{other}`: their motions are not independent",
-                joint.name,
-                shared.len()
-            );
-            found.push(Diagnostic::new(Code::InterfaceShared, message));
-        }
-    }
-    found
-}
-
-/// All joints together leave the body free to turn.
-fn body_not_held(model: &FeModel, joints: &[CoupledInterface]) -> Option<Diagnostic> {
-    let d = model.dimension();
-    let held: Vec<[f64; 3]> =
-        joints.iter().flat_map(|joint| &joint.nodes).map(|&i| model.nodes().positions[i]).collect();
-    if joints.iter().any(|joint| joint.holds) || InterfaceMotion::new(&held, false, d, None).is_determined() {
-        return None;
-    }
-    let (place, least) = determining(d);
-    let message = format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
-    let help = format!("the interfaces together need {least}");
-    Some(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help))
-}
-
-/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of
-/// averaging ones have no mean.
-///
-/// # Errors
-/// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not
-/// fit.
-pub(super) fn hold(
-    n: usize,
-    joints: &[CoupledInterface],
-    memory: Option<u64>,
-) -> std::result::Result<Elimination, EigenFailure> {
-    let averaging = |joint: &&CoupledInterface| joint.coupling == Coupling::Averaging;
-    // In K and in M. Bytes of an entry: in both matrices, one of them twice while it is made symmetric.
-    let entries: u64 = joints.iter().filter(averaging).map(|joint| (joint.rows.len() as u64).pow(2)).sum();
-    let bytes = 48 * entries;
-    if let Some(available) = memory.filter(|&available| bytes > available) {
-        return Err(EigenFailure::Memory { bytes, available });
-    }
-    let dependents = joints.iter().filter(averaging).map(without_mean).collect();
-    let zero = joints.iter().filter(|joint| !averaging(joint)).flat_map(|joint| joint.rows.iter().copied());
-    Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
-}
-
-/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of
-/// the size of one.
-fn without_mean(joint: &CoupledInterface) -> Dependents {
-    let measure = joint.centred.as_ref();
-    let (rows, r) = (measure.nrows(), measure.ncols());
-    // Rows of one size: rotations are in other units than displacements.
-    let mut a = Mat::from_fn(r, rows, |i, j| measure[(j, i)] / measure.col(i).norm_l2());
-    let mut pivots: Vec<usize> = Vec::new();
-    for step in 0..r {
-        let places = (step..r).flat_map(|i| (0..rows).map(move |j| (i, j)));
-        let (i, j) = places
-            .filter(|(_, j)| !pivots.contains(j))
-            .max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs()))
-            .expect("an averaging interface has more rows than coordinates");
-        for column in 0..rows {
-            let (upper, lower) = (a[(step, column)], a[(i, column)]);
-            (a[(step, column)], a[(i, column)]) = (lower, upper);
-        }
-        let pivot = a[(step, j)];
-        (0..rows).for_each(|column| a[(step, column)] /= pivot);
-        for other in (0..r).filter(|&other| other != step) {
-            let factor = a[(other, j)];
-            (0..rows).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
-        }
-        pivots.push(j);
-    }
-    let others: Vec<usize> = (0..rows).filter(|j| !pivots.contains(j)).collect();
-    Dependents {
-        rows: pivots.iter().map(|&j| joint.rows[j]).collect(),
-        on: others.iter().map(|&j| joint.rows[j]).collect(),
-        weights: Mat::from_fn(r, others.len(), |i, j| -a[(i, others[j])]),
-    }
 }

@@ -8,6 +8,7 @@ mod failure;
 mod fixed_interface;
 mod free_estimate;
 mod free_surface;
+mod held_interfaces;
 mod imported;
 mod interface_coordinates;
 mod interface_rows;
