@@ -67,6 +67,9 @@ pub struct NodeSet {
     pub coupling: Option<Coupling>,
     /// Its reference point; in a checked model a point, but of a free interface.
     pub reference: Reference,
+    /// Node numbers whose faces and edges have the default reference point, where these are more than `nodes`: a set of an
+    /// FE program may have nodes without rows. Empty: `nodes`.
+    pub outline: Vec<i64>,
 }
 
 impl Reference {
@@ -87,7 +90,13 @@ impl Reference {
 impl NodeSet {
     /// A set without a stated coupling and reference point.
     pub fn new(name: impl Into<String>, nodes: Vec<i64>) -> Self {
-        Self { name: name.into(), nodes, coupling: None, reference: Reference::default() }
+        Self {
+            name: name.into(),
+            nodes,
+            coupling: None,
+            reference: Reference::default(),
+            outline: Vec::new(),
+        }
     }
 
     /// The coupling where one is needed: averaging unless another was stated.

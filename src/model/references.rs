@@ -1,6 +1,6 @@
 //! Reference points of interfaces: where they lie, and whether they can lie there.
 
-use super::interface_centre::InterfaceCentre;
+use super::interface_centre::{InterfaceCentre, InterfaceNodes};
 use super::{Coupling, Nodes, RawModel, Reference, centre_and_length, span};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::numbers::significant;
@@ -34,7 +34,8 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
             let message = format!("interface `{}` is free, but has a reference point", set.name);
             found.push(Diagnostic::new(Code::ManifestSyntax, message));
         }
-        let nodes: Vec<u32> = set.nodes.iter().filter_map(|id| index.get(id)).copied().collect();
+        let places = |ids: &[i64]| ids.iter().filter_map(|id| index.get(id)).copied().collect::<Vec<u32>>();
+        let nodes = places(&set.nodes);
         let own: Vec<[f64; 3]> = nodes.iter().map(|&node| positions[node as usize]).collect();
         match set.reference {
             Reference::Node(id) => match index.get(&id) {
@@ -45,7 +46,11 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
                 }
             },
             Reference::Centre | Reference::Axis { .. } if !is_free => {
-                let centre = InterfaceCentre::new(&nodes, positions, raw.mesh.as_ref(), &set.reference);
+                let mut outline = places(if set.outline.is_empty() { &set.nodes } else { &set.outline });
+                outline.sort_unstable();
+                outline.dedup();
+                let members = InterfaceNodes { nodes: &nodes, outline: &outline, positions };
+                let centre = InterfaceCentre::new(&members, raw.mesh.as_ref(), &set.reference);
                 found.extend(beside_the_mean(&set.name, &centre, &own, body.size));
                 set.reference = Reference::Default(centre.point);
             }

@@ -338,7 +338,9 @@ fn a_spinning_beam_stiffens_as_its_centrifugal_tension_says_and_softens_without(
 
 #[test]
 fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_warn() {
+    let turn = Rotation3::from_euler_angles(-0.8, 0.4, 2.0);
     let case = Case::skew_block();
+    let case = Case::new(case.mesh.moved(turn.matrix(), [1.0, 2.0, 3.0]), case.material);
     let centrifugal = || BasisChoice::Free(FreeSurface { residual_vectors: vec![Loads::Centrifugal] });
     let done = run(case.raw(Vec::new()), BodyFrame::Com, centrifugal()).expect("a sound body");
     let warning = done.diagnostics.iter().find(|d| d.code() == Code::GeometricStiffnessNone);
@@ -426,7 +428,7 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     assert_eq!(told["load"], "spin xx");
     assert!((told["relative_norm"].as_f64().expect("a number") / norm - 1.0).abs() < 1e-9);
     assert!(render(&facts, Format::Html).contains("force z at `tip`"));
-    assert!(render(&facts, Format::Text).contains("spin xz: up to"));
+    assert!(render(&facts, Format::Text).contains("spin xz (body axes): up to"));
 
     let model = FeModel::from_raw(raw.clone()).expect("sound").model;
     let checks = verify(&body, &model).expect("the same nodes");

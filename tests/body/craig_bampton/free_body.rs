@@ -134,6 +134,7 @@ fn reports_call_a_healthy_body_healthy() {
             "{html}"
         );
         let text = render(&facts, Format::Text);
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
         let made_of = format!(
             "craig-bampton: {count} fixed-interface modes ({count} asked for) + 12 interface motions - 6"
         );
