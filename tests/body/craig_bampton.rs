@@ -2,6 +2,7 @@
 //! type.
 
 mod free_body;
+mod sharing;
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::Mesh;
@@ -76,27 +77,9 @@ const COUPLINGS: [[Coupling; 2]; 5] = [
     [Coupling::Free, Coupling::Rigid],
 ];
 
-/// Couplings of interfaces that share nodes; at least one of two averages.
-const SHARING: [[Coupling; 2]; 4] = [
-    [Coupling::Averaging, Coupling::Averaging],
-    [Coupling::Rigid, Coupling::Averaging],
-    [Coupling::Averaging, Coupling::Rigid],
-    [Coupling::Averaging, Coupling::Free],
-];
-
-/// The bracket or the strip with nodes of its second interface, and some more, in the first as well.
-fn sharing(couplings: [Coupling; 2], raw: RawModel) -> RawModel {
-    let mut raw = raw;
-    let taken: Vec<i64> = raw.interfaces[1].nodes.iter().copied().take(2).collect();
-    raw.interfaces[0].nodes.extend(taken);
-    assert_eq!(raw.interfaces.iter().map(|set| set.coupling).collect::<Vec<_>>(), couplings.map(Some));
-    raw
-}
-
 fn models() -> Vec<RawModel> {
     let apart = COUPLINGS.into_iter().flat_map(|c| [bracket(c), strip(c)]);
-    let sharing = SHARING.into_iter().flat_map(|c| [sharing(c, bracket(c)), sharing(c, strip(c))]);
-    apart.chain(sharing).collect()
+    apart.chain(sharing::models()).collect()
 }
 
 /// The same from definitions, dense: K, M, D, a basis Z of what leaves the interface coordinates zero, and
@@ -172,7 +155,7 @@ impl Dense {
         let rigid = rigid(x, d, [0.0; 3]);
         let (motion, weights) = (matrix(&motion), matrix(&weights));
         let free = |row: usize| !prescribed.contains(&((row / d) as i64 + 1));
-        let motion = with_unit_coordinates(motion, &weights, free);
+        let motion = sharing::with_unit_coordinates(motion, &weights, free);
         Self { k, m, motion, held, weights, rigid }
     }
 
@@ -220,27 +203,6 @@ impl Dense {
     fn equilibrated(&self) -> Mat<f64> {
         complement(&(self.weights.transpose() * &self.rigid))
     }
-}
-
-/// The same motions with unit coordinates, also of interfaces that share nodes: changed at the `free` rows alone.
-fn with_unit_coordinates(motion: Mat<f64>, weights: &Mat<f64>, free: impl Fn(usize) -> bool) -> Mat<f64> {
-    let c = weights.ncols();
-    let missing = Mat::<f64>::identity(c, c) - weights.transpose() * &motion;
-    let moved: Vec<usize> = (0..c).filter(|&j| missing.row(j).norm_max() > 1e-12).collect();
-    if moved.is_empty() {
-        return motion;
-    }
-    let own =
-        Mat::from_fn(
-            weights.nrows(),
-            moved.len(),
-            |row, j| {
-                if free(row) { weights[(row, moved[j])] } else { 0.0 }
-            },
-        );
-    let missing = Mat::from_fn(moved.len(), c, |i, j| missing[(moved[i], j)]);
-    let normal = own.transpose() * &own;
-    motion + &own * normal.partial_piv_lu().solve(missing)
 }
 
 /// An orthonormal basis of what is orthogonal to the columns of `a`, which are independent.
@@ -559,31 +521,6 @@ fn the_span_does_not_depend_on_the_reference_points() {
             close(*a, *b, 1e-10, "lambda");
         }
     }
-}
-
-/// Motions that follow from those of other interfaces are refused, with the node that both have.
-#[test]
-fn interfaces_whose_motions_follow_from_others_are_refused() {
-    use Coupling::{Averaging, Free, Rigid};
-    let told = |couplings: [Coupling; 2], nodes: &dyn Fn(&[i64]) -> Vec<i64>| {
-        let mut raw = bracket(couplings);
-        raw.interfaces[1].reference = Reference::Centre;
-        raw.interfaces[1].nodes = nodes(&raw.interfaces[0].nodes);
-        let error = modes_of(&model(raw), &CraigBampton, &lowest(3)).expect_err("not independent");
-        assert!(error.has(Code::InterfaceShared), "{couplings:?}: {error}");
-        assert!(error.to_string().contains("with `first`"), "{couplings:?}: {error}");
-    };
-    for couplings in [[Averaging, Averaging], [Rigid, Averaging], [Free, Averaging], [Rigid, Free]] {
-        told(couplings, &|first| first.to_vec());
-    }
-    // Some nodes of its own leave a rigid interface, or a mean, as little independent of another rigid one.
-    told([Rigid, Rigid], &|first| [&first[..1], &[1, 2, 30]].concat());
-    told([Rigid, Averaging], &|first| [first, &[1]].concat());
-    let other = |first: &[i64]| (1..).filter(|id| !first.contains(id)).take(6).collect::<Vec<i64>>();
-    let mut raw = bracket([Averaging, Averaging]);
-    let first = raw.interfaces[0].nodes.clone();
-    raw.interfaces[1].nodes = [first.as_slice(), &other(&first)].concat();
-    assert_eq!(craig_bampton(&model(raw), 3).solution.eigenvalues.len(), 9);
 }
 
 /// Interfaces that state nothing are averaging ones.

@@ -106,7 +106,7 @@ fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
 fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
     let mut given = fields(line);
     let (name, weight) = (given.next()?, given.next()?);
-    let weight: f64 = fast_float2::parse(weight).ok()?;
+    let weight = fast_float2::parse(weight).ok().filter(|weight: &f64| weight.is_finite())?;
     let nodes: BTreeSet<i64> = match integer(name) {
         Some(node) => BTreeSet::from([node]),
         None => {
