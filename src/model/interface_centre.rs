@@ -53,9 +53,10 @@ impl InterfaceCentre {
             Some((outline.centre(edges.into_iter())?, "the centre of its edges, weighted by length"))
         };
         let (point, origin) = match *reference {
-            Reference::Axis { point, direction } => {
-                (members.on_axis(&point.into(), &direction.into()), "the point on its axis in its middle")
-            }
+            Reference::Axis { point, direction } => (
+                members.on_axis(&point.into(), &direction.into()),
+                "the point of its axis in the middle of its nodes",
+            ),
             _ => by_mesh().unwrap_or((members.mean(), "the mean of its nodes")),
         };
         Self { point: point.into(), mean: members.mean().into(), origin }

@@ -189,7 +189,7 @@ pub(super) struct ModeFacts {
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
     /// Of nodes whose rotations carry mass.
     pub inertia_stiffness: Option<InertiaStiffnessFacts>,
-    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where W2 is held without
+    /// Spin about each axis of the model that takes 1 % of the stiffness of a motion, where W2 is held without
     /// geometric stiffness for spin.
     pub softening_hz: Option<[Option<f64>; 3]>,
 }

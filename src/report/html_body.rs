@@ -121,5 +121,5 @@ fn interfaces(html: &mut String, facts: &Facts<'_>) {
     let rows: Vec<_> = model.interfaces.iter().map(row).collect();
     section(html, &word_as("interface", "Interfaces"));
     let caption = format!("{}, in the order of the file", counted(rows.len(), "interface"));
-    table(html, &caption, &texts(["Name", "Nodes and coupling"]), &[0, 1], &rows);
+    table(html, &caption, &texts(["Name", "Nodes, coupling, reference point (model axes)"]), &[0, 1], &rows);
 }

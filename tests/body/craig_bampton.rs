@@ -3,6 +3,7 @@
 
 mod free_body;
 mod sharing;
+mod slender;
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::Mesh;
