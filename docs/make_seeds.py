@@ -149,7 +149,8 @@ class Program:
         return done.stdout
 
     def convert(self, model, path, modes, *options):
-        self.run("convert", model, "--modes", modes, "--lumped", "none", "--quiet", "-o", path, *options)
+        frame = () if "--frame" in options else ("--frame", "principal")
+        self.run("convert", model, "--modes", modes, "--lumped", "none", "--quiet", "-o", path, *frame, *options)
 
     def significance(self, body, deflection, speed, folder):
         """Sizes of the terms at `speed` times the first circular frequency and such a deflection over the extent."""

@@ -109,7 +109,7 @@ def study(program, model, count, digits=17, options=()):
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         k, m, x = save(folder, model, digits)
-        command = [program, "convert", "model.toml", "-o", "body.flex.h5", "--modes", str(count), "--lumped", "none", *options]
+        command = [program, "convert", "model.toml", "-o", "body.flex.h5", "--modes", str(count), "--frame", "principal", "--lumped", "none", *options]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
         codes = sorted(set(re.findall(r"\[(FB\d+)\]", done.stderr)))
         if done.returncode:
@@ -200,7 +200,7 @@ def motion(program, bar):
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
         save(folder, bar, 17)
-        subprocess.run([program[0], "convert", "model.toml", "-o", "body.flex.h5", "--modes", "8", "--quiet"], cwd=folder, check=True, capture_output=True)
+        subprocess.run([program[0], "convert", "model.toml", "-o", "body.flex.h5", "--modes", "8", "--frame", "principal", "--quiet"], cwd=folder, check=True, capture_output=True)
         done = subprocess.run([program[1], "body.flex.h5"], cwd=folder, check=True, capture_output=True, text=True)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     out = ["## Motion", "", "Relative drift of the energy and the angular momentum of a free body over the whole run, largest at twenty instants, by the integrators of the library "

@@ -254,7 +254,7 @@ impl Model {
     /// and modes alone that the scene needs; `Body.terms` says why.
     ///
     /// Raises InputError, NumericalError or ResourceError.
-    #[pyo3(signature = (*, modes=None, max_frequency=None, basis="free", accuracy="standard", frame="principal", comparators=true, scene=None))]
+    #[pyo3(signature = (*, modes=None, max_frequency=None, basis="free", accuracy="standard", frame="com", comparators=true, scene=None))]
     #[allow(clippy::too_many_arguments)] // the keywords of a Python function
     fn convert(
         &self,

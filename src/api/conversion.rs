@@ -45,17 +45,17 @@ pub enum Accuracy {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Frame {
-    /// At the centre of mass, along the principal axes of inertia.
-    #[default]
-    Principal,
     /// At the centre of mass, along the axes of the model.
+    #[default]
     CentreOfMass,
+    /// At the centre of mass, along the principal axes of inertia, moments ascending.
+    Principal,
     /// That of the model.
     Model,
 }
 
-/// What is asked of a conversion. The default: 20 free-surface modes, proved complete, in the principal
-/// frame.
+/// What is asked of a conversion. The default: 20 free-surface modes, proved complete, about the centre of mass along the
+/// axes of the model.
 #[derive(Debug, Clone, Default)]
 pub struct ConvertOptions {
     modes: Option<usize>,

@@ -118,7 +118,7 @@ impl Model {
             name: name.to_owned(),
             nodes: InterfaceNodes::Set(set.to_owned()),
             coupling: coupling.map(Coupling::inner),
-            reference: Reference::Mean,
+            reference: Reference::Centre,
         };
         let interfaces = interfaces.iter().map(source).collect();
         let units = units.map(|units| units.join(","));
@@ -210,8 +210,8 @@ impl ModelBuilder {
         Ok(self)
     }
 
-    /// A set of nodes that joints and loads act on, coupled to its reference point (the mean of the nodes) by
-    /// their mean motion.
+    /// Adds a set of nodes that joints and loads act on, coupled to its reference point by their mean motion. The point
+    /// is the mean of the nodes.
     pub fn interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
         self.raw.interfaces.push(NodeSet::new(name, nodes));
         self
@@ -224,8 +224,8 @@ impl ModelBuilder {
         self
     }
 
-    /// As [`ModelBuilder::interface`], with a coupling, and a reference point elsewhere than at the mean of
-    /// the nodes, in model axes.
+    /// Adds an interface as [`ModelBuilder::interface`] does, with a coupling and a reference point in model axes; `None`:
+    /// the mean of the nodes.
     pub fn coupled_interface(
         mut self,
         name: impl Into<String>,
@@ -234,7 +234,7 @@ impl ModelBuilder {
         reference: Option<[f64; 3]>,
     ) -> Self {
         let coupling = Some(coupling.inner());
-        let reference = reference.map_or(Reference::Mean, Reference::Point);
+        let reference = reference.map_or(Reference::Centre, Reference::Point);
         self.raw.interfaces.push(NodeSet { coupling, reference, ..NodeSet::new(name, nodes) });
         self
     }

@@ -218,9 +218,9 @@ pub struct JobArguments {
     /// Units of length, mass and time where no manifest states them [default: m,kg,s, not checked]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
-    /// Node set of the job as an interface: NAME=SET, SET for both, and a coupling after a comma as in
-    /// bore=SET_BORE,rigid (repeatable)
-    #[arg(long, value_name = "NAME=SET[,COUPLING]")]
+    /// Node set of the job as an interface: NAME=SET, SET for both, then a coupling and a reference point in model axes,
+    /// each after a comma, as in bore=SET_BORE,rigid,0/0/12.5 (repeatable) [default point: the centre of its faces]
+    #[arg(long, value_name = "NAME=SET[,COUPLING][,X/Y/Z]")]
     pub interface: Vec<String>,
 }
 
@@ -418,7 +418,7 @@ pub struct ConvertArguments {
     #[arg(long)]
     pub allow_long: bool,
     /// Frame of the body
-    #[arg(long, value_enum, default_value_t = FrameName::Principal)]
+    #[arg(long, value_enum, default_value_t = FrameName::Com)]
     pub frame: FrameName,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
@@ -622,10 +622,10 @@ fn memory_size(text: &str) -> Result<u64, String> {
 /// Names of the frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum FrameName {
+    /// Origin at the centre of mass, axes of the model
+    Com,
     /// Origin at the centre of mass, principal axes
     Principal,
-    /// Origin at the centre of mass, model axes
-    Com,
     /// The model's own frame
     Model,
 }

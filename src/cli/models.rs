@@ -3,7 +3,7 @@
 use super::arguments::JobArguments;
 use super::places::refuse_replacing;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
+use crate::base::error::{Error, Result};
 use crate::input::{InterfaceNodes, InterfaceSource, ModelFiles, is_job, read_manifest, read_model};
 use crate::model::{CheckedModel, Coupling, FeModel, Reference};
 use std::path::{Path, PathBuf};
@@ -84,25 +84,44 @@ fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
     Err(Diagnostic::new(Code::Usage, message).into())
 }
 
-/// An interface as named on the command line: `NAME=SET`, `SET`, each with `,COUPLING`.
+/// Returns the interface that `--interface` names: `NAME=SET` or `SET`, then a coupling, a reference point or both, each
+/// after a comma.
+///
+/// # Errors
+/// FB801 for a coupling that is not known, a point that does not have three coordinates, or an empty name.
 fn interface_source(text: &str) -> Result<InterfaceSource> {
-    let (names, coupling) = match text.rsplit_once(',') {
-        Some((names, coupling)) => (names, Some(coupling.trim())),
-        None => (text, None),
+    let refused = |why: String, help: String| {
+        Error::from(Diagnostic::new(Code::Usage, format!("--interface {text}: {why}")).with_help(help))
     };
-    let coupling = coupling.map(|name| {
-        Coupling::ALL.into_iter().find(|coupling| coupling.name() == name).ok_or_else(|| {
-            let known = Coupling::ALL.map(Coupling::name).join(", ");
-            let message = format!("--interface {text}: `{name}` is no coupling");
-            Diagnostic::new(Code::Usage, message).with_help(format!("couplings: {known}"))
-        })
-    });
-    let coupling = coupling.transpose()?;
+    let mut names = text;
+    let mut reference = Reference::Centre;
+    if let Some((before, last)) = names.rsplit_once(',').filter(|(_, last)| last.contains('/')) {
+        let point = point(last).ok_or_else(|| {
+            let help =
+                "write the point as X/Y/Z in model axes and the unit of length of the nodes".to_owned();
+            refused(format!("`{last}` is no point"), help)
+        })?;
+        (names, reference) = (before, Reference::Point(point));
+    }
+    let mut coupling = None;
+    if let Some((before, last)) = names.rsplit_once(',') {
+        let known = Coupling::ALL.into_iter().find(|coupling| coupling.name() == last.trim());
+        let help = || format!("couplings: {}", Coupling::ALL.map(Coupling::name).join(", "));
+        coupling = Some(known.ok_or_else(|| refused(format!("`{}` is no coupling", last.trim()), help()))?);
+        names = before;
+    }
     let (name, set) = names.split_once('=').unwrap_or((names, names));
     if name.is_empty() || set.is_empty() || name.chars().any(char::is_control) {
-        let message = format!("--interface {text}: expected NAME=SET, or NAME=SET,COUPLING");
-        return Err(Diagnostic::new(Code::Usage, message).into());
+        let message = "expected NAME=SET, NAME=SET,COUPLING or NAME=SET,COUPLING,X/Y/Z".to_owned();
+        let help = "name a node set of the job, as in --interface bore=SET_BORE,rigid,0/0/12.5".to_owned();
+        return Err(refused(message, help));
     }
     let nodes = InterfaceNodes::Set(set.to_owned());
-    Ok(InterfaceSource { name: name.to_owned(), nodes, coupling, reference: Reference::Mean })
+    Ok(InterfaceSource { name: name.to_owned(), nodes, coupling, reference })
+}
+
+/// Returns the point `X/Y/Z`.
+fn point(text: &str) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = text.split('/').map(|number| number.trim().parse().ok()).collect();
+    numbers?.try_into().ok()
 }

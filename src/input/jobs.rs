@@ -9,6 +9,7 @@ mod coordinate_files;
 mod deck;
 mod deck_mesh;
 mod deck_surfaces;
+mod distributing_couplings;
 mod element_kinds;
 mod expanded;
 mod labelled_lines;

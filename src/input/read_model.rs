@@ -241,10 +241,14 @@ impl<'m> Places<'m> {
         opened: &OpenFiles,
         files: &ModelFiles,
     ) -> Found<NodeSet> {
+        let mut outline = Vec::new();
         let nodes = match &interface.nodes {
             InterfaceNodes::Listed(nodes) => nodes.clone(),
             InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
-            InterfaceNodes::Set(name) => self.of_set(interface, name, files)?,
+            InterfaceNodes::Set(name) => {
+                outline = self.members(name).map(<[i64]>::to_vec).unwrap_or_default();
+                self.of_set(interface, name, files)?
+            }
             InterfaceNodes::Region(region) => {
                 let nodes = self.matrices.map_or(Vec::new(), |matrices| {
                     let all =
@@ -255,17 +259,22 @@ impl<'m> Places<'m> {
             }
         };
         let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
-        Ok(NodeSet { name, nodes, coupling, reference })
+        Ok(NodeSet { name, nodes, coupling, reference, outline })
     }
 
     fn moves(&self, node: i64) -> bool {
         self.moving.as_ref().is_none_or(|moving| moving.contains(&node))
     }
 
+    /// Returns the members of a node set, with those that have no rows.
+    fn members(&self, name: &str) -> Option<&[i64]> {
+        let mut sets = self.matrices?.sets.iter();
+        sets.find(|(own, _)| own.eq_ignore_ascii_case(name)).map(|(_, nodes)| nodes.as_slice())
+    }
+
     fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
-        let known = matrices.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
-        let Some((_, nodes)) = known else {
+        let Some(nodes) = self.members(name) else {
             let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
             let help = match names.is_empty() {

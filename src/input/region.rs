@@ -1,5 +1,6 @@
 //! Node sets by geometry: the nodes that lie in a box, about an axis, in a plane, or nearest to a point.
 
+use crate::model::Reference;
 use nalgebra::Vector3;
 
 /// Where the nodes of a set lie, in model axes.
@@ -53,6 +54,17 @@ impl Region {
             return all.into_iter().map(|(_, _, id)| id).collect();
         }
         nodes.filter(|(_, x)| self.holds(*x)).map(|(id, _)| id).collect()
+    }
+
+    /// Returns where the reference point of an interface in the region lies if no other is stated: on the axis of a
+    /// cylinder.
+    pub fn reference(&self) -> Reference {
+        match *self {
+            Self::Cylinder { from, to, .. } => {
+                Reference::Axis { point: from, direction: [0, 1, 2].map(|k| to[k] - from[k]) }
+            }
+            Self::Box { .. } | Self::Plane { .. } | Self::Nearest { .. } => Reference::Centre,
+        }
     }
 
     fn holds(&self, x: [f64; 3]) -> bool {

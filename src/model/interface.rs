@@ -38,9 +38,18 @@ impl Coupling {
 /// Where the reference point of an interface lies.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Reference {
-    /// At the mean of its nodes.
+    /// At the centre of its faces (weighted by area), else of its edges (by length), else at the mean of its nodes.
     #[default]
-    Mean,
+    Centre,
+    /// On an axis, at the middle of the extent of its nodes along it.
+    Axis {
+        /// A point of the axis, in model axes.
+        point: [f64; 3],
+        /// Its direction, of any length.
+        direction: [f64; 3],
+    },
+    /// In a checked model: where the default, [`Reference::Centre`] or [`Reference::Axis`], lies, in model axes.
+    Default([f64; 3]),
     /// Here, in model axes.
     Point([f64; 3]),
     /// At a node of the node table, with degrees of freedom or without.
@@ -58,12 +67,36 @@ pub struct NodeSet {
     pub coupling: Option<Coupling>,
     /// Its reference point; in a checked model a point, but of a free interface.
     pub reference: Reference,
+    /// Node numbers whose faces and edges have the default reference point, where these are more than `nodes`: a set of an
+    /// FE program may have nodes without rows. Empty: `nodes`.
+    pub outline: Vec<i64>,
+}
+
+impl Reference {
+    /// True if a user stated the point: a place or a node.
+    pub fn is_stated(&self) -> bool {
+        matches!(self, Self::Point(_) | Self::Node(_))
+    }
+
+    /// The place in model axes, where it is known.
+    pub fn point(&self) -> Option<[f64; 3]> {
+        match *self {
+            Self::Default(point) | Self::Point(point) => Some(point),
+            Self::Centre | Self::Axis { .. } | Self::Node(_) => None,
+        }
+    }
 }
 
 impl NodeSet {
-    /// A set without a stated coupling, its reference point at the mean of the nodes.
+    /// A set without a stated coupling and reference point.
     pub fn new(name: impl Into<String>, nodes: Vec<i64>) -> Self {
-        Self { name: name.into(), nodes, coupling: None, reference: Reference::default() }
+        Self {
+            name: name.into(),
+            nodes,
+            coupling: None,
+            reference: Reference::default(),
+            outline: Vec::new(),
+        }
     }
 
     /// The coupling where one is needed: averaging unless another was stated.

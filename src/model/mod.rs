@@ -16,6 +16,7 @@ mod fe_model;
 mod geometric_stiffness;
 mod inertial_rows;
 mod interface;
+mod interface_centre;
 mod layout;
 mod load_checks;
 mod local_mass;

@@ -1,7 +1,9 @@
 //! Reference points of interfaces: where they lie, and whether they can lie there.
 
-use super::{Coupling, Nodes, RawModel, Reference, centre_and_length};
+use super::interface_centre::{InterfaceCentre, InterfaceNodes};
+use super::{Coupling, Nodes, RawModel, Reference, centre_and_length, span};
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::numbers::significant;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
@@ -14,56 +16,104 @@ const FARTHEST: f64 = 100.0;
 const REACH: f64 = 3.0;
 const SMALLEST: f64 = 0.05;
 
+/// Distance of the default point of an interface from the mean of its nodes, relative to the largest distance of two of
+/// them, above which the interface is warned about; distances below this part of the body are rounding.
+const ASIDE: f64 = 0.01;
+const ROUNDING: f64 = 1e-9;
+
 /// Puts the places of reference points in place of what says where they are, and complains about those that
 /// cannot be.
 pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut Vec<Diagnostic>) {
     let (centre, size) = centre_and_length(&used.positions);
-    let places: HashMap<i64, [f64; 3]> =
-        raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
+    let body = Extent { centre, size };
+    let index: HashMap<i64, u32> = raw.nodes.ids.iter().copied().zip(0..).collect();
+    let positions = &raw.nodes.positions;
     for set in &mut raw.interfaces {
-        let name = &set.name;
-        if set.coupling == Some(Coupling::Free) && set.reference != Reference::Mean {
-            let message = format!("interface `{name}` is free, but has a reference point");
+        let is_free = set.coupling == Some(Coupling::Free);
+        if is_free && set.reference.is_stated() {
+            let message = format!("interface `{}` is free, but has a reference point", set.name);
             found.push(Diagnostic::new(Code::ManifestSyntax, message));
         }
+        let places = |ids: &[i64]| ids.iter().filter_map(|id| index.get(id)).copied().collect::<Vec<u32>>();
+        let nodes = places(&set.nodes);
+        let own: Vec<[f64; 3]> = nodes.iter().map(|&node| positions[node as usize]).collect();
         match set.reference {
-            Reference::Node(id) => match places.get(&id) {
-                Some(&place) => set.reference = Reference::Point(place),
+            Reference::Node(id) => match index.get(&id) {
+                Some(&node) => set.reference = Reference::Point(positions[node as usize]),
                 None => {
-                    let message = format!("reference node {id} of interface `{name}` is unknown");
+                    let message = format!("reference node {id} of interface `{}` is unknown", set.name);
                     found.push(Diagnostic::new(Code::InterfaceNode, message));
                 }
             },
-            Reference::Mean if set.coupling != Some(Coupling::Free) => {
-                let positions: Vec<[f64; 3]> =
-                    set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
-                set.reference = Reference::Point(centre_and_length(&positions).0);
+            Reference::Centre | Reference::Axis { .. } if !is_free => {
+                let mut outline = places(if set.outline.is_empty() { &set.nodes } else { &set.outline });
+                outline.sort_unstable();
+                outline.dedup();
+                let members = InterfaceNodes { nodes: &nodes, outline: &outline, positions };
+                let centre = InterfaceCentre::new(&members, raw.mesh.as_ref(), &set.reference);
+                found.extend(beside_the_mean(&set.name, &centre, &own, body.size));
+                set.reference = Reference::Default(centre.point);
             }
-            Reference::Mean | Reference::Point(_) => {}
+            _ => {}
         }
-        if let Reference::Point(x) = set.reference {
-            if x.iter().any(|x| !x.is_finite()) {
-                let message = format!("reference point of interface `{name}` is not finite");
-                found.push(Diagnostic::new(Code::CoordinateNotFinite, message));
-            } else if raw.dimension == 2 && x[2] != 0.0 {
-                let message =
-                    format!("reference point of interface `{name}` in a plane model has z = {}", x[2]);
-                found.push(Diagnostic::new(Code::DirectionOutOfPlane, message));
-            } else {
-                let away = (Vector3::from(x) - Vector3::from(centre)).norm() / size;
-                if away.is_nan() || away > FARTHEST {
-                    let message = format!(
-                        "reference point of interface `{name}` is {away:.1e} times the size of the body away from its middle"
-                    );
-                    let help = "it is in model axes and in the unit of length of the nodes";
-                    found.push(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help));
-                } else {
-                    let own = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect::<Vec<_>>();
-                    found.extend(far_reference(name, x, &own, size));
-                }
-            }
+        if let Some(x) = set.reference.point() {
+            let problem = impossible(&set.name, x, raw.dimension, &body);
+            found.extend(problem.or_else(|| far_reference(&set.name, x, &own, body.size)));
         }
     }
+}
+
+/// The nodes of a body: their mean, and the largest distance from it.
+struct Extent {
+    centre: [f64; 3],
+    size: f64,
+}
+
+/// Returns an error for a reference point that cannot be one.
+fn impossible(name: &str, reference: [f64; 3], dimension: u8, body: &Extent) -> Option<Diagnostic> {
+    if reference.iter().any(|x| !x.is_finite()) {
+        let message = format!("reference point of interface `{name}` is not finite");
+        return Some(Diagnostic::new(Code::CoordinateNotFinite, message));
+    }
+    if dimension == 2 && reference[2] != 0.0 {
+        let message =
+            format!("reference point of interface `{name}` in a plane model has z = {}", reference[2]);
+        return Some(Diagnostic::new(Code::DirectionOutOfPlane, message));
+    }
+    let away = (Vector3::from(reference) - Vector3::from(body.centre)).norm() / body.size;
+    (away.is_nan() || away > FARTHEST).then(|| {
+        let message = format!(
+            "reference point of interface `{name}` is {away:.1e} times the size of the body away from its middle"
+        );
+        let help = "it is in model axes and in the unit of length of the nodes";
+        Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
+    })
+}
+
+/// Returns a warning for a default reference point that is not the mean of the nodes, which was the default before.
+fn beside_the_mean(
+    name: &str,
+    centre: &InterfaceCentre,
+    nodes: &[[f64; 3]],
+    size: f64,
+) -> Option<Diagnostic> {
+    let away = (Vector3::from(centre.point) - Vector3::from(centre.mean)).norm();
+    let extent = span(nodes);
+    (away > ASIDE * extent && away > ROUNDING * size).then(|| {
+        let [point, mean] = [centre.point, centre.mean].map(|x| in_words(x, size));
+        let away = significant(away, 4);
+        let message = format!(
+            "interface `{name}`: the reference point is {}, at ({point}); the mean of its nodes, ({mean}), is {away} beside it, with an extent of {}",
+            centre.origin,
+            significant(extent, 4)
+        );
+        Diagnostic::new(Code::InterfaceCentre, message)
+    })
+}
+
+/// `120, 0, -3.25`: six digits, rounding beside `size` is zero.
+fn in_words(point: [f64; 3], size: f64) -> String {
+    point.map(|x| significant(if x.abs() <= ROUNDING * size { 0.0 } else { x }, 6)).join(", ")
 }
 
 /// A warning for a reference point that lies far from the nodes beside their own size, in a body of this

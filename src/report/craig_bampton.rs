@@ -11,6 +11,12 @@ const RIGHT: f64 = 0.01;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct CraigBamptonFacts {
     pub fixed_interface_modes: usize,
+    /// Number of fixed-interface modes that was asked for; `None`: not known, or all below a frequency.
+    pub fixed_interface_asked: Option<usize>,
+    /// Frequency below which all fixed-interface modes were asked for.
+    pub fixed_interface_asked_below_hz: Option<f64>,
+    /// Frequencies of the fixed-interface modes; `None`: the body keeps a part of the modes only, or an older file.
+    pub fixed_interface_hz: Option<Vec<f64>>,
     pub interface_motions: usize,
     pub rigid_modes: usize,
     /// Fixed-interface modes below `shift_hz` by the inertia count; `None`: not counted.
@@ -40,8 +46,13 @@ impl CraigBamptonFacts {
         let fixed = body.certificate().fixed_interface.as_ref()?;
         let (theta, nf) = (&body.modes().eigenvalue, body.n_modes());
         let hertz = |lambda: f64| body.units().frequency_of(lambda);
+        let asked = &body.source().settings;
         Some(Self {
             fixed_interface_modes: fixed.modes,
+            fixed_interface_asked: asked["modes"].as_u64().and_then(|count| usize::try_from(count).ok()),
+            fixed_interface_asked_below_hz: asked["max_eigenvalue"].as_f64().map(hertz),
+            fixed_interface_hz: fixed_interface_eigenvalues(body)
+                .map(|all| all.into_iter().map(hertz).collect()),
             interface_motions: fixed.interface_motions,
             rigid_modes: body.certificate().rigid_modes,
             counted: fixed.counted,
@@ -57,10 +68,20 @@ impl CraigBamptonFacts {
         })
     }
 
-    /// `10 fixed-interface modes + 12 interface motions - 6 rigid-body motions`.
+    /// Returns the frequencies of the fixed-interface modes, where there are some and they are known.
+    pub fn held_hz(&self) -> Option<&[f64]> {
+        self.fixed_interface_hz.as_deref().filter(|hz| !hz.is_empty())
+    }
+
+    /// `10 fixed-interface modes (10 asked for) + 12 interface motions - 6 rigid-body motions`.
     pub fn made_of(&self) -> String {
+        let asked = match (self.fixed_interface_asked, self.fixed_interface_asked_below_hz) {
+            (Some(count), _) => format!(" ({count} asked for)"),
+            (None, Some(hertz)) => format!(" (all below {} Hz asked for)", significant(hertz, 5)),
+            (None, None) => String::new(),
+        };
         format!(
-            "{} + {} - {}",
+            "{}{asked} + {} - {}",
             counted(self.fixed_interface_modes, "fixed-interface mode"),
             counted(self.interface_motions, "interface motion"),
             counted(self.rigid_modes, "rigid-body motion")
@@ -90,6 +111,13 @@ impl CraigBamptonFacts {
             percent(self.too_high[good])
         )
     }
+}
+
+/// Returns the eigenvalues of the fixed-interface modes, which stand in the stiffness matrix of the interface coordinates.
+fn fixed_interface_eigenvalues(body: &FlexBody) -> Option<Vec<f64>> {
+    let coordinates = body.coordinates()?;
+    let first = body.certificate().fixed_interface.as_ref()?.interface_motions;
+    Some((first..coordinates.names.len()).map(|i| coordinates.stiffness[(i, i)]).collect())
 }
 
 /// What is proved of the fixed-interface modes of a body.

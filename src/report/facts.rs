@@ -6,7 +6,7 @@ use super::geometric_stiffness::{GeometricStiffnessFacts, InertiaStiffnessFacts,
 use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
-use super::numbers::{counted, percent, significant};
+use super::numbers::{coordinates, counted, percent, significant};
 use super::run_data::{Phase, RunData};
 use super::term_facts::TermFacts;
 use crate::base::diagnostic::Diagnostic;
@@ -17,7 +17,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 5;
+const MINOR: u32 = 6;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -116,6 +116,8 @@ pub(super) struct InterfaceFacts {
     pub coupling: Option<&'static str>,
     /// Body frame; `None`: no reference point.
     pub reference: Option<[f64; 3]>,
+    /// The same point in model axes.
+    pub reference_model: Option<[f64; 3]>,
     /// Largest deformation of the interface in a mode, relative to its largest motion in any; `None`: no
     /// reference point.
     pub deformation: Option<f64>,
@@ -130,6 +132,7 @@ impl InterfaceFacts {
             n_nodes: interface.nodes.len(),
             coupling: interface.coupling.map(|coupling| coupling.name()),
             reference: interface.reference,
+            reference_model: interface.reference.map(|x| body.frame().to_model(x)),
             deformation: rows.map(|rows| rows.deformation().1),
         }
     }
@@ -139,15 +142,24 @@ impl InterfaceFacts {
         self.coupling == Some("rigid") && self.deformation.is_some_and(|part| part > RIGID)
     }
 
-    /// `80 nodes, rigid`, `3 nodes, averaging, deforms by up to 12 %`.
-    pub fn in_words(&self) -> String {
+    /// `, at 0, 0, 12.5 mm`: the reference point in model axes; empty without one. Coordinates that are rounding beside
+    /// `size` are zero.
+    pub fn place_in_words(&self, size: f64, unit: &str) -> String {
+        let place = |x: [f64; 3]| format!(", at {}", coordinates(&x, size, unit));
+        self.reference_model.map_or_else(String::new, place)
+    }
+
+    /// `80 nodes, rigid, at 0, 0, 12.5 mm`, `3 nodes, averaging, at 1, 0, 0 mm, deforms by up to 12 %`; `size` and `unit`
+    /// as of [`Self::place_in_words`].
+    pub fn in_words(&self, size: f64, unit: &str) -> String {
+        let place = self.place_in_words(size, unit);
         let coupling = self.coupling.map_or(String::new(), |name| format!(", {name}"));
         let deforms = match self.deformation {
             Some(part) if part > RIGID => format!(", deforms by up to {} of its motion", percent(part)),
             Some(_) => ", moves as a rigid body".to_owned(),
             None => String::new(),
         };
-        format!("{}{coupling}{deforms}", counted(self.n_nodes, "node"))
+        format!("{}{coupling}{place}{deforms}", counted(self.n_nodes, "node"))
     }
 }
 
@@ -177,7 +189,7 @@ pub(super) struct ModeFacts {
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
     /// Of nodes whose rotations carry mass.
     pub inertia_stiffness: Option<InertiaStiffnessFacts>,
-    /// Spin about each body axis that takes 1 % of the stiffness of a motion, where W2 is held without
+    /// Spin about each axis of the model that takes 1 % of the stiffness of a motion, where W2 is held without
     /// geometric stiffness for spin.
     pub softening_hz: Option<[Option<f64>; 3]>,
 }

@@ -3,6 +3,7 @@
 use super::numbers::significant;
 use crate::body::flex_body::{FlexBody, LoadKind};
 use crate::body::invariants::relative_norm;
+use nalgebra::Matrix3;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -11,25 +12,32 @@ pub(super) struct GeometricStiffnessFacts {
     pub load: String,
     /// By which part of its own a unit of the load changes the stiffness of any motion at the most.
     pub relative_norm: f64,
+    /// True if the axes of the body are not those of the model.
+    #[serde(skip)]
+    is_turned: bool,
 }
 
 impl GeometricStiffnessFacts {
     pub fn of(body: &FlexBody) -> Vec<Self> {
         let stiffness = body.invariants().modal_stiffness().as_ref();
+        let is_turned = body.frame().axes != Matrix3::identity();
         body.geometric_stiffness()
             .iter()
             .map(|one| Self {
                 load: one.load.to_string(),
                 relative_norm: relative_norm(one.matrix.as_ref(), stiffness).unwrap_or(f64::NAN),
+                is_turned,
             })
             .collect()
     }
 
-    /// `spin xx: up to 1.2e-3 of the stiffness of a motion per unit`.
+    /// `spin xx: up to 1.2e-3 of the stiffness of a motion per unit`; of axes that are not the model's `spin xx (body
+    /// axes): ...`.
     pub fn in_words(&self) -> String {
         format!(
-            "{}: up to {} of the stiffness of a motion per unit",
+            "{}{}: up to {} of the stiffness of a motion per unit",
             self.load,
+            if self.is_turned { " (body axes)" } else { "" },
             significant(self.relative_norm, 3)
         )
     }
@@ -67,7 +75,7 @@ impl InertiaStiffnessFacts {
     }
 }
 
-/// Spin about each body axis, in hertz, at which the centrifugal term takes 1 % of the stiffness of the
+/// Spin about each axis of the model, in hertz, at which the centrifugal term takes 1 % of the stiffness of the
 /// motion that it softens most. Nothing for a body with geometric stiffness for spin, or without W2; no
 /// number where nothing moves across the axis, nor about axes that a plane body does not spin about.
 pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
@@ -81,7 +89,7 @@ pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
     })
 }
 
-/// `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z)`.
+/// `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z of the model)`.
 pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     let axes = ["x", "y", "z"].into_iter().zip(hertz);
     let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
@@ -90,5 +98,9 @@ pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
     }
     let rates: Vec<String> = known.iter().map(|(_, hz)| significant(*hz, 3)).collect();
     let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
-    format!("no geometric stiffness: 1 % softer at {} Hz ({})", rates.join(", "), axes.join(", "))
+    format!(
+        "no geometric stiffness: 1 % softer at {} Hz ({} of the model)",
+        rates.join(", "),
+        axes.join(", ")
+    )
 }

@@ -16,7 +16,7 @@ pub(super) fn body(html: &mut String, facts: &Facts<'_>, panel: Option<&str>) {
     terms_in_markup(html, properties(facts));
     html.push_str("</div>\n</div>\n");
     limits(html, &facts.model);
-    interfaces(html, &facts.model);
+    interfaces(html, facts);
 }
 
 /// Three numbers on lines of their own would tear a table apart: they wrap between each other.
@@ -28,7 +28,7 @@ fn triple(values: &[f64; 3], unit: &str) -> String {
 fn properties(facts: &Facts<'_>) -> Vec<(String, String)> {
     let (model, body) = (&facts.model, &facts.body);
     let units = &model.units;
-    let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
+    let size = body.size();
     let centre = body.centre_of_mass.map(|x| if x.abs() <= 1e-12 * size { 0.0 } else { x });
     let [x, y, z] = body.frame_axes.map(|row| row.map(|v| significant(v, 6)).join(", "));
     let mut items = vec![
@@ -104,12 +104,14 @@ fn limits(html: &mut String, model: &ModelFacts) {
     }
 }
 
-fn interfaces(html: &mut String, model: &ModelFacts) {
+fn interfaces(html: &mut String, facts: &Facts<'_>) {
+    let model = &facts.model;
     if model.interfaces.is_empty() {
         return;
     }
+    let (size, unit) = (facts.body.size(), model.units.length());
     let row = |interface: &super::facts::InterfaceFacts| {
-        let words = escape(&interface.in_words());
+        let words = escape(&interface.in_words(size, &unit));
         let words = match interface.breaks_its_word() {
             true => format!("<span class=\"warning\">{words}</span>"),
             false => words,
@@ -119,5 +121,5 @@ fn interfaces(html: &mut String, model: &ModelFacts) {
     let rows: Vec<_> = model.interfaces.iter().map(row).collect();
     section(html, &word_as("interface", "Interfaces"));
     let caption = format!("{}, in the order of the file", counted(rows.len(), "interface"));
-    table(html, &caption, &texts(["Name", "Nodes and coupling"]), &[0, 1], &rows);
+    table(html, &caption, &texts(["Name", "Nodes, coupling, reference point (model axes)"]), &[0, 1], &rows);
 }

@@ -141,6 +141,15 @@ fn frequencies(html: &mut String, facts: &Facts<'_>) {
         None => "Flexible modes, ascending",
     };
     table(html, caption, &columns.head(&facts.model.units.time), &columns.of_text(), &rows);
+    fixed_interface_frequencies(html, &facts.modes);
+}
+
+/// The table of the fixed-interface modes of a Craig-Bampton body.
+fn fixed_interface_frequencies(html: &mut String, modes: &ModeFacts) {
+    let Some(hz) = modes.craig_bampton.as_ref().and_then(|own| own.held_hz()) else { return };
+    let rows: Vec<_> = (1..).zip(hz).map(|(j, hz)| vec![format!("{j}"), significant(*hz, 8)]).collect();
+    let caption = "Fixed-interface modes that the basis has: natural frequencies with all interfaces held";
+    table(html, caption, &texts(["Fixed-interface mode", "Frequency (Hz)"]), &[], &rows);
 }
 
 /// The columns that the table of the modes has.

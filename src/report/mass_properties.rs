@@ -32,6 +32,11 @@ pub(super) struct MassProperties {
 }
 
 impl MassProperties {
+    /// Returns the largest radius of gyration: coordinates that are rounding beside it are shown as zero.
+    pub fn size(&self) -> f64 {
+        self.radii_of_gyration.iter().copied().fold(0.0, f64::max)
+    }
+
     pub fn of(body: &FlexBody) -> Self {
         let (invariants, frame) = (body.invariants(), body.frame());
         let inertia = inertia_about_com(invariants);
@@ -58,9 +63,10 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
         (false, true) => "origin of the model",
         (false, false) => "origin off the centre of mass",
     };
-    let axes = match (largest_product(inertia) <= PRINCIPAL, frame.axes == Matrix3::identity()) {
-        (true, _) => "principal axes",
-        (false, true) => "axes of the model",
+    let axes = match (frame.axes == Matrix3::identity(), largest_product(inertia) <= PRINCIPAL) {
+        (true, true) => "axes of the model, which are principal",
+        (true, false) => "axes of the model",
+        (false, true) => "principal axes",
         (false, false) => "axes neither principal nor of the model",
     };
     let turned = turned_degrees(&frame.axes);

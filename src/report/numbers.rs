@@ -32,6 +32,17 @@ pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
+/// Three values and their unit.
+pub(super) fn triple(values: &[f64; 3], unit: &str) -> String {
+    let [x, y, z] = values.map(|v| significant(v, 6));
+    format!("{x}, {y}, {z} {unit}")
+}
+
+/// Three coordinates; what is rounding compared with `size` is zero.
+pub(super) fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
+    triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
+}
+
 /// Text of a file for one line of a terminal or a page: what could steer a terminal or turn the direction of
 /// the text is replaced.
 pub(super) fn plain(text: &str) -> String {

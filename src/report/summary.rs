@@ -5,8 +5,8 @@ use super::Facts;
 use super::facts::{InterfaceFacts, RunFacts};
 use super::geometric_stiffness::softening_in_words;
 use super::lumped_effect::scheme_in_words;
-use super::numbers::{bytes, counted, duration, plain, significant};
-use super::text::{LABEL, WIDTH, coordinates, entry_lines, own_modes, triple};
+use super::numbers::{bytes, coordinates, counted, duration, plain, significant, triple};
+use super::text::{LABEL, WIDTH, entry_lines, first_and_last, own_modes};
 use crate::base::diagnostic::Severity;
 
 /// Entries of a list that are shown.
@@ -156,23 +156,25 @@ fn body(summary: &mut Summary, facts: &Facts<'_>) {
         summary.entry(Tone::Warning, "storage", rounded, 2);
     }
     if !model.interfaces.is_empty() {
-        let all: Vec<String> = model.interfaces.iter().map(interface).collect();
+        let (size, unit) = (facts.body.size(), model.units.length());
+        let all: Vec<String> = model.interfaces.iter().map(|one| interface(one, size, &unit)).collect();
         let bends = model.interfaces.iter().any(InterfaceFacts::breaks_its_word);
         let tone = if bends { Tone::Warning } else { Tone::Plain };
-        summary.entry(tone, "interfaces", &all.join("; "), if bends { 4 } else { 2 });
+        summary.entry(tone, "interfaces", &all.join("; "), if bends { 6 } else { 4 });
     }
 }
 
-/// `bore: 80 nodes, rigid`.
-fn interface(interface: &InterfaceFacts) -> String {
+/// `bore: 80 nodes, rigid, at 0, 0, 12.5 mm`; the point in model axes.
+fn interface(interface: &InterfaceFacts, size: f64, unit: &str) -> String {
     let coupling = interface.coupling.map_or(String::new(), |name| format!(", {name}"));
     let bends = if interface.breaks_its_word() { " but DEFORMS" } else { "" };
-    format!("{}: {}{coupling}{bends}", plain(&interface.name), counted(interface.n_nodes, "node"))
+    let place = interface.place_in_words(size, unit);
+    format!("{}: {}{coupling}{bends}{place}", plain(&interface.name), counted(interface.n_nodes, "node"))
 }
 
 fn mass_properties(summary: &mut Summary, facts: &Facts<'_>) {
     let (body, units) = (&facts.body, &facts.model.units);
-    let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
+    let size = body.size();
     let centre = coordinates(&body.centre_of_mass, size, &units.length());
     let inertia = triple(&body.principal_inertia, &units.inertia());
     let mass = format!("{} {} at {centre} (model axes)", significant(body.mass, 6), units.mass());
@@ -188,10 +190,19 @@ fn modes(summary: &mut Summary, facts: &Facts<'_>) {
         [first, .., last] => format!(", {} to {} Hz", significant(*first, 5), significant(*last, 5)),
     };
     let origins = modes.origins();
-    let kinds: Vec<String> =
-        origins.iter().map(|(origin, count)| format!("{count} x {}", plain(origin))).collect();
-    let kinds = if kinds.is_empty() { String::new() } else { format!(" ({})", kinds.join(", ")) };
+    let kinds = match &modes.craig_bampton {
+        // Modes of the body are mixtures of fixed-interface modes and motions of the interfaces.
+        Some(own) => format!(": {}", own.made_of()),
+        None if origins.is_empty() => String::new(),
+        None => {
+            let kinds = origins.iter().map(|(origin, count)| format!("{count} x {}", plain(origin)));
+            format!(" ({})", kinds.collect::<Vec<_>>().join(", "))
+        }
+    };
     summary.entry(Tone::Plain, "modes", &format!("{} flexible{range}{kinds}", modes.count), 3);
+    if let Some(hz) = modes.craig_bampton.as_ref().and_then(|own| own.held_hz()) {
+        summary.entry(Tone::Plain, "held", &format!("{} (fixed-interface modes)", first_and_last(hz)), 2);
+    }
     let proof = completeness.sentence.strip_prefix("proved: ");
     match (completeness.verdict, proof) {
         ("proved", Some(proof)) => summary.entry(Tone::Good, "proved", proof, 4),

@@ -4,7 +4,7 @@ use super::Facts;
 use super::facts::RunFacts;
 use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
-use super::numbers::{bytes, counted, duration, percent, plain, significant};
+use super::numbers::{bytes, coordinates, counted, duration, percent, plain, significant, triple};
 use crate::base::diagnostic::{Diagnostic, Severity};
 
 /// Columns of a terminal that every terminal has.
@@ -110,16 +110,6 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
     lines
 }
 
-pub(super) fn triple(values: &[f64; 3], unit: &str) -> String {
-    let [x, y, z] = values.map(|v| significant(v, 6));
-    format!("{x}, {y}, {z} {unit}")
-}
-
-/// Three coordinates; what is rounding compared with `size` is zero.
-pub(super) fn coordinates(values: &[f64; 3], size: f64, unit: &str) -> String {
-    triple(&values.map(|v| if v.abs() <= 1e-12 * size { 0.0 } else { v }), unit)
-}
-
 fn heading(page: &mut Page, facts: &Facts<'_>) {
     let (model, body) = (&facts.model, &facts.body);
     let units = &model.units;
@@ -138,35 +128,48 @@ fn heading(page: &mut Page, facts: &Facts<'_>) {
         page.entry("", &format!("body {} of {} in the matrices", body.number, body.of));
     }
     page.entry("mass", &format!("{} {}", significant(body.mass, 6), units.mass()));
-    let size = body.radii_of_gyration.iter().copied().fold(0.0, f64::max);
+    let size = body.size();
     let centre = coordinates(&body.centre_of_mass, size, &units.length());
     page.entry("centre", &format!("{centre} (of mass, model axes)"));
     page.entry("inertia", &format!("{} (principal)", triple(&body.principal_inertia, &units.inertia())));
     page.entry("gyration", &format!("{} (radii)", triple(&body.radii_of_gyration, &units.length())));
     page.entry("frame", &body.frame);
-    page.list("interface", &model.interfaces, |i| format!("{}: {}", plain(&i.name), i.in_words()));
+    let length = units.length();
+    page.list("interface", &model.interfaces, |i| {
+        format!("{}: {}", plain(&i.name), i.in_words(size, &length))
+    });
+}
+
+/// `812.5 812.5 1204 1890.2 2411 3020 ... 4412.5 Hz`.
+pub(super) fn first_and_last(hz: &[f64]) -> String {
+    let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
+    let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
+    let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
+    let last = last.map_or(String::new(), |f| format!("{dots} {}", significant(*f, 5)));
+    format!("{}{last} Hz", shown.join(" "))
 }
 
 fn modes(page: &mut Page, facts: &Facts<'_>) {
     let modes = &facts.modes;
     let hz = &modes.frequency_hz;
-    let shown: Vec<String> = hz.iter().take(FIRST_FREQUENCIES).map(|f| significant(*f, 5)).collect();
-    let last = hz.last().filter(|_| hz.len() > FIRST_FREQUENCIES);
-    let dots = if hz.len() > FIRST_FREQUENCIES + 1 { " ..." } else { "" };
-    let last = last.map_or(String::new(), |f| format!("{dots} {}", significant(*f, 5)));
     let accuracy = facts.run.as_ref().map(|run| plain(&run.accuracy)).filter(|name| !name.is_empty());
     let accuracy = accuracy.map_or(String::new(), |name| format!(", {name} accuracy"));
     let residual = significant(modes.worst_residual, 2);
     let whose = modes.whose_residual();
     page.entry("modes", &format!("{} flexible, worst residual {residual}{whose}{accuracy}", modes.count));
-    page.entry("frequency", &format!("{}{last} Hz", shown.join(" ")));
+    page.entry("frequency", &first_and_last(hz));
     if let Some(basis) = facts.model.settings["basis"].as_str().filter(|basis| *basis != "free") {
         let made_of = modes.craig_bampton.as_ref().map_or(String::new(), |cb| format!(": {}", cb.made_of()));
         page.entry("basis", &format!("{}{made_of}", plain(basis)));
     }
+    if let Some(hz) = modes.craig_bampton.as_ref().and_then(|own| own.held_hz()) {
+        page.entry("held", &format!("{} (fixed-interface modes)", first_and_last(hz)));
+    }
     let origins = modes.origins();
-    page.list("origin", &origins, |(origin, count)| {
-        format!("{}: {}", counted(*count, "mode"), plain(origin))
+    page.list("origin", &origins, |(origin, count)| match modes.craig_bampton {
+        // The modes of the body are mixtures.
+        Some(_) => format!("{} with the largest share of a {}", counted(*count, "mode"), plain(origin)),
+        None => format!("{}: {}", counted(*count, "mode"), plain(origin)),
     });
     page.list("static", &modes.truncation, |t| {
         let (before, after) = (significant(t.before, 2), significant(t.after, 2));

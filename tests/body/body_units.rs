@@ -100,7 +100,7 @@ fn interfaces_and_identities_come_along_and_the_way_back_is_the_body() {
     let body: FlexBody = convert(&model, &settings, SILENT).expect("converts").body;
     assert!(body.coordinates().is_some() && body.interfaces().iter().any(|i| i.reference.is_some()));
     let there = body.in_units(&other()).expect("a body");
-    let failed: Vec<_> = there.identities(BodyFrame::Principal).into_iter().filter(|c| !c.passed).collect();
+    let failed: Vec<_> = there.identities(BodyFrame::Com).into_iter().filter(|c| !c.passed).collect();
     assert!(failed.is_empty(), "{failed:?}");
     let back = there.in_units(body.units()).expect("a body");
     let (a, b) = (body.coordinates().expect("there"), back.coordinates().expect("there"));

@@ -2,6 +2,8 @@
 //! type.
 
 mod free_body;
+mod sharing;
+mod slender;
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::mesh::Mesh;
@@ -24,6 +26,7 @@ use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
 use flexbody::numerics::linalg::{CscMatrix, gram};
 use nalgebra::DMatrix;
+use std::collections::HashSet;
 use std::path::Path;
 
 const CELL: f64 = 0.05;
@@ -39,7 +42,8 @@ fn bracket(couplings: [Coupling; 2]) -> RawModel {
     let turned = mesh.moved(&crate::support::random::Random(3).rotation(), [0.7, -0.2, 1.1]);
     let mut raw = turned.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let far = Reference::Point([0.5, 0.3, 0.9]);
-    let references = [Reference::Mean, if couplings[1] == Coupling::Free { Reference::Mean } else { far }];
+    let references =
+        [Reference::Centre, if couplings[1] == Coupling::Free { Reference::Centre } else { far }];
     raw.interfaces = ["first", "second"]
         .into_iter()
         .zip(sets)
@@ -76,7 +80,8 @@ const COUPLINGS: [[Coupling; 2]; 5] = [
 ];
 
 fn models() -> Vec<RawModel> {
-    COUPLINGS.into_iter().flat_map(|c| [bracket(c), strip(c)]).collect()
+    let apart = COUPLINGS.into_iter().flat_map(|c| [bracket(c), strip(c)]);
+    apart.chain(sharing::models()).collect()
 }
 
 /// The same from definitions, dense: K, M, D, a basis Z of what leaves the interface coordinates zero, and
@@ -98,6 +103,13 @@ impl Dense {
         let mut motion: Vec<Vec<f64>> = Vec::new();
         let mut weights: Vec<Vec<f64>> = Vec::new();
         let mut constraints: Vec<Vec<f64>> = Vec::new();
+        // Nodes whose displacements an interface prescribes do not follow the mean of another.
+        let prescribed: HashSet<i64> = raw
+            .interfaces
+            .iter()
+            .filter(|set| set.coupling != Some(Coupling::Averaging))
+            .flat_map(|set| set.nodes.iter().copied())
+            .collect();
         for set in &raw.interfaces {
             let nodes: Vec<usize> = set.nodes.iter().map(|id| (*id - 1) as usize).collect();
             let rows: Vec<usize> = nodes.iter().flat_map(|i| (0..d).map(move |c| d * i + c)).collect();
@@ -122,8 +134,10 @@ impl Dense {
                 let r = rigid(&nodes.iter().map(|&i| x[i]).collect::<Vec<_>>(), d, reference);
                 let normal = r.transpose() * &r;
                 let a = normal.partial_piv_lu().solve(r.transpose()).transpose().to_owned();
+                let follows =
+                    |i: usize| coupling == Coupling::Rigid || !prescribed.contains(&set.nodes[i / d]);
                 for j in 0..r.ncols() {
-                    motion.push(column(&|i| r[(i, j)]));
+                    motion.push(column(&|i| if follows(i) { r[(i, j)] } else { 0.0 }));
                     weights.push(column(&|i| a[(i, j)]));
                 }
             }
@@ -141,7 +155,10 @@ impl Dense {
         let matrix = |columns: &[Vec<f64>]| Mat::from_fn(n, columns.len(), |i, j| columns[j][i]);
         let held = complement(&matrix(&constraints));
         let rigid = rigid(x, d, [0.0; 3]);
-        Self { k, m, motion: matrix(&motion), held, weights: matrix(&weights), rigid }
+        let (motion, weights) = (matrix(&motion), matrix(&weights));
+        let free = |row: usize| !prescribed.contains(&((row / d) as i64 + 1));
+        let motion = sharing::with_unit_coordinates(motion, &weights, free);
+        Self { k, m, motion, held, weights, rigid }
     }
 
     /// Eigenvalues of K, M within the span of `basis`, ascending, without the zero ones.
@@ -500,7 +517,7 @@ fn the_span_does_not_depend_on_the_reference_points() {
         let near = craig_bampton(&model(bracket(*couplings)), 5).solution;
         let mut raw = bracket(*couplings);
         raw.interfaces[0].reference = Reference::Node(raw.nodes.ids[0]);
-        raw.interfaces[1].reference = Reference::Mean;
+        raw.interfaces[1].reference = Reference::Centre;
         let far = craig_bampton(&model(raw), 5).solution;
         for (a, b) in near.eigenvalues.iter().zip(&far.eigenvalues) {
             close(*a, *b, 1e-10, "lambda");

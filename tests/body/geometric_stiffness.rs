@@ -338,9 +338,11 @@ fn a_spinning_beam_stiffens_as_its_centrifugal_tension_says_and_softens_without(
 
 #[test]
 fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_warn() {
+    let turn = Rotation3::from_euler_angles(-0.8, 0.4, 2.0);
     let case = Case::skew_block();
+    let case = Case::new(case.mesh.moved(turn.matrix(), [1.0, 2.0, 3.0]), case.material);
     let centrifugal = || BasisChoice::Free(FreeSurface { residual_vectors: vec![Loads::Centrifugal] });
-    let done = run(case.raw(Vec::new()), BodyFrame::Principal, centrifugal()).expect("a sound body");
+    let done = run(case.raw(Vec::new()), BodyFrame::Com, centrifugal()).expect("a sound body");
     let warning = done.diagnostics.iter().find(|d| d.code() == Code::GeometricStiffnessNone);
     let invariants = done.body.invariants();
     let rates: Vec<f64> = (0..3).map(|k| done.body.softening_rate(k).expect("moves")).collect();
@@ -354,6 +356,18 @@ fn without_geometric_stiffness_the_report_tells_the_rate_and_centrifugal_loads_w
             assert_eq!(lowest < 0.0, lost, "axis {axis}, {part}: {lowest:e}");
         }
     }
+    // The axes are those of the model, whatever the frame of the body is.
+    let turned = run(case.raw(Vec::new()), BodyFrame::Principal, centrifugal()).expect("a sound body");
+    assert!((turned.body.frame().axes - nalgebra::Matrix3::identity()).amax() > 0.1);
+    for (axis, rate) in rates.iter().enumerate() {
+        let other = turned.body.softening_rate(axis).expect("moves");
+        assert!((other / rate - 1.0).abs() < 1e-9, "axis {axis}: {rate} {other}");
+    }
+    let words = |found: &[flexbody::base::diagnostic::Diagnostic]| {
+        let told = found.iter().find(|d| d.code() == Code::GeometricStiffnessNone).expect("a warning");
+        told.message().to_owned()
+    };
+    assert_eq!(words(&done.diagnostics), words(&turned.diagnostics));
     // About no axis is the rate lower than the one that is told, and about some axis it is as low.
     let message = warning.expect("a warning").message();
     let words: Vec<&str> = message.split_whitespace().collect();
@@ -414,7 +428,7 @@ fn file_reports_and_recomputation_hold_what_was_given() {
     assert_eq!(told["load"], "spin xx");
     assert!((told["relative_norm"].as_f64().expect("a number") / norm - 1.0).abs() < 1e-9);
     assert!(render(&facts, Format::Html).contains("force z at `tip`"));
-    assert!(render(&facts, Format::Text).contains("spin xz: up to"));
+    assert!(render(&facts, Format::Text).contains("spin xz (body axes): up to"));
 
     let model = FeModel::from_raw(raw.clone()).expect("sound").model;
     let checks = verify(&body, &model).expect("the same nodes");

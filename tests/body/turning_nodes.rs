@@ -508,7 +508,8 @@ fn a_cantilever_with_an_offset_mass_has_the_closed_form() {
         name: name.to_owned(),
         nodes: vec![node],
         coupling: Some(Coupling::Rigid),
-        reference: Reference::Mean,
+        reference: Reference::Centre,
+        outline: Vec::new(),
     };
     raw.interfaces = vec![set("root", 1), set("tip", 5)];
     let model = FeModel::from_raw(raw).expect("a body").model;

@@ -278,7 +278,7 @@ fn a_whole_model_is_read_with_its_fingerprints() {
         name: name.into(),
         nodes,
         coupling: None,
-        reference: flexbody::model::Reference::Mean,
+        reference: flexbody::model::Reference::Centre,
     };
     files.interfaces = vec![
         interface("tip", InterfaceNodes::Listed(vec![40])),

@@ -2,6 +2,7 @@
 
 use crate::input_fuzz::{apply, damage};
 use crate::support::program::{fixtures, flexbody};
+use flexbody::base::diagnostic::Code;
 use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
@@ -19,7 +20,7 @@ pub(crate) fn set(name: &str, set: &str) -> InterfaceSource {
         name: name.to_owned(),
         nodes,
         coupling: Some(Coupling::Rigid),
-        reference: Reference::Mean,
+        reference: Reference::Centre,
     }
 }
 
@@ -90,6 +91,51 @@ fn a_job_of_calculix_is_read_with_its_internal_rows_and_rotations() {
     let names: Vec<&str> = raw.sources.iter().map(|source| source.name.as_str()).collect();
     assert_eq!(names, ["job.inp", "nodes.inp", "job.sti", "job.mas", "job.dof"]);
     assert_is_the_block(&body(raw, 6));
+}
+
+/// The reference node of a distributing coupling is the weighted mean of its nodes, wherever the deck puts it: the body is
+/// that of the block without the coupling, in other coordinates.
+#[test]
+fn a_distributing_coupling_has_its_node_at_the_mean_of_its_nodes() {
+    let raw = job(&small("calculix_distributing"), Vec::new());
+    let told: Vec<_> = raw.diagnostics.iter().map(|told| (told.code(), told.message().to_owned())).collect();
+    assert!(
+        matches!(&told[..], [(Code::DeckReference, message)] if message.contains("900 at (0, 0.048, 0.024)")),
+        "{told:?}"
+    );
+    let at = raw.nodes.ids.iter().position(|id| *id == 900).expect("the reference node");
+    let place = raw.nodes.positions[at];
+    assert!(place.iter().zip([0.0, 0.048, 0.024]).all(|(a, b)| (a - b).abs() < 1e-16), "{place:?}");
+    let (coupled, free) = (body(raw, 8), body(job(&small("abaqus"), Vec::new()), 8));
+    assert_is_the_block(&coupled);
+    for (a, b) in coupled.modes().eigenvalue.iter().zip(&free.modes().eigenvalue) {
+        assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
+    }
+    // The first node of the coupling has no rows: an interface has three nodes, about the centre of all four.
+    let end = job(&small("calculix_distributing"), vec![set("end", "left")]);
+    let model = FeModel::from_raw(end).expect("a body").model;
+    assert_eq!(model.interfaces()[0].nodes, [17, 14, 20]);
+    let point = model.interfaces()[0].reference.point().expect("a point");
+    assert!(point.iter().zip([0.0, 0.04, 0.03]).all(|(a, b)| (a - b).abs() < 1e-16), "{point:?}");
+    // What names no reference node, or no nodes, is refused with its line.
+    let place = tempfile::tempdir().expect("a folder");
+    copy_job("calculix_distributing", place.path());
+    let deck = place.path().join("job.inp");
+    let text = fs::read_to_string(&deck).expect("the deck");
+    for (from, to, said) in [
+        ("ELSET=MEAN\n11", "ELSET=NONE\n11", "element set `NONE` is unknown"),
+        ("ELSET=MEAN\n11", "ELSET=BRICKS\n11", "is not one element of type DCOUP3D"),
+        ("REST, 1.", "REST", "`REST` is not a node or node set and its weight"),
+        ("REST, 1.", "NOWHERE, 1.", "`NOWHERE, 1.` is not a node"),
+        ("REST, 1.", "REST, -1.5", "add up to zero"),
+        ("REST, 1.", "REST, nan", "is not a node"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        fs::write(&deck, text.replace(from, to)).expect("written");
+        let files = ModelFiles::from_job(&deck, None, Vec::new(), Some("m,kg,s")).expect("units");
+        let error = read_model(&files).expect_err(to);
+        assert!(error.has(Code::DeckUnsupported) && error.to_string().contains(said), "{error}");
+    }
 }
 
 /// Each of two kinematic couplings gives its reference node the rotations that CalculiX labels as displacements

@@ -9,6 +9,7 @@ mod input_hdf5;
 mod input_readers;
 mod input_tables;
 mod interface_names;
+mod interface_points;
 mod jobs;
 mod manifest_settings;
 mod mesh;

@@ -18,7 +18,7 @@ pub fn tetrahedron(nodes: &Path, dofs: Option<&Path>, sets: &[&str]) -> Result<R
         name: (*name).to_owned(),
         nodes: InterfaceNodes::Set((*name).to_owned()),
         coupling: None,
-        reference: Reference::Mean,
+        reference: Reference::Centre,
     };
     files.interfaces = sets.iter().map(interface).collect();
     read_model(&files)

@@ -389,7 +389,7 @@ fn a_reference_point_far_from_its_nodes_is_told() {
         let set = NodeSet { coupling: Some(Coupling::Rigid), reference, ..NodeSet::new("bolt", nodes) };
         told(RawModel { interfaces: vec![set], ..raw.clone() })
     };
-    assert_eq!(with(Reference::Mean), []);
+    assert_eq!(with(Reference::Centre), []);
     assert_eq!(with(Reference::Point([300.0, 0.0, 0.0])), [Code::InterfaceFar]);
 }
 

@@ -26,7 +26,7 @@ fn bracket() -> FlexBody {
     };
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     raw.interfaces =
-        vec![set("first", 0, Reference::Mean), set("second", 2, Reference::Point([0.1, 0.05, 0.3]))];
+        vec![set("first", 0, Reference::Centre), set("second", 2, Reference::Point([0.1, 0.05, 0.3]))];
     body_of(raw, 8, BodyFrame::Principal)
 }
 

@@ -264,10 +264,10 @@ fn mass_properties_do_not_depend_on_the_body_frame() {
         );
     }
     let words = |facts: &serde_json::Value| facts["body"]["frame"].as_str().unwrap().to_owned();
-    assert_eq!(words(&principal), "origin at the centre of mass, principal axes");
+    assert_eq!(words(&principal), "origin at the centre of mass, axes of the model, which are principal");
     // The sides of the cuboid are along the model axes: they are principal, too.
-    assert_eq!(words(&com), "origin at the centre of mass, principal axes");
-    assert_eq!(words(&model), "origin of the model, principal axes");
+    assert_eq!(words(&com), "origin at the centre of mass, axes of the model, which are principal");
+    assert_eq!(words(&model), "origin of the model, axes of the model, which are principal");
 }
 
 #[test]

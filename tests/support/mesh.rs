@@ -92,7 +92,7 @@ impl Mesh {
     }
 
     /// The mesh with nodes closer than `distance` made one.
-    fn welded(self, distance: f64) -> Self {
+    pub fn welded(self, distance: f64) -> Self {
         let (mut nodes, mut numbers) = (Vec::<[f64; 3]>::new(), Vec::new());
         for x in &self.nodes {
             let near = |y: &[f64; 3]| (Vector3::from(*x) - Vector3::from(*y)).norm() < distance;

@@ -103,7 +103,8 @@ def model(
         node. Without: x, y, z of every node, node by node (in the plane x, y).
     interfaces
         Sets of nodes that joints and loads act on: name to node numbers, or to a tuple of these with a
-        coupling ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes.
+        coupling ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes; without one
+        it is the mean of the nodes.
     units
         Units of length, mass and time, as in ("mm", "t", "s"); a number is a factor to SI. Without, they are
         m, kg, s and plausibility is not checked.
@@ -179,7 +180,7 @@ def convert(
     max_frequency: float | None = None,
     basis: str = "free",
     accuracy: str = "standard",
-    frame: str = "principal",
+    frame: str = "com",
     comparators: bool = True,
     scene: Any = None,
     **of_model: Any,
@@ -201,8 +202,8 @@ def convert(
     accuracy
         "fast"; "standard" proves that no mode is missing; "certified" guarantees bounds.
     frame
-        Body frame: "principal" (at the centre of mass, along the principal axes), "com" (there, along the
-        axes of the model), "model".
+        Body frame: "com" (at the centre of mass, along the axes of the model), "principal" (there, along the
+        principal axes of inertia), "model".
     comparators
         Whether to compute what lumped masses would have given.
     scene

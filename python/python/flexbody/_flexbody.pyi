@@ -63,7 +63,7 @@ class Model:
         max_frequency: float | None = None,
         basis: str = "free",
         accuracy: str = "standard",
-        frame: str = "principal",
+        frame: str = "com",
         comparators: bool = True,
         scene: _Cases | None = None,
     ) -> Body: ...

@@ -1,13 +1,14 @@
 //! A model under the couplings that every mode of a body keeps: interfaces that move as rigid bodies (theory
 //! section 5).
 
-use super::interface_rows::{CoupledInterface, coupled_sets, rigid_rows};
+use super::echelon::Echelon;
+use super::interface_rows::{CoupledInterface, coupled_sets};
 use super::modal_basis::input_error;
 use super::rigid_modes::rigid_modes;
 use crate::base::error::Result;
 use crate::model::{Coupling, FeModel, NodeSet};
 use crate::numerics::eigen::{EigenProblem, Resume};
-use crate::numerics::linalg::{Elimination, Pencil, ReducedPencil, combine, gram, larger};
+use crate::numerics::linalg::{Dependents, Elimination, Pencil, ReducedPencil, combine, gram, larger};
 use faer::{Mat, MatRef};
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -143,4 +144,18 @@ fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f6
     let (displaced, all) = (joint.displaced_rows(), model.rows().displacements());
     let rotations = all..all + model.rows().rotations().len();
     larger(part(0..displaced, 0..all), part(displaced..own.nrows(), rotations))
+}
+
+/// u = R q of a rigid interface solved for its other rows: as many rows as it has rigid motions determine them, chosen
+/// by complete pivoting (three nodes that lie far apart, one of them held in all directions).
+fn rigid_rows(joint: &CoupledInterface) -> Dependents {
+    let Echelon { pivots, others, weights } = Echelon::new(joint.balanced().transpose().to_owned());
+    // From displacements and turns of one size to those in the units of the model.
+    let size = |row: usize| if row < joint.displaced_rows() { 1.0 } else { joint.length() };
+    let weight = |i: usize, j: usize| weights[(j, i)] * size(pivots[j]) / size(others[i]);
+    Dependents {
+        rows: others.iter().map(|&j| joint.rows[j]).collect(),
+        on: pivots.iter().map(|&j| joint.rows[j]).collect(),
+        weights: Mat::from_fn(others.len(), pivots.len(), weight),
+    }
 }

@@ -10,8 +10,9 @@
 use super::failure::explain;
 use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
 use super::free_surface::{polynomial_estimate, single_precision_note};
+use super::held_interfaces::{check_prescribable, hold, unit_motions};
 use super::interface_coordinates::InterfaceCoordinates;
-use super::interface_rows::{CoupledInterface, check_prescribable, coupled_interfaces, hold};
+use super::interface_rows::{CoupledInterface, coupled_interfaces};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::rigid_modes::rigid_modes;
@@ -139,14 +140,10 @@ impl<'a> Parts<'a> {
                 .with_help("give the interfaces fewer nodes")
                 .into());
         }
-        let count = joints.iter().map(|joint| joint.coordinates.len()).sum();
         let names = joints.iter().flat_map(|joint| {
             joint.coordinates.iter().map(|coordinate| format!("{} {coordinate}", joint.name))
         });
-        let mut moved = Mat::zeros(pencil.n(), count);
-        for (joint, first) in starts(joints) {
-            joint.scatter(joint.motion(), &mut moved, first);
-        }
+        let moved = unit_motions(pencil.n(), joints);
         let reduced = elimination.reduced(&pencil);
         let held = reduced.pencil();
         // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of

@@ -2,10 +2,8 @@
 //! measure of them.
 
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
-use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, Reference, centre_and_length, rigid_count};
-use crate::numerics::eigen::EigenFailure;
-use crate::numerics::linalg::{Dependents, Elimination};
+use crate::base::error::Result;
+use crate::model::{Coupling, FeModel, InterfaceMotion, NodeSet, centre_and_length, rigid_count};
 use faer::{Mat, MatRef};
 use std::collections::HashMap;
 
@@ -30,8 +28,7 @@ pub(super) struct CoupledInterface {
     /// r).
     motion: Mat<f64>,
     measure: Mat<f64>,
-    /// The same weights about the mean of the nodes: what they leave zero is the same, and a far reference
-    /// point costs no digits.
+    /// The weights about the mean of the nodes (rows x r).
     centred: Mat<f64>,
     /// R about the mean of the nodes, rotations by one over their extent, rows of rotations times it: all of the size of
     /// one.
@@ -44,9 +41,9 @@ pub(super) struct CoupledInterface {
     pub displacements: usize,
     /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its
     /// rotations or none has one.
-    determined: bool,
+    pub determined: bool,
     /// Whether it holds the body by itself, not only together with others.
-    holds: bool,
+    pub holds: bool,
 }
 
 impl CoupledInterface {
@@ -93,10 +90,7 @@ impl CoupledInterface {
         let Members { nodes, displaced, turned, all_turn } = members;
         let (coupling, d) = (set.coupling(), model.dimension());
         let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| model.nodes().positions[i]).collect();
-        let reference = match set.reference {
-            Reference::Point(x) => Some(x),
-            _ => None,
-        };
+        let reference = set.reference.point();
         let by_place = InterfaceMotion::new(&positions, false, d, reference);
         // The mean motion leaves the rotations of the nodes alone, unless nothing else tells its own.
         let rows = match coupling {
@@ -140,6 +134,17 @@ impl CoupledInterface {
         self.motion.as_ref()
     }
 
+    /// R about the mean of the nodes (rows x r), displacements and turns of the size of one: rotations by one over
+    /// [`CoupledInterface::length`], rows of rotations times it.
+    pub fn balanced(&self) -> MatRef<'_, f64> {
+        self.balanced.as_ref()
+    }
+
+    /// Extent of the nodes about their mean.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
     /// Number of rows that are displacements, the first ones.
     pub fn displaced_rows(&self) -> usize {
         self.displaced
@@ -149,6 +154,12 @@ impl CoupledInterface {
     /// unit loads on the coordinates.
     pub fn measure(&self) -> MatRef<'_, f64> {
         self.measure.as_ref()
+    }
+
+    /// Returns the weights of [`measure`](Self::measure) about the mean of the nodes: what they leave zero is the same, and
+    /// a far reference point costs no digits.
+    pub fn centred(&self) -> MatRef<'_, f64> {
+        self.centred.as_ref()
     }
 
     /// Adds the columns of `part` (rows x r) to `whole` (N x c) from column `first` on.
@@ -220,181 +231,4 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
 pub(super) fn coupled_sets(model: &FeModel, sets: &[NodeSet]) -> Vec<CoupledInterface> {
     let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     sets.iter().map(|set| CoupledInterface::new(model, set, &places)).collect()
-}
-
-/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are
-/// zero.
-///
-/// # Errors
-/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that
-/// are found.
-pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -> Result<()> {
-    let mut found: Vec<Diagnostic> =
-        joints.iter().filter(|joint| !joint.determined).map(|joint| undetermined(model, joint)).collect();
-    found.extend(shared_nodes(model, joints));
-    if found.is_empty() {
-        found.extend(body_not_held(model, joints));
-    }
-    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
-}
-
-/// Where nodes must not lie that are to determine every rotation, and how many of them do.
-fn determining(dimension: usize) -> (&'static str, &'static str) {
-    if dimension == 2 {
-        ("one point", "two nodes")
-    } else {
-        ("one line", "three nodes that do not lie on one line")
-    }
-}
-
-/// The nodes of a joint do not determine its coordinates.
-fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
-    if joint.coupling == Coupling::Free {
-        let message =
-            format!("nodes of the free interface `{}` have a part of their rotations only", joint.name);
-        let help = "give it nodes with all rotations, nodes with none, or another coupling";
-        return Diagnostic::new(Code::InterfaceCoupling, message).with_help(help);
-    }
-    let (place, least) = determining(model.dimension());
-    let message = format!(
-        "interface `{}` has {} nodes on {place}: their motion determines no rotation of its reference point",
-        joint.name,
-        joint.nodes.len()
-    );
-    let help = format!("give the interface {least}, or coupling = \"free\"");
-    Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
-}
-
-/// Nodes that belong to several joints.
-fn shared_nodes(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diagnostic> {
-    let mut found = Vec::new();
-    let mut owner: HashMap<usize, &str> = HashMap::new();
-    for joint in joints {
-        let shared: Vec<(i64, &str)> = joint
-            .nodes
-            .iter()
-            .filter_map(|&i| owner.insert(i, &joint.name).map(|other| (model.nodes().ids[i], other)))
-            .collect();
-        if let Some((node, other)) = shared.first() {
-            let message = format!(
-                "interface `{}` shares {} nodes with others, node {node} with `{other}`: their motions are not independent",
-                joint.name,
-                shared.len()
-            );
-            found.push(Diagnostic::new(Code::InterfaceShared, message));
-        }
-    }
-    found
-}
-
-/// All joints together leave the body free to turn.
-fn body_not_held(model: &FeModel, joints: &[CoupledInterface]) -> Option<Diagnostic> {
-    let d = model.dimension();
-    let held: Vec<[f64; 3]> =
-        joints.iter().flat_map(|joint| &joint.nodes).map(|&i| model.nodes().positions[i]).collect();
-    if joints.iter().any(|joint| joint.holds) || InterfaceMotion::new(&held, false, d, None).is_determined() {
-        return None;
-    }
-    let (place, least) = determining(d);
-    let message = format!("the interfaces have {} nodes on {place}: they do not hold the body", held.len());
-    let help = format!("the interfaces together need {least}");
-    Some(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help))
-}
-
-/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of
-/// averaging ones have no mean.
-///
-/// # Errors
-/// [`EigenFailure::Memory`]: an averaging interface couples all of its rows with each other, which does not
-/// fit.
-pub(super) fn hold(
-    n: usize,
-    joints: &[CoupledInterface],
-    memory: Option<u64>,
-) -> std::result::Result<Elimination, EigenFailure> {
-    let averaging = |joint: &&CoupledInterface| joint.coupling == Coupling::Averaging;
-    // In K and in M. Bytes of an entry: in both matrices, one of them twice while it is made symmetric.
-    let entries: u64 = joints.iter().filter(averaging).map(|joint| (joint.rows.len() as u64).pow(2)).sum();
-    let bytes = 48 * entries;
-    if let Some(available) = memory.filter(|&available| bytes > available) {
-        return Err(EigenFailure::Memory { bytes, available });
-    }
-    let dependents = joints.iter().filter(averaging).map(without_mean).collect();
-    let zero = joints.iter().filter(|joint| !averaging(joint)).flat_map(|joint| joint.rows.iter().copied());
-    Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
-}
-
-/// A'u = 0 solved for as many rows as it has, chosen by complete pivoting: the weights of the others stay of
-/// the size of one.
-fn without_mean(joint: &CoupledInterface) -> Dependents {
-    let measure = joint.centred.as_ref();
-    // Rows of one size: rotations are in other units than displacements.
-    let rows =
-        Mat::from_fn(measure.ncols(), measure.nrows(), |i, j| measure[(j, i)] / measure.col(i).norm_l2());
-    let Echelon { pivots, others, weights } = Echelon::new(rows);
-    Dependents {
-        rows: pivots.iter().map(|&j| joint.rows[j]).collect(),
-        on: others.iter().map(|&j| joint.rows[j]).collect(),
-        weights: weights * faer::Scale(-1.0),
-    }
-}
-
-/// u = R q of a rigid interface solved for its other rows: as many rows as it has rigid motions determine them, chosen
-/// by complete pivoting (three nodes that lie far apart, one of them held in all directions).
-pub(super) fn rigid_rows(joint: &CoupledInterface) -> Dependents {
-    let Echelon { pivots, others, weights } = Echelon::new(joint.balanced.transpose().to_owned());
-    // From displacements and turns of one size to those in the units of the model.
-    let size = |row: usize| if row < joint.displaced { 1.0 } else { joint.length };
-    let weight = |i: usize, j: usize| weights[(j, i)] * size(pivots[j]) / size(others[i]);
-    Dependents {
-        rows: others.iter().map(|&j| joint.rows[j]).collect(),
-        on: pivots.iter().map(|&j| joint.rows[j]).collect(),
-        weights: Mat::from_fn(others.len(), pivots.len(), weight),
-    }
-}
-
-/// The reduced echelon form \[1, W\] of a matrix A (r x n) with its columns in another order: of the rank of A, with
-/// pivots that are the largest entries left.
-struct Echelon {
-    /// Columns of A of the unit matrix, and all others.
-    pivots: Vec<usize>,
-    others: Vec<usize>,
-    /// W (rank x others).
-    weights: Mat<f64>,
-}
-
-impl Echelon {
-    /// Pivots below this part of the first one are rounding.
-    const ROUNDING: f64 = 1e-9;
-
-    fn new(mut a: Mat<f64>) -> Self {
-        let (r, columns) = (a.nrows(), a.ncols());
-        let mut pivots: Vec<usize> = Vec::new();
-        let mut first = 0.0;
-        for step in 0..r.min(columns) {
-            let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
-            let open = places.filter(|(_, j)| !pivots.contains(j));
-            let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
-            if step == 0 {
-                first = a[(i, j)].abs();
-            }
-            if a[(i, j)].abs() <= Self::ROUNDING * first {
-                break;
-            }
-            for column in 0..columns {
-                let (upper, lower) = (a[(step, column)], a[(i, column)]);
-                (a[(step, column)], a[(i, column)]) = (lower, upper);
-            }
-            let pivot = a[(step, j)];
-            (0..columns).for_each(|column| a[(step, column)] /= pivot);
-            for other in (0..r).filter(|&other| other != step) {
-                let factor = a[(other, j)];
-                (0..columns).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
-            }
-            pivots.push(j);
-        }
-        let others: Vec<usize> = (0..columns).filter(|j| !pivots.contains(j)).collect();
-        let weights = Mat::from_fn(pivots.len(), others.len(), |i, j| a[(i, others[j])]);
-        Self { pivots, others, weights }
-    }
 }

@@ -62,7 +62,7 @@ pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &Fle
     let axis = axis_in_words(&axis);
     let hertz = model.units().frequency_of(SOFTENING / part);
     let message = format!(
-        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about body axis {axis}"
+        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about axis {axis} of the model"
     );
     Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
 }

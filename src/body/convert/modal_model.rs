@@ -11,7 +11,7 @@ use crate::body::invariants::{
     BodyFrame, Frame, InertiaStiffness, LumpedMasses, MassProperties, choose_frame, choose_general_frame,
     choose_plane_frame,
 };
-use crate::model::{FeModel, GeometricStiffness, Nodes, Reference};
+use crate::model::{FeModel, GeometricStiffness, Nodes};
 use crate::numerics::eigen::{Accuracy, Resume};
 use faer::Mat;
 use std::collections::HashMap;
@@ -124,16 +124,12 @@ fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperti
 /// none was stated.
 pub(crate) fn interfaces_in_frame(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
-    let in_body = |reference: &Reference| match reference {
-        Reference::Point(x) => Some(frame.to_body(&[*x])[0]),
-        _ => None,
-    };
     let sets = model.interfaces().iter();
     sets.map(|set| Interface {
         name: set.name.clone(),
         nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
         coupling: if coupled { Some(set.coupling()) } else { set.coupling },
-        reference: in_body(&set.reference),
+        reference: set.reference.point().map(|x| frame.to_body(&[x])[0]),
     })
     .collect()
 }

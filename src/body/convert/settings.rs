@@ -56,7 +56,7 @@ pub struct ConvertSettings {
 }
 
 impl Default for ConvertSettings {
-    /// 20 modes, principal frame, and the two comparators that need nothing but the matrices.
+    /// 20 modes, the centre of mass and the axes of the model as frame, and the two comparators that need nothing but the matrices.
     fn default() -> Self {
         Self {
             modes: ModeSettings::default(),

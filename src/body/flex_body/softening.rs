@@ -21,20 +21,21 @@ impl FlexBody {
         Some(self.softest_motion(omega)?.0)
     }
 
-    /// Spin rate about body axis `axis` at which the centrifugal terms take 1 % of the stiffness of the motion that
-    /// they soften most: the root of 0.01 over the [part](FlexBody::softening) at unit spin. `None` where nothing moves
-    /// across the axis. Unit: 1/time.
+    /// Spin rate about axis `axis` of the model at which the centrifugal terms take 1 % of the stiffness of the motion
+    /// that they soften most: the root of 0.01 over the [part](FlexBody::softening) at unit spin. `None` where nothing
+    /// moves across the axis. Unit: 1/time.
     ///
     /// # Panics
     /// When `axis` is not below 3.
     pub fn softening_rate(&self, axis: usize) -> Option<f64> {
-        let part = self.softening(&Vector3::ith(axis, 1.0))?;
+        let omega_body = self.frame().axes.transpose() * Vector3::ith(axis, 1.0);
+        let part = self.softening(&omega_body)?;
         (part > 0.0).then(|| (SOFTENING / part).sqrt())
     }
 
-    /// The axis about which a spin softens most, of unit length with its largest component positive, and the part that
-    /// a unit of spin takes: the motion that a spin softens most tells the axis that softens it most, and so on, from
-    /// each of the three axes. Of a plane body the normal.
+    /// The axis about which a spin softens most, in axes of the model, of unit length with its largest component
+    /// positive, and the part that a unit of spin takes: the motion that a spin softens most tells the axis that softens
+    /// it most, and so on, from each of the three axes. Of a plane body the normal.
     pub fn worst_spin(&self) -> Option<(Vector3<f64>, f64)> {
         if self.dimension() == 2 {
             return Some((Vector3::z(), self.softening(&Vector3::z())?));
@@ -57,6 +58,7 @@ impl FlexBody {
         };
         let all = (0..3).map(from_axis).collect::<Option<Vec<_>>>()?;
         let (omega, part) = all.into_iter().reduce(|a, b| if b.1 > a.1 * (1.0 + GROWTH) { b } else { a })?;
+        let omega = self.frame().axes * omega;
         Some((if omega[omega.iamax()] < 0.0 { -omega } else { omega }, part))
     }
 
@@ -92,10 +94,10 @@ impl FlexBody {
     }
 }
 
-/// Cosine of the angle to an axis of the body up to which a direction is called by its name.
+/// Cosine of the angle to a coordinate axis up to which a direction is called by its name.
 const ALONG: f64 = 1.0 - 1e-9;
 
-/// `z`, or `(0.707, 0.707, 0)` of an axis that is none of the body.
+/// `z`, or `(0.707, 0.707, 0)` of an axis that is none of the coordinate axes.
 pub(crate) fn axis_in_words(axis: &Vector3<f64>) -> String {
     let unit = axis.normalize();
     match (0..3).find(|&k| unit[k].abs() >= ALONG) {

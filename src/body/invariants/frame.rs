@@ -77,18 +77,18 @@ impl Frame {
 /// Which body frame to use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BodyFrame {
-    /// Origin at the centre of mass, principal axes with ascending moments: I0 is diagonal.
-    #[default]
-    Principal,
     /// Origin at the centre of mass, axes of the model.
+    #[default]
     Com,
+    /// Origin at the centre of mass, principal axes with ascending moments: I0 is diagonal.
+    Principal,
     /// The frame of the model.
     Model,
 }
 
 impl BodyFrame {
     /// Every choice, in the order of the documentation.
-    pub const ALL: [BodyFrame; 3] = [Self::Principal, Self::Com, Self::Model];
+    pub const ALL: [BodyFrame; 3] = [Self::Com, Self::Principal, Self::Model];
 
     /// Name in settings and on the command line.
     pub fn name(self) -> &'static str {

@@ -3,14 +3,15 @@
 use crate::body::convert::interfaces_in_frame;
 use crate::body::flex_body::{FlexBody, Interface};
 use crate::body::invariants::IdentityCheck;
-use crate::model::FeModel;
+use crate::model::{FeModel, centre_and_length};
 use std::collections::BTreeSet;
 
 /// Reference points agree to rounding of the change of frame, relative to the coordinates of the nodes.
 const PLACE: f64 = 1e-12;
 
 /// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies of files before
-/// reference points were stored have none.
+/// reference points were stored have none. A body of an earlier version has the mean of the nodes where the model
+/// states no point, which is accepted.
 pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<IdentityCheck> {
     let (stored, own) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
     if stored.is_empty() && own.is_empty() {
@@ -23,9 +24,16 @@ pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<Identity
         own.iter().filter(|own| of(&own.name).is_none_or(|stored| !is_same(stored, own, model))).count();
     let positions = body.nodes().positions.iter().flatten();
     let size = positions.fold(body.frame().origin.amax().max(f64::MIN_POSITIVE), |m, x| m.max(x.abs()));
+    let apart = |x: [f64; 3], y: [f64; 3]| (0..3).map(|k| (x[k] - y[k]).abs()).fold(0.0, f64::max) / size;
     let moved = own.iter().filter_map(|own| {
         let (x, y) = (own.reference?, of(&own.name)?.reference?);
-        Some((0..3).map(|k| (x[k] - y[k]).abs()).fold(0.0, f64::max) / size)
+        let away = apart(x, y);
+        let set = model.interfaces().iter().find(|set| set.name == own.name)?;
+        let mean = || {
+            let positions: Vec<[f64; 3]> = own.nodes.iter().map(|&i| body.nodes().positions[i]).collect();
+            centre_and_length(&positions).0
+        };
+        Some(if set.reference.is_stated() { away } else { away.min(apart(mean(), y)) })
     });
     vec![
         IdentityCheck::new(

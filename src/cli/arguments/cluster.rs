@@ -63,7 +63,7 @@ pub struct AssembleArguments {
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
     /// Frame of the body
-    #[arg(long, value_enum, default_value_t = FrameName::Principal)]
+    #[arg(long, value_enum, default_value_t = FrameName::Com)]
     pub frame: FrameName,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]

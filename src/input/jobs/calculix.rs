@@ -4,6 +4,7 @@
 use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
+use super::distributing_couplings::{placed_note, reference_places};
 use super::expanded::label_once;
 use super::rotation_nodes::rotation_nodes;
 use super::{Found, JobModel, JobReader, both, is_deck, missing};
@@ -47,6 +48,7 @@ impl JobReader for Calculix {
         let mesh = DeckMesh::of(&deck)?;
         let labels = read_labels(&dof)?;
         let rotations = rotation_nodes(&deck, &mesh, &labels)?;
+        let means = reference_places(&deck, &mesh)?;
         let n = labels.len();
         let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
         // One after the other: each is read by all threads, and the entries of only one are held.
@@ -57,12 +59,15 @@ impl JobReader for Calculix {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
             None => *own,
         };
-        let dofs = labels.iter().map(label).collect();
+        let dofs: Vec<DofLabel> = labels.iter().map(label).collect();
         // The nodes that only name rotations stand at no place of their own.
         let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
-        let (mut ids, mut positions): (Vec<_>, Vec<_>) = placed.map(|(id, x)| (*id, *x)).unzip();
+        let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
+        let (mut ids, mut positions): (Vec<_>, Vec<_>) = placed.map(place).unzip();
         ids.extend(added.ids);
         positions.extend(added.positions);
+        let mut diagnostics = mesh.notes.clone();
+        diagnostics.extend(placed_note(&means, &dofs, path));
         let mut files: Vec<(&'static str, _)> =
             deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
         files.extend([("stiffness", sti), ("mass", mas), ("dofs", dof)]);
@@ -74,7 +79,7 @@ impl JobReader for Calculix {
             elements: mesh.drawn(),
             sets: mesh.sets,
             files,
-            diagnostics: mesh.notes,
+            diagnostics,
         })
     }
 }

@@ -92,6 +92,8 @@ pub(super) fn drawing(kind: &str, nodes: &[i64]) -> Drawing {
     let count = if is_line { n_nodes(kind).unwrap_or(nodes.len()).min(nodes.len()) } else { nodes.len() };
     let shape = match (family(kind), count) {
         (Some(Family::Mass | Family::Turner), _) => return Drawing::Nothing,
+        // The reference node of a distributing coupling.
+        (None, 1) if kind == "DCOUP3D" => return Drawing::Nothing,
         (Some(Family::Solid), 4 | 10) => ElementShape::Tetrahedron,
         (Some(Family::Solid), 5 | 13) => ElementShape::Pyramid,
         (Some(Family::Solid), 6 | 15 | 18) => ElementShape::Wedge,

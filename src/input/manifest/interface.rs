@@ -74,7 +74,10 @@ impl Walk<'_> {
             None => None,
         };
         let reference = match (table.get("reference"), table.get("reference_node")) {
-            (None, None) => Reference::Mean,
+            (None, None) => match &nodes {
+                InterfaceNodes::Region(region) => region.reference(),
+                _ => Reference::Centre,
+            },
             (Some(point), None) => Reference::Point(self.point("reference", point, dimension)?),
             (None, Some(node)) => match integer(node) {
                 Some(node) => Reference::Node(node),

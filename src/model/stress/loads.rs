@@ -2,7 +2,7 @@
 
 use super::fit::{Relief, force, least_lengths, solve};
 use crate::model::rigid::centre_and_length;
-use crate::model::{Coupling, FeModel, InertialRows, LoadKind, NodeSet, Reference, UnitLoad};
+use crate::model::{Coupling, FeModel, InertialRows, LoadKind, NodeSet, UnitLoad};
 use crate::numerics::linalg::{gram, larger};
 use faer::Mat;
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -211,7 +211,7 @@ impl<'m> UnitLoads<'m> {
 
     /// The reference point of an interface, or the mean of its nodes.
     fn reference(&self, set: &NodeSet, is_member: &[bool]) -> Vector3<f64> {
-        if let Reference::Point(point) = set.reference {
+        if let Some(point) = set.reference.point() {
             return Vector3::from(point);
         }
         let own: Vec<_> = self.model.nodes().positions.iter().zip(is_member).filter(|(_, m)| **m).collect();

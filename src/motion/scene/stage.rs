@@ -1,7 +1,7 @@
 //! A scene and its body in one frame: axes of the model, origin at the centre of mass or at what carries the
 //! body.
 //!
-//! A flex-body file has its frame where the conversion put it, along principal axes as a rule. What a scene
+//! A flex-body file has its frame where the conversion put it, along the axes of the model or others. What a scene
 //! means does not depend on that: everything is computed in this frame, and vectors of the results are along
 //! its axes, which are those of the model.
 

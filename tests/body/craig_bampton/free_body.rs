@@ -134,7 +134,10 @@ fn reports_call_a_healthy_body_healthy() {
             "{html}"
         );
         let text = render(&facts, Format::Text);
-        let made_of = format!("craig-bampton: {count} fixed-interface modes + 12 interface motions - 6");
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let made_of = format!(
+            "craig-bampton: {count} fixed-interface modes ({count} asked for) + 12 interface motions - 6"
+        );
         assert!(text.contains(&made_of) && text.contains("of the free body"), "{text}");
         assert!(text.contains("proved:") && !text.contains("NOT PROVED"), "{text}");
         let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).expect("JSON");
@@ -142,6 +145,20 @@ fn reports_call_a_healthy_body_healthy() {
         assert_eq!(json["completeness"]["verdict"], "proved");
         let own = &json["modes"]["craig_bampton"];
         assert_eq!(own["fixed_interface_modes"], count);
+        assert_eq!(own["fixed_interface_asked"], count);
+        let held: Vec<f64> = own["fixed_interface_hz"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|hz| hz.as_f64().expect("a number"))
+            .collect();
+        let expected = fixed(&craig_bampton(&model, count));
+        assert_eq!(held.len(), expected.len());
+        for (hz, lambda) in held.iter().zip(&expected) {
+            close(*hz, lambda.sqrt() / std::f64::consts::TAU, 1e-12, "held");
+        }
+        assert_eq!(text.contains(" Hz (fixed-interface modes)"), count > 0, "{text}");
+        assert!(!text.contains("x fixed-interface"), "{text}");
         assert_eq!(own["free_hz"].as_array().expect("a list").len(), body.n_modes());
     }
     let attached =

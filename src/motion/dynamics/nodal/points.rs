@@ -2,7 +2,7 @@
 
 use crate::base::error::Result;
 use crate::body::basis::interface_loads;
-use crate::model::{FeModel, Reference};
+use crate::model::FeModel;
 use faer::{Mat, MatRef};
 use nalgebra::Vector3;
 
@@ -46,7 +46,7 @@ impl NodalPoint {
     /// FB150 when the model has no interfaces at all.
     pub fn interface(model: &FeModel, name: &str) -> Result<Option<Self>> {
         let set = model.interfaces().iter().find(|set| set.name == name);
-        let Some(Reference::Point(place)) = set.map(|set| set.reference) else { return Ok(None) };
+        let Some(place) = set.and_then(|set| set.reference.point()) else { return Ok(None) };
         let Some(loads) = interface_loads(model, name)? else { return Ok(None) };
         let d = model.dimension();
         let (forces, torques) = loads.as_ref().split_at_col(d);

@@ -1,0 +1,71 @@
+//! Interfaces that share nodes: bodies of them among those that every oracle holds, and what is refused.
+
+use super::*;
+
+/// Couplings of interfaces that share nodes; at least one of two averages.
+const SHARING: [[Coupling; 2]; 4] = [
+    [Coupling::Averaging, Coupling::Averaging],
+    [Coupling::Rigid, Coupling::Averaging],
+    [Coupling::Averaging, Coupling::Rigid],
+    [Coupling::Averaging, Coupling::Free],
+];
+
+/// The bracket or the strip with nodes of its second interface, and some more, in the first as well.
+fn shared(couplings: [Coupling; 2], raw: RawModel) -> RawModel {
+    let mut raw = raw;
+    let taken: Vec<i64> = raw.interfaces[1].nodes.iter().copied().take(2).collect();
+    raw.interfaces[0].nodes.extend(taken);
+    assert_eq!(raw.interfaces.iter().map(|set| set.coupling).collect::<Vec<_>>(), couplings.map(Some));
+    raw
+}
+
+/// Brackets and strips whose interfaces share nodes.
+pub fn models() -> impl Iterator<Item = RawModel> {
+    SHARING.into_iter().flat_map(|c| [shared(c, bracket(c)), shared(c, strip(c))])
+}
+
+/// The same motions with unit coordinates, also of interfaces that share nodes: changed at the `free` rows alone.
+pub fn with_unit_coordinates(motion: Mat<f64>, weights: &Mat<f64>, free: impl Fn(usize) -> bool) -> Mat<f64> {
+    let c = weights.ncols();
+    let missing = Mat::<f64>::identity(c, c) - weights.transpose() * &motion;
+    let moved: Vec<usize> = (0..c).filter(|&j| missing.row(j).norm_max() > 1e-12).collect();
+    if moved.is_empty() {
+        return motion;
+    }
+    let own =
+        Mat::from_fn(
+            weights.nrows(),
+            moved.len(),
+            |row, j| {
+                if free(row) { weights[(row, moved[j])] } else { 0.0 }
+            },
+        );
+    let missing = Mat::from_fn(moved.len(), c, |i, j| missing[(moved[i], j)]);
+    let normal = own.transpose() * &own;
+    motion + &own * normal.partial_piv_lu().solve(missing)
+}
+
+/// Motions that follow from those of other interfaces are refused, with the node that both have.
+#[test]
+fn interfaces_whose_motions_follow_from_others_are_refused() {
+    use Coupling::{Averaging, Free, Rigid};
+    let told = |couplings: [Coupling; 2], nodes: &dyn Fn(&[i64]) -> Vec<i64>| {
+        let mut raw = bracket(couplings);
+        raw.interfaces[1].reference = Reference::Centre;
+        raw.interfaces[1].nodes = nodes(&raw.interfaces[0].nodes);
+        let error = modes_of(&model(raw), &CraigBampton, &lowest(3)).expect_err("not independent");
+        assert!(error.has(Code::InterfaceShared), "{couplings:?}: {error}");
+        assert!(error.to_string().contains("with `first`"), "{couplings:?}: {error}");
+    };
+    for couplings in [[Averaging, Averaging], [Rigid, Averaging], [Free, Averaging], [Rigid, Free]] {
+        told(couplings, &|first| first.to_vec());
+    }
+    // Some nodes of its own leave a rigid interface, or a mean, as little independent of another rigid one.
+    told([Rigid, Rigid], &|first| [&first[..1], &[1, 2, 30]].concat());
+    told([Rigid, Averaging], &|first| [first, &[1]].concat());
+    let other = |first: &[i64]| (1..).filter(|id| !first.contains(id)).take(6).collect::<Vec<i64>>();
+    let mut raw = bracket([Averaging, Averaging]);
+    let first = raw.interfaces[0].nodes.clone();
+    raw.interfaces[1].nodes = [first.as_slice(), &other(&first)].concat();
+    assert_eq!(craig_bampton(&model(raw), 3).solution.eigenvalues.len(), 9);
+}
