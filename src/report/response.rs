@@ -76,10 +76,10 @@ impl CouplingFacts<'_> {
             all => format!("interfaces {} are", all.join(", ")),
         };
         let effect = self.largest.map_or_else(
-            || "the effect of it is not known".to_owned(),
+            || "the effect of the coupling is not known".to_owned(),
             |at| {
                 let hertz = significant(at.hertz, 4);
-                format!("it changes the response of the model by up to {} (at {hertz} Hz)", percent(at.value))
+                format!("the coupling changes the response of the model by up to {} (at {hertz} Hz)", percent(at.value))
             },
         );
         format!("{which} rigid, in the body and in the model it is compared with; {effect}")
