@@ -9,6 +9,7 @@ use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::body::verification::accept;
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody::motion::scene::{
@@ -43,8 +44,10 @@ fn beam_of(element: Element, rule: MassRule, cells: [i32; 3]) -> FeModel {
     FeModel::from_raw(RawModel { interfaces, ..raw }).expect("a sound model").model
 }
 
+/// Loads and spins of the scenes are along the axes of the body, which are principal.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
+        frame: BodyFrame::Principal,
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
         lumped: Vec::new(),
         ..ConvertSettings::default()
