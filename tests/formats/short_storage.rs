@@ -77,7 +77,7 @@ fn rounded_bodies_are_read_bit_for_bit_and_pass_their_checks() {
             assert_eq!(kind("invariants/datasets/W1"), groups.w1.then(|| Value::from("float32")));
             assert_eq!(kind("invariants/datasets/modal_stiffness"), Some(Value::from("float64")));
         }
-        let checks = short.identities(BodyFrame::Principal);
+        let checks = short.identities(BodyFrame::Com);
         let failed: Vec<_> = checks
             .iter()
             .chain(&verify(&short, &model).expect("comparable"))

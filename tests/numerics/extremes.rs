@@ -48,7 +48,7 @@ fn try_convert(raw: RawModel, modes: usize, method: Method) -> Result<(FeModel, 
 fn converted(raw: RawModel, modes: usize, method: Method) -> Conversion {
     let (model, done) = try_convert(raw, modes, method).expect("a body");
     let body = &done.body;
-    let own = body.identities(BodyFrame::Principal);
+    let own = body.identities(BodyFrame::Com);
     for check in own.into_iter().chain(verify(body, &model).expect("the same model")) {
         assert!(check.passed, "{}: {:e} > {:e}", check.name, check.value, check.limit);
     }

@@ -15,6 +15,7 @@ use flexbody::base::progress::SILENT;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody::motion::dynamics::Terms;
 use flexbody::motion::scene::{
@@ -203,8 +204,10 @@ fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<C
     Some(Carried { by, spin, translation })
 }
 
+/// Loads along body axes are along the principal ones.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
+        frame: BodyFrame::Principal,
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
         lumped: Vec::new(),
         ..ConvertSettings::default()

@@ -9,6 +9,7 @@ use flexbody::base::progress::SILENT;
 use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
+use flexbody::body::invariants::BodyFrame;
 use flexbody::body::verification::accept;
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody::motion::scene::{
@@ -48,8 +49,10 @@ fn rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coup
     FeModel::from_raw(RawModel { interfaces, ..raw }).expect("a sound model").model
 }
 
+/// Loads and spins of the scenes are along the axes of the body, which are principal.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
+        frame: BodyFrame::Principal,
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
         lumped: Vec::new(),
         ..ConvertSettings::default()

@@ -2,8 +2,8 @@
 
 use super::*;
 
-/// A bar of 5000 times its width with a third of its modes: B'M B = I holds to the rounding of its summands, which is far
-/// above that of one, and a mass that is wrong is still found.
+/// A bar of 5000 times its width with a third of its modes: B'M B = I holds to the rounding of its summands, which is
+/// above the limit of other bodies, and a mass that is wrong is still found.
 #[test]
 fn many_modes_of_a_slender_bar_hold_to_the_rounding_of_their_summands() {
     let mesh = Mesh::block(Kind::Hex8, [60, 1, 1], [1.0, 2e-4, 2e-4]);
@@ -20,7 +20,7 @@ fn many_modes_of_a_slender_bar_hold_to_the_rounding_of_their_summands() {
         checks.into_iter().find(|check| check.name == "interface_mass").expect("a check")
     };
     let check = mass(&body);
-    assert!(check.passed && check.value > 1e-8, "{check:?}");
+    assert!(check.passed && check.value > 1e-9, "{check:?}");
     assert_eq!(broken(&body), [""; 0]);
     for (entry, change) in [((0, 0), 1.0 + 1e-5), ((20, 20), 1.0 + 1e-3)] {
         let mut parts = body.clone().into_parts();
