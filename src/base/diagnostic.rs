@@ -184,7 +184,7 @@ codes! {
     NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
     FactorPrecision = "FB513", Note, Done, "precision of the factor", "nothing to do: --factor f64 or f32 decides otherwise";
     DampingIndefinite = "FB514", Error, Untrustworthy, "damping of the modes is not positive semidefinite or not finite", "damping must not feed energy: check the signs and the units of the damping";
-    ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "check the units of the damping: alpha is in 1/time, beta in time, D in mass/time";
+    ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "nothing to do if it is meant so; else check the units: a ratio of 2 % is 0.02, alpha is in 1/time, beta in time, D in mass/time";
     ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
     ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
     ShapesRigid = "FB522", Note, Done, "rigid-body motions are taken out of the shapes: the body frame carries them out", "nothing to do: no motion is lost";

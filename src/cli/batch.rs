@@ -157,7 +157,8 @@ fn empty_row(body: &BatchBody) -> BatchRow {
 
 fn fail(row: &mut BatchRow, error: &Error) {
     row.exit_code = error.exit_code() as i32;
-    row.error = error.diagnostics().first().map(|d| format!("{} {}", d.code().id(), d.message()));
+    let cause = error.first_error();
+    row.error = Some(format!("{} {}", cause.code().id(), cause.message()));
 }
 
 /// A conversion that has ended.

@@ -147,7 +147,7 @@ fn settings(arguments: &ResponseArguments, scene: Option<&Scene>, body: &FlexBod
         band,
         points: arguments.points as usize,
         solves: arguments.solves as usize,
-        damping: arguments.damping.or_else(|| scene?.requirements.damping),
+        damping: arguments.damping.map(Into::into).or_else(|| scene?.requirements.damping.clone()),
         replaces_damping: arguments.damping.is_none()
             && scene.is_some_and(|scene| scene.requirements.replaces_damping),
         tolerance: arguments.tolerance,

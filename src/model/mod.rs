@@ -39,7 +39,7 @@ mod wording;
 
 pub use body_number::BodyNumber;
 pub use checks::{CheckedModel, Plausibility, check};
-pub use damping::{Damping, DampingBand};
+pub use damping::{Damping, DampingBand, DampingRatios, ratio_at};
 pub use density::Densities;
 pub use director_mass::DirectorMass;
 pub use elements::{ElementShape, Elements};
