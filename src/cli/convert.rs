@@ -6,7 +6,7 @@ use super::elsewhere::Elsewhere;
 use super::import;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{Places, Reserved, format_of, refuse_replacing};
+use super::places::{Places, Reserved, format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::select::asked_cases;
 use super::terminal::body_text;
@@ -69,6 +69,8 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let watcher = watcher(arguments, "reading");
     let lumped = schemes.iter().map(Scheme::read).collect::<Result<Vec<_>>>()?;
     let raw = read_model(&files)?;
+    // Before the work: what a deck includes or assigns is known now.
+    refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
     let job = Job {
         arguments,
@@ -89,6 +91,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
     refuse_overwriting(arguments, &all, &files, &schemes, &loads, &scenes)?;
+    refuse_replacing_read(all.iter().flat_map(Places::all))?;
     let mut slots = vec![reserved];
     for places in &all[1..] {
         slots.push(places.reserve()?);
