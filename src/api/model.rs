@@ -174,7 +174,8 @@ pub struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    /// Numbers and positions of the nodes.
+    /// Numbers and positions of the nodes. Interfaces, labels of rows, loads and scenes name nodes by these numbers;
+    /// [`ModelBuilder::mesh`] by positions from 0.
     pub fn nodes(mut self, ids: Vec<i64>, positions: Vec<[f64; 3]>) -> Self {
         self.raw.nodes = Nodes { ids, positions };
         self

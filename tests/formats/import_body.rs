@@ -11,8 +11,7 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, condense, primary_differences};
 use flexbody::formats::import::{
-    accept_imported,
-    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, audit, import_body,
+    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, accept_imported, audit, import_body,
 };
 use flexbody::model::{FeModel, GeometricStiffness};
 use flexbody::report::{Tolerances, compare};
@@ -214,7 +213,8 @@ fn a_file_that_breaks_an_identity_is_told_to_be_wrong() {
     let mut bad = good.clone();
     let i9 = bad.body.inertia.i9.as_mut().expect("all groups");
     *i9 *= faer::Scale(3.0);
-    let error = accept_imported(&imported(&bad).expect("a body")).expect_err("three times the inertia of the modes");
+    let error =
+        accept_imported(&imported(&bad).expect("a body")).expect_err("three times the inertia of the modes");
     let told = error.to_string();
     assert!(error.has(Code::ForeignUnsound) && told.contains("the file states a body that breaks"), "{told}");
     assert!(told.contains("write it anew") && !told.contains("report the model"), "{told}");

@@ -369,7 +369,8 @@ fn a_batch_tells_the_first_error_of_what_fails() {
         .map(|line| if line.starts_with("8,") { "8,0.3,0.3,0.3\n".to_owned() } else { format!("{line}\n") })
         .collect();
     fs::write(place.join("nodes.csv"), moved + "9,1,1,1\n").expect("written");
-    fs::write(place.join("list.toml"), "[[body]]\nmodel = \"model.toml\"\noutput = \"b.h5\"\n").expect("written");
+    fs::write(place.join("list.toml"), "[[body]]\nmodel = \"model.toml\"\noutput = \"b.h5\"\n")
+        .expect("written");
     let (exit, told) = batch(place);
     let error = told["results"]["bodies"][0]["error"].as_str().expect("a text");
     assert!(exit == 1 && error.starts_with("FB410"), "{told:#}");
