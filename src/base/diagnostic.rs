@@ -86,7 +86,7 @@ codes! {
     JobStep = "FB114", Note, Done, "one of several steps with matrices is taken", "nothing to do if it is the right one; else remove the others";
     NodeFileSyntax = "FB115", Error, BadInput, "file of nodes cannot be read", "write it again, or give a table with the columns node, x, y, z";
     DeckSupports = "FB116", Note, Done, "input deck supports the body", "matrices that are written before the supports are applied (KGG, MGG) are free; for others take the supports out";
-    RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids";
+    RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids and nodes of no element";
     DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
     JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all nodes (of Nastran KGG and MGG) where it matters how the inertia changes with the deformation";
     MeshPartial = "FB124", Note, Done, "surface to draw the body by is not whole", "nothing to do for the results; connectors and springs are not drawn";

@@ -44,12 +44,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
 
 /// A conversion whose modes this program finds, or somebody else.
 pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
-    if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
-        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
-        return Err(Diagnostic::new(Code::Usage, message)
-            .with_help("give at least 1, or --basis craig-bampton for static condensation")
-            .into());
-    }
+    refuse_without_modes(arguments)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // What the command line says replaces what the manifest says.
@@ -310,6 +305,16 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
     Ok(sets)
+}
+
+fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
+    if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
+        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
+        return Err(Diagnostic::new(Code::Usage, message)
+            .with_help("give at least 1, or --basis craig-bampton for static condensation")
+            .into());
+    }
+    Ok(())
 }
 
 /// Options that say nothing together; `loads` are those of residual vectors.

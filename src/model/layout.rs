@@ -217,8 +217,8 @@ impl LeftOut {
     /// A note about the rows, where there are any.
     fn note(&self, raw: &RawModel) -> Option<Diagnostic> {
         let Self { nodes, of_nodes, rotations } = self;
-        let of_nodes = (*of_nodes > 0)
-            .then(|| format!("{of_nodes} of {} nodes without elements ({})", nodes.len(), name_some(nodes)));
+        let of_nodes =
+            (*of_nodes > 0).then(|| format!("{of_nodes} of nodes without elements ({})", name_some(nodes)));
         let turning = (*rotations > 0).then(|| format!("{rotations} rotations of other nodes"));
         let parts: Vec<String> = of_nodes.into_iter().chain(turning).collect();
         (!parts.is_empty()).then(|| {

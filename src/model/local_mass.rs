@@ -8,7 +8,7 @@
 //! speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
 
 use super::assembled::Assembled;
-use super::density::{state_units, units_of_speed};
+use super::common_units::{state_units, units_of_speed};
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use crate::base::diagnostic::{Code, Diagnostic};

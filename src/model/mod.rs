@@ -5,6 +5,7 @@ mod assembled;
 mod body_number;
 mod checks;
 mod columns;
+mod common_units;
 mod connections;
 mod damping;
 mod density;

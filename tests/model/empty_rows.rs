@@ -75,7 +75,7 @@ fn empty_rows_are_left_out_and_told() {
     assert_eq!(
         message,
         format!(
-            "{} rows without stiffness and mass are left out: 12 of 2 nodes without elements (9002, 9001), {rotations} rotations of other nodes",
+            "{} rows without stiffness and mass are left out: 12 of nodes without elements (9002, 9001), {rotations} rotations of other nodes",
             12 + rotations
         )
     );

@@ -83,7 +83,6 @@ fn links_to_included_files_and_other_spellings_are_inputs_for_every_command() {
         format!("convert {model} -o sub/../nodes.inp"),
         format!("convert {model} -o sub/link.json"),
         format!("convert {model} -o b.h5 --report hard.json"),
-        format!("convert {model} -o b.h5 --checkpoint hard.csv"),
         format!("select {model} --scene s.toml --report hard.json"),
         format!("trade {model} --scene s.toml --csv hard.csv"),
         format!("response {model} --band 0..100 --from 11 --to 11 --csv hard.csv"),
