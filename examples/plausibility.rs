@@ -64,7 +64,7 @@ see stands here; the table below has its figures on every model of the fixtures 
   row sums included, up to the distortion of the elements. d is the number of directions.
 * Elements are found as the largest sets of nodes that K couples all with each other. Volumes and shares of mass are exact for affine elements with 4, 6, 8, 10 and
   20 nodes, off by some percent for curved ones; nodes with anything else around them (rotations, bars, other sets) are not judged, nor are quadratic elements with a diagonal mass.
-* The checks of units need `[model.units]`. `allow_implausible = true` in `[model]`, or `--allow-implausible`, turns FB433 and FB437 into warnings.
+* Numbers whose units nothing states are taken for m, kg, s; a speed that no matter has there is refused as well (FB437) where common units explain it. `allow_implausible = true` in `[model]`, or `--allow-implausible`, turns FB433 and FB437 into warnings.
 
 What stays invisible: the order of a **diagonal** M, which couples nothing (e/m from node to node is no help: slivers among linear tetrahedra spread it by
 factors of a thousand in the right order); M of a mesh with the same connections and other positions or densities; nodes of the same elements with like masses (the

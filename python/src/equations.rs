@@ -178,7 +178,8 @@ impl EquationsOfMotion {
         Ok(vector(py, self.at(&q, None)?.first_moment().as_slice()))
     }
 
-    /// Node of that number: where forces act and motion is read.
+    /// Node of that number (`Body.node_ids`; of a model that was made without `node_ids` its position from 0): where
+    /// forces act and motion is read.
     fn node(&self, py: Python<'_>, number: i64) -> PyResult<Point> {
         let inner = self.body.node_point(number).map_err(|error| exception(py, &error))?;
         Ok(Point { equations: Arc::clone(&self.inner), inner, name: format!("node {number}") })

@@ -70,6 +70,8 @@ pub enum Damping<'py> {
     Ratio(f64),
     /// alpha and beta of D = alpha M + beta K.
     Rayleigh(f64, f64),
+    /// Ratios by frequency: ends in hertz, the last infinite, and ratios.
+    Bands(Vec<(f64, f64)>),
     /// D.
     Matrix(Compressed<'py>),
 }
@@ -78,6 +80,7 @@ fn damped(py: Python<'_>, builder: ModelBuilder, damping: &Damping<'_>) -> PyRes
     Ok(match damping {
         Damping::Ratio(ratio) => builder.damping_ratio(*ratio),
         Damping::Rayleigh(alpha, beta) => builder.rayleigh_damping(*alpha, *beta),
+        Damping::Bands(bands) => builder.damping_bands(bands),
         Damping::Matrix(matrix) => builder.damping_matrix(matrix.matrix(py)?),
     })
 }

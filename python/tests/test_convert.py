@@ -121,7 +121,60 @@ def test_interfaces_and_craig_bampton(bracket: Given) -> None:
     np.testing.assert_allclose(own.of_modes.T @ own.mass @ own.of_modes, np.eye(body.n_modes), atol=1e-8)
 
 
+def without_numbers(given: Given) -> tuple[dict[str, object], np.ndarray]:
+    """The model by positions, and the nodes of its face of the largest x, which are not those at their positions + 1."""
+    place = {int(node): at for at, node in enumerate(given.node_ids)}
+    dofs = None if given.dofs is None else np.array([[place[int(node)], dir] for node, dir in given.dofs])
+    arguments = {"stiffness": given.stiffness, "mass": given.mass, "nodes": given.nodes, "dofs": dofs, "units": given.units}
+    return arguments, given.nodes[:, 0] > given.nodes[:, 0].max() - 1e-9
+
+
+def test_nodes_are_positions_without_numbers_and_numbers_with_them(bracket: Given) -> None:
+    arguments, mask = without_numbers(bracket)
+    positions = np.flatnonzero(mask)
+    assert 0 not in positions
+    numbered = bracket.model(interfaces={"end": (bracket.node_ids[mask], "rigid")})
+    expected = numbered.convert(modes=2, basis="craig-bampton")
+    for end in (positions, positions.tolist(), mask, mask.tolist()):
+        body = flexbody.convert(**arguments, interfaces={"end": (end, "rigid")}, modes=2, basis="craig-bampton")
+        np.testing.assert_allclose(body.frequencies_hz, expected.frequencies_hz, rtol=1e-9)
+        np.testing.assert_array_equal(body.interfaces["end"].node_ids, positions)
+        np.testing.assert_array_equal(body.node_ids, np.arange(len(mask)))
+    by_mask = bracket.model(interfaces={"end": (mask, "rigid")}).convert(modes=2, basis="craig-bampton")
+    assert by_mask == expected
+    q = np.zeros(expected.n_modes)
+    for at in positions[:3]:
+        point = body.equations_of_motion().node(int(at))
+        np.testing.assert_allclose(body.origin + body.axes @ point.place(q), bracket.nodes[at], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    [
+        ([684], "names 1 positions outside of 0 to 683: 684"),
+        ([-1, 3], "names 1 positions outside of 0 to 683: -1"),
+        ([20000], "without node_ids nodes are positions from 0"),
+        (np.ones(5, bool), r"the mask of interface 'end' has the shape \(5,\), expected \(684,\)"),
+    ],
+)
+def test_nodes_that_are_none_are_refused_by_what_they_are(bracket: Given, end: object, words: str) -> None:
+    arguments, _ = without_numbers(bracket)
+    with pytest.raises(ValueError, match=words):
+        flexbody.model(**arguments, interfaces={"end": end})
+
+
+def test_unknown_numbers_are_called_numbers(bracket: Given) -> None:
+    with pytest.raises(flexbody.InputError, match="names 1 unknown node numbers: 999999") as caught:
+        bracket.model(interfaces={"end": [int(bracket.node_ids[0]), 999999]})
+    assert caught.value.codes == ("FB209",) and "node_ids" in caught.value.diagnostics[0].help
+
+
 def test_damping(cube: Given) -> None:
+    frequencies = cube.model().convert(modes=8).frequencies_hz
+    gap = int(np.argmax(np.diff(frequencies)))
+    middle = float(frequencies[gap] + frequencies[gap + 1]) / 2
+    bands = cube.model(damping=[(middle, 0.01), (None, 1.0)]).convert(modes=8)
+    np.testing.assert_allclose(bands.damping_ratios, np.where(bands.frequencies_hz < middle, 0.01, 1.0))
     ratio = cube.model(damping=0.02).convert(modes=8)
     np.testing.assert_allclose(ratio.damping_ratios, 0.02)
     rayleigh = cube.model(damping=(0.0, 1e-9)).convert(modes=8)
@@ -151,7 +204,7 @@ def test_errors_carry_codes(cube: Given) -> None:
     for keywords, code in [
         ({"units": ("mm", "stone", "s")}, "FB202"),
         ({"interfaces": {"end": [999999]}}, "FB209"),
-        ({"damping": 2.0}, None),
+        ({"damping": -2.0}, None),
     ]:
         with pytest.raises(flexbody.InputError) as caught:
             cube.model(**keywords)

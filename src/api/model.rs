@@ -8,7 +8,8 @@ use crate::input::{
     InterfaceNodes, InterfaceSource, LoadSource, ModelFiles, check_size, read_manifest, read_model,
 };
 use crate::model::{
-    CheckedModel, Damping, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel, Reference, SurfaceMesh,
+    CheckedModel, Damping, DampingBand, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel, Reference,
+    SurfaceMesh,
 };
 use crate::numerics::linalg::CscMatrix;
 use std::path::{Path, PathBuf};
@@ -173,7 +174,8 @@ pub struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    /// Numbers and positions of the nodes.
+    /// Numbers and positions of the nodes. Interfaces, labels of rows, loads and scenes name nodes by these numbers;
+    /// [`ModelBuilder::mesh`] by positions from 0.
     pub fn nodes(mut self, ids: Vec<i64>, positions: Vec<[f64; 3]>) -> Self {
         self.raw.nodes = Nodes { ids, positions };
         self
@@ -257,6 +259,15 @@ impl ModelBuilder {
     /// The same damping ratio for every mode.
     pub fn damping_ratio(mut self, ratio: f64) -> Self {
         self.raw.damping = Some(Damping::Ratio(ratio));
+        self
+    }
+
+    /// Damping ratios of modes by their frequencies: (end in hertz, ratio), ends ascending, the last
+    /// [`f64::INFINITY`]. A mode belongs to the first band whose end its frequency does not exceed. What is wrong with
+    /// them is refused by [`ModelBuilder::build`].
+    pub fn damping_bands(mut self, bands: &[(f64, f64)]) -> Self {
+        let band = |&(to_hz, ratio): &(f64, f64)| DampingBand { to_hz, ratio };
+        self.raw.damping = Some(Damping::Bands(bands.iter().map(band).collect()));
         self
     }
 

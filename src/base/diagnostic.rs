@@ -86,7 +86,7 @@ codes! {
     JobStep = "FB114", Note, Done, "one of several steps with matrices is taken", "nothing to do if it is the right one; else remove the others";
     NodeFileSyntax = "FB115", Error, BadInput, "file of nodes cannot be read", "write it again, or give a table with the columns node, x, y, z";
     DeckSupports = "FB116", Note, Done, "input deck supports the body", "matrices that are written before the supports are applied (KGG, MGG) are free; for others take the supports out";
-    RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids";
+    RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids and nodes of no element";
     DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
     JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all nodes (of Nastran KGG and MGG) where it matters how the inertia changes with the deformation";
     DeckReference = "FB120", Note, Done, "reference node of a distributing coupling lies at the mean of its nodes", "nothing to do; an averaging interface of the nodes has their rotation as well";
@@ -145,7 +145,7 @@ codes! {
     RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "the body is constrained or grounded, rotations are labelled as displacements, or coordinates are in other units or another order than the matrix";
     PencilSingular = "FB411", Error, BadInput, "rows that neither K nor M holds: the eigenproblem is singular", "remove these degrees of freedom from the matrices, or hold them";
     MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
-    InertiaImplausible = "FB413", Warning, Done, "mass and size do not fit the stated units", "check the units of the manifest";
+    InertiaImplausible = "FB413", Warning, Done, "mass and size are those of no matter in the units of the model", "check the units of the manifest, or state them with --units";
     BodiesSeveral = "FB414", Error, Untrustworthy, "matrices hold several bodies", "convert each by itself with --split, or connect them";
     DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
     BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
@@ -157,14 +157,15 @@ codes! {
     RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
     MagnitudeExtreme = "FB424", Error, BadInput, "numbers too large or too small to be multiplied in double precision", "write the model in units in which its numbers are closer to one";
     NodesRounded = "FB425", Warning, Done, "node positions do not fit the stiffness to all digits", "write coordinates with 17 digits, and the body near the origin: far from it coordinates are rounded to their own size";
+    RotationsFollow = "FB427", Note, Done, "rotations without stiffness and mass follow the nodes around them", "nothing to do for shells without drilling stiffness: no frequency and no displacement depends on these rotations";
     InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
     InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
     InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
     MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows stand in another order, or it is another mesh's", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so";
     MassPairs = "FB434", Warning, Done, "mass matrix couples nodes that the stiffness matrix does not", "nothing to do if the model is meant so; else write K and M in the same order";
     MassesExchanged = "FB435", Warning, Done, "masses of nodes seem to be exchanged", "write K and M in the same order of nodes";
-    SpeedImplausible = "FB436", Warning, Done, "speed of sound of no known matter: stiffness, mass and lengths do not fit the stated units", "check that density, Young's modulus and coordinates are all in the units of the manifest";
-    DensityImplausible = "FB437", Error, BadInput, "density of no known matter: mass and coordinates do not fit the stated units", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
+    SpeedImplausible = "FB436", Warning, Done, "speed of sound of no known matter: stiffness, mass and lengths do not fit the units of the model", "check that density, Young's modulus and coordinates are all in the units of the manifest, or state these with --units";
+    DensityImplausible = "FB437", Error, BadInput, "density or speed of sound of no known matter: the numbers do not fit the units of the model", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
     MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass";
     InterfaceFar = "FB439", Warning, Done, "reference point of an interface is far from its nodes", "reference points are in model axes and in the unit of length of the nodes";
     GeometricStiffnessMotion = "FB440", Error, BadInput, "geometric stiffness is not that of a stress: it breaks a relation with rigid motion", "give the stress stiffness alone: the difference of the stiffness matrices with and without prestress holds the stiffness of the initial displacements as well";
@@ -186,7 +187,7 @@ codes! {
     NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
     FactorPrecision = "FB513", Note, Done, "precision of the factor", "nothing to do: --factor f64 or f32 decides otherwise";
     DampingIndefinite = "FB514", Error, Untrustworthy, "damping of the modes is not positive semidefinite or not finite", "damping must not feed energy: check the signs and the units of the damping";
-    ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "check the units of the damping: alpha is in 1/time, beta in time, D in mass/time";
+    ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "nothing to do if it is meant so; else check the units: a ratio of 2 % is 0.02, alpha is in 1/time, beta in time, D in mass/time";
     ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
     ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
     ShapesRigid = "FB522", Note, Done, "rigid-body motions are taken out of the shapes: the body frame carries them out", "nothing to do: no motion is lost";

@@ -61,7 +61,8 @@ impl Error {
         self.diagnostics.iter().any(|d| d.code() == code)
     }
 
-    fn first_error(&self) -> &Diagnostic {
+    /// The first diagnostic of severity error: the cause of the failure, whatever was noted before it.
+    pub fn first_error(&self) -> &Diagnostic {
         self.diagnostics.iter().find(|d| d.severity() == Severity::Error).expect("checked at construction")
     }
 }

@@ -12,4 +12,5 @@ pub(crate) mod numbers;
 pub mod output;
 pub mod progress;
 pub mod provenance;
+pub mod read_files;
 pub mod units;

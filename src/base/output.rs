@@ -6,6 +6,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
+use crate::base::read_files::{followed, refuse_read};
 use std::fs::{File, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -16,9 +17,6 @@ use tempfile::TempPath;
 /// What the names of temporary files begin and end with.
 const PREFIX: &str = ".flexbody-";
 const SUFFIX: &str = ".tmp";
-
-/// Most symbolic links that one path may lead through, as on Linux.
-const MOST_LINKS: usize = 40;
 
 /// A place for one output file, reserved before the work starts.
 ///
@@ -173,25 +171,6 @@ fn is_at(_: &File, _: &Path) -> bool {
     true
 }
 
-/// The file that an output path stands for: symbolic links are followed, to a file that does not exist yet as
-/// well.
-///
-/// # Errors
-/// Links that lead in a circle.
-pub fn followed(path: &Path) -> std::io::Result<PathBuf> {
-    let mut at = path.to_path_buf();
-    for _ in 0..MOST_LINKS {
-        match std::fs::symlink_metadata(&at) {
-            Ok(meta) if meta.is_symlink() => {
-                let target = std::fs::read_link(&at)?;
-                at = at.parent().unwrap_or(Path::new("")).join(target);
-            }
-            _ => return Ok(at),
-        }
-    }
-    Err(std::io::Error::other("its symbolic links lead in a circle"))
-}
-
 impl OutputSlot {
     /// Reserves `path`. A symbolic link is followed, so that the file it points to is replaced or made, not
     /// the link.
@@ -277,9 +256,12 @@ impl OutputSlot {
     /// in place, what stood in the places of the others before comes back, on file systems with hard links.
     ///
     /// # Errors
-    /// As [`OutputSlot::write`].
+    /// As [`OutputSlot::write`]; [`Usage`](Code::Usage) where one would replace a file that the run has read.
     pub fn commit_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
         let mut slots: Vec<Self> = slots.into_iter().collect();
+        for slot in &slots {
+            refuse_read(&slot.asked)?;
+        }
         for slot in &slots {
             slot.temporary.file.sync_all().map_err(|e| slot.failure(&e))?;
         }

@@ -53,7 +53,7 @@ pub struct UnitSystem {
     pub mass: Unit,
     /// Unit of time.
     pub time: Unit,
-    /// Whether the user stated them; plausibility is checked only then.
+    /// True if the user stated them; else they are m, kg, s.
     pub stated: bool,
 }
 

@@ -4,7 +4,7 @@ use super::arguments::BatchArguments;
 use super::arguments::{Arguments, Command, ConvertArguments};
 use super::convert::{model_files, wanted};
 use super::outcome::Outcome;
-use super::places::{format_of, refuse_replacing};
+use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::memory_left;
 use super::watcher::Watcher;
 use crate::base::children;
@@ -58,24 +58,26 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
     };
     let mut rows: Vec<BatchRow> = Vec::new();
     let mut waiting: Vec<(usize, Body)> = Vec::new();
-    for (index, (body, (words, converted))) in list.bodies.iter().zip(parsed).enumerate() {
+    for (index, (body, (words, converted))) in list.bodies.iter().zip(&parsed).enumerate() {
         let mut row = empty_row(body);
-        let inputs = inputs_of(&words, &converted);
+        let inputs = inputs_of(words, converted);
         match ledger.done(&body.output, &inputs) {
             Some(done) => {
                 row.read(&done.told);
                 row.state = "unchanged";
             }
-            None => match need(body, &converted, &watcher) {
+            None => match need(body, converted, &watcher) {
                 Ok(need) => {
                     row.memory_estimate_bytes = need;
-                    waiting.push((index, Body { words, output: body.output.clone(), inputs, need }));
+                    let (words, output) = (words.clone(), body.output.clone());
+                    waiting.push((index, Body { words, output, inputs, need }));
                 }
                 Err(error) => fail(&mut row, &error),
             },
         }
         rows.push(row);
     }
+    refuse_replacing_inputs(arguments, &list, &parsed, &ledger)?;
     watcher.hear(Event::Phase("converting"));
     let finished = work(waiting, budget, &mut rows, &mut ledger);
     watcher.clear();
@@ -91,6 +93,24 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
     });
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, passed: failed.is_none(), diagnostics: failed.into_iter().collect() })
+}
+
+/// No output of the list, and no report, may replace an input of any of its bodies or another output.
+fn refuse_replacing_inputs(
+    arguments: &BatchArguments,
+    list: &BatchList,
+    parsed: &[(Vec<String>, Box<ConvertArguments>)],
+    ledger: &Ledger,
+) -> Result<()> {
+    let files = |converted: &ConvertArguments| match &converted.from {
+        Some(_) => converted.model.iter().cloned().collect(),
+        None => model_files(converted).map(|files| files.paths()).unwrap_or_default(),
+    };
+    let inputs: Vec<PathBuf> = parsed.iter().flat_map(|(_, converted)| files(converted)).collect();
+    let own = ledger.path().to_path_buf();
+    let outputs = || list.bodies.iter().map(|body| &body.output).chain(&arguments.report).chain([&own]);
+    refuse_replacing(inputs.iter().chain([&arguments.list]), outputs())?;
+    refuse_replacing_read(outputs())
 }
 
 /// The words of a conversion, and what they say.
@@ -157,7 +177,8 @@ fn empty_row(body: &BatchBody) -> BatchRow {
 
 fn fail(row: &mut BatchRow, error: &Error) {
     row.exit_code = error.exit_code() as i32;
-    row.error = error.diagnostics().first().map(|d| format!("{} {}", d.code().id(), d.message()));
+    let cause = error.first_error();
+    row.error = Some(format!("{} {}", cause.code().id(), cause.message()));
 }
 
 /// A conversion that has ended.

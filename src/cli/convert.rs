@@ -6,7 +6,7 @@ use super::elsewhere::Elsewhere;
 use super::import;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{Places, Reserved, format_of, refuse_replacing};
+use super::places::{Places, Reserved, format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::select::asked_cases;
 use super::terminal::body_text;
@@ -44,12 +44,7 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
 
 /// A conversion whose modes this program finds, or somebody else.
 pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
-    if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
-        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
-        return Err(Diagnostic::new(Code::Usage, message)
-            .with_help("give at least 1, or --basis craig-bampton for static condensation")
-            .into());
-    }
+    refuse_without_modes(arguments)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
     // What the command line says replaces what the manifest says.
@@ -69,6 +64,8 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let watcher = watcher(arguments, "reading");
     let lumped = schemes.iter().map(Scheme::read).collect::<Result<Vec<_>>>()?;
     let raw = read_model(&files)?;
+    // Before the work: what a deck includes or assigns is known now.
+    refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
     let job = Job {
         arguments,
@@ -89,6 +86,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
     refuse_overwriting(arguments, &all, &files, &schemes, &loads, &scenes)?;
+    refuse_replacing_read(all.iter().flat_map(Places::all))?;
     let mut slots = vec![reserved];
     for places in &all[1..] {
         slots.push(places.reserve()?);
@@ -309,6 +307,16 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
     Ok(sets)
 }
 
+fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
+    if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
+        let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
+        return Err(Diagnostic::new(Code::Usage, message)
+            .with_help("give at least 1, or --basis craig-bampton for static condensation")
+            .into());
+    }
+    Ok(())
+}
+
 /// Options that say nothing together; `loads` are those of residual vectors.
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
@@ -366,7 +374,7 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
     match (arguments.basis, &arguments.shapes) {
         (BasisName::Imported, Some(shapes)) => {
             let location = MatrixLocation::parse(shapes);
-            let imported = match read_imported(&location, model.stiffness().n(), "shapes")? {
+            let imported = match read_imported(&location, model.matrix_rows(), "shapes")? {
                 ImportedColumns::Rows(raw) => ImportedShapes::new(model, raw),
                 ImportedColumns::Modes(raw) => ImportedShapes::of_modes(model, raw),
             };

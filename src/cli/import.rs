@@ -8,10 +8,9 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::base::provenance::SourceFile;
-use crate::body::verification::accept;
 use crate::formats::find_import_format;
 use crate::formats::flex_body_file;
-use crate::formats::import::import_body;
+use crate::formats::import::{accept_imported, import_body};
 use crate::input::{InputFile, parse_units};
 use crate::report::{Facts, Format, RunData, render};
 
@@ -35,7 +34,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     if arguments.storage == StorageName::F32 {
         imported.body = imported.body.rounded_to_f32()?;
     }
-    accept(&imported.body)?;
+    accept_imported(&imported).map_err(|error| error.in_file(path))?;
     refuse_warnings(arguments.printing, &imported.diagnostics)?;
     flex_body_file::fill_slot(&imported.body, &slot)?;
     let run = RunData { diagnostics: imported.diagnostics, ..RunData::default() };

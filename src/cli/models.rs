@@ -1,7 +1,7 @@
 //! Models that are given by their manifest or by the job of an FE program.
 
 use super::arguments::JobArguments;
-use super::places::refuse_replacing;
+use super::places::{refuse_replacing, refuse_replacing_read};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::input::{InterfaceNodes, InterfaceSource, ModelFiles, is_job, read_manifest, read_model};
@@ -44,12 +44,13 @@ pub(super) fn of_manifest_or_job(path: &Path, job: &JobArguments) -> Result<Mode
 pub(super) fn read_checked<'p>(
     path: &Path,
     job: &JobArguments,
-    outputs: impl Iterator<Item = &'p PathBuf>,
+    outputs: impl Iterator<Item = &'p PathBuf> + Clone,
 ) -> Result<(ModelFiles, CheckedModel)> {
     let files = of_manifest_or_job(path, job)?;
-    refuse_replacing(files.paths().iter(), outputs)?;
-    let checked = FeModel::from_raw(read_model(&files)?)?;
-    Ok((files, checked))
+    refuse_replacing(files.paths().iter(), outputs.clone())?;
+    let raw = read_model(&files)?;
+    refuse_replacing_read(outputs)?;
+    Ok((files, FeModel::from_raw(raw)?))
 }
 
 impl JobArguments {

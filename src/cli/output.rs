@@ -10,6 +10,7 @@ use super::{
 };
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{ExitCode, Result};
+use crate::base::read_files::begin_run;
 use crate::report::output_json;
 use clap::{CommandFactory, Parser};
 use std::ffi::OsString;
@@ -63,6 +64,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         _ => None,
     });
     let (name, printing) = command_of(arguments);
+    begin_run();
     // In a thread of the pool: from any other one every loop in parallel is handed over, and waited for asleep.
     let outcome = rayon::scope(|_| outcome_of(arguments));
     finish(Some(name), printing, outcome)

@@ -3,7 +3,8 @@
 use super::arguments::ConvertArguments;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::base::output::{OutputSlot, followed};
+use crate::base::output::OutputSlot;
+use crate::base::read_files::{FileIdentity, refuse_read, replaces};
 use crate::formats::flex_body_file;
 use crate::report::Format;
 use crate::study::checkpoint::CheckpointFile;
@@ -65,49 +66,16 @@ pub(super) fn refuse_replacing<'i, 'o>(
     for output in outputs {
         let path = FileIdentity::of(output);
         if taken.iter().any(|other| other.is_same(&path)) {
-            let message = format!("output {} is an input or another output of this run", output.display());
-            return Err(Diagnostic::new(Code::Usage, message).with_help("choose another output name").into());
+            return Err(replaces(output).into());
         }
         taken.push(path);
     }
     Ok(())
 }
 
-/// What a path stands for, however it is spelt.
-struct FileIdentity {
-    path: PathBuf,
-    /// Device and number of an existing file: the same for all of its names.
-    file: Option<(u64, u64)>,
-}
-
-impl FileIdentity {
-    fn of(path: &Path) -> Self {
-        let followed = followed(path).unwrap_or_else(|_| path.to_path_buf());
-        // A file that does not exist yet has a folder that does.
-        let in_folder = || {
-            let folder = followed.parent().filter(|folder| !folder.as_os_str().is_empty());
-            Some(std::fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?.join(followed.file_name()?))
-        };
-        let whole = std::fs::canonicalize(path).ok().or_else(in_folder);
-        let path = whole.unwrap_or_else(|| std::path::absolute(path).unwrap_or_else(|_| path.into()));
-        Self { file: file_number(&path), path }
-    }
-
-    fn is_same(&self, other: &Self) -> bool {
-        self.path == other.path || (self.file.is_some() && self.file == other.file)
-    }
-}
-
-#[cfg(unix)]
-fn file_number(path: &Path) -> Option<(u64, u64)> {
-    use std::os::unix::fs::MetadataExt;
-    let meta = std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
-    Some((meta.dev(), meta.ino()))
-}
-
-#[cfg(not(unix))]
-fn file_number(_: &Path) -> Option<(u64, u64)> {
-    None
+/// No output may replace a file that was read, also those that no argument names: what a deck includes or assigns.
+pub(super) fn refuse_replacing_read<'o>(outputs: impl Iterator<Item = &'o PathBuf>) -> Result<()> {
+    outputs.map(|output| refuse_read(output)).collect()
 }
 
 /// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`: with a number or a name before

@@ -4,7 +4,7 @@ use super::arguments::{BasisName, ResponseArguments};
 use super::convert::load_sources;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -38,6 +38,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     let watch = |event: Event<'_>| watcher.hear(event);
     let scene =
         arguments.scene.as_ref().map(|path| read_case(path, arguments.case.as_deref())).transpose()?;
+    refuse_replacing_read(outputs(arguments))?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let (model, body, diagnostics) = if is_model {
         let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
@@ -68,7 +69,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     })
 }
 
-fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> {
+fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> + Clone {
     arguments.csv.iter().chain(&arguments.report)
 }
 
@@ -147,7 +148,7 @@ fn settings(arguments: &ResponseArguments, scene: Option<&Scene>, body: &FlexBod
         band,
         points: arguments.points as usize,
         solves: arguments.solves as usize,
-        damping: arguments.damping.or_else(|| scene?.requirements.damping),
+        damping: arguments.damping.map(Into::into).or_else(|| scene?.requirements.damping.clone()),
         replaces_damping: arguments.damping.is_none()
             && scene.is_some_and(|scene| scene.requirements.replaces_damping),
         tolerance: arguments.tolerance,

@@ -3,7 +3,7 @@
 use super::arguments::SelectArguments;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -34,6 +34,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
     let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     refuse_replacing(series, arguments.report.iter())?;
+    refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let (body, lacks, mut diagnostics) = if is_model {
         converted(arguments, &scenes, &watch)?

@@ -2,7 +2,7 @@
 
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, marked, refuse_replacing};
+use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
 use super::resources::{memory_left, use_threads};
 use super::select::asked_cases;
 use super::watcher::Watcher;
@@ -32,6 +32,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     let inputs = [&arguments.body, &arguments.scene].into_iter().chain(series);
     refuse_replacing(inputs, all.iter().flat_map(Places::all))?;
+    refuse_replacing_read(all.iter().flat_map(Places::all))?;
     let slots = match &all[..] {
         [_] => vec![reserved],
         all => all.iter().map(Places::reserve).collect::<Result<Vec<_>>>()?,

@@ -3,7 +3,7 @@
 use super::arguments::{ReferenceName, TradeArguments};
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{format_of, refuse_replacing};
+use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
 use super::select::asked_cases;
 use super::watcher::Watcher;
@@ -34,6 +34,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
     let series = scenes.iter().flat_map(|scene| &scene.series);
     refuse_replacing(series.map(|file| &file.path), outputs())?;
+    refuse_replacing_read(outputs())?;
     let memory = memory_left(None);
     let mut diagnostics = Vec::new();
     let (model, sources, lacks) = if is_model {

@@ -2,6 +2,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
+use crate::base::read_files::note_read;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
@@ -42,6 +43,7 @@ pub struct BatchBody {
 /// [`BatchSyntax`](Code::BatchSyntax) for what is not as it should be.
 pub fn read_batch_list(path: &Path) -> Result<BatchList> {
     let wrong = |message: String| Error::from(Diagnostic::new(Code::BatchSyntax, message).in_file(path));
+    note_read(path);
     let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("the list cannot be read: {e}")))?;
     let mut list: BatchList = toml::from_str(&text).map_err(|e| {
         let line = e.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());

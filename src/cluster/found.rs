@@ -10,6 +10,7 @@ use super::sealed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, sha256_of_file};
+use crate::base::read_files::note_read;
 use crate::body::basis::{CountElsewhere, SolvedModes, rigid_modes};
 use crate::model::FeModel;
 use faer::{Mat, MatRef};
@@ -195,6 +196,7 @@ impl Vectors<'_> {
             let message = format!("the {} are not those that the result was written with", self.of);
             return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
         }
+        note_read(self.path);
         let file = File::open(self.path).map_err(failed)?;
         columns(BufReader::with_capacity(1 << 20, file), (n, count), index, place)
             .map_err(failed)?

@@ -34,7 +34,7 @@ impl Ledger {
         let mut path = list.as_os_str().to_owned();
         path.push(".done");
         let path = PathBuf::from(path);
-        let done = sealed::open(&path, FORMAT).unwrap_or_default();
+        let done = sealed::open_kept(&path, FORMAT).unwrap_or_default();
         Self { path, done }
     }
 

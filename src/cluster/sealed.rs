@@ -4,6 +4,7 @@
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::sha256_hex;
+use crate::base::read_files::note_read;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -26,12 +27,21 @@ pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
     format!("{head}\n{body}\n")
 }
 
-/// What a file holds.
+/// What a file of an input holds.
+///
+/// # Errors
+/// As [`open_kept`].
+pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
+    note_read(path);
+    open_kept(path, format)
+}
+
+/// What a file holds that the run keeps for itself and replaces.
 ///
 /// # Errors
 /// [`ClusterUnreadable`](Code::ClusterUnreadable) where it cannot be read or is no file of `format`;
 /// [`ClusterChanged`](Code::ClusterChanged) where its digest is another.
-pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
+pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
     let text = std::fs::read_to_string(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
     let not_ours = || unreadable(format!("file is no `{format}`"));

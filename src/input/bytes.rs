@@ -7,6 +7,7 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::provenance::Fingerprint;
+use crate::base::read_files::note_read;
 use memmap2::Mmap;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -40,6 +41,7 @@ impl InputFile {
         if metadata.len() == 0 {
             return Err(Diagnostic::new(Code::FileEmpty, "file has no bytes").in_file(path));
         }
+        note_read(path);
         Self::of(&file, path)
     }
 

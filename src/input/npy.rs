@@ -10,13 +10,59 @@ pub(super) fn recognises(head: &[u8]) -> bool {
     head.starts_with(MAGIC)
 }
 
-/// An array of real numbers with one or two extents.
-pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
+/// Matrices of equal size, one after the other, each row by row.
+pub(super) struct Blocks {
+    /// Number of matrices.
+    pub count: usize,
+    /// Rows of each.
+    pub rows: usize,
+    /// Columns of each.
+    pub columns: usize,
+    /// All values.
+    pub values: Vec<f64>,
+    /// Significant decimal digits that the values carry at the most.
+    pub digits: u8,
+}
+
+/// Reads an array of real numbers with three extents.
+pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
+    let (Header { descr, fortran, shape }, data) = described(bytes)?;
+    let (size, decode) = number_type(descr)?;
+    let &[count, rows, columns] = shape.as_slice() else {
+        let message = format!("array has {} extents, expected 3", shape.len());
+        return Err(Diagnostic::new(Code::MatrixKind, message));
+    };
+    let length = count.checked_mul(rows).and_then(|some| some.checked_mul(columns));
+    let length = length.filter(|all| all.checked_mul(size) == Some(data.len()));
+    let Some(length) = length else {
+        let message = format!(
+            "header announces {count} x {rows} x {columns} values of {size} bytes, {} bytes follow",
+            data.len()
+        );
+        return Err(Diagnostic::new(Code::MatrixCount, message));
+    };
+    let own = rows * columns;
+    // In Fortran's order the first index runs fastest.
+    let at = |k: usize| match fortran {
+        true => k / own + count * (k % own / columns + rows * (k % columns)),
+        false => k,
+    };
+    let values = (0..length).map(|k| decode(&data[at(k) * size..(at(k) + 1) * size])).collect();
+    Ok(Blocks { count, rows, columns, values, digits: if size == 4 { 7 } else { 17 } })
+}
+
+/// Header and numbers of an array.
+fn described(bytes: &[u8]) -> Result<(Header<'_>, &[u8]), Diagnostic> {
     let (header, data) = split(bytes)?;
     let text = header.escape_ascii().to_string();
     let shown = text.get(..100).unwrap_or(&text).trim_end();
-    let Header { descr, fortran, shape } =
-        parse(header).ok_or_else(|| syntax(format!("header is not understood: `{shown}`")))?;
+    let header = parse(header).ok_or_else(|| syntax(format!("header is not understood: `{shown}`")))?;
+    Ok((header, data))
+}
+
+/// An array of real numbers with one or two extents.
+pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
+    let (Header { descr, fortran, shape }, data) = described(bytes)?;
     let (size, decode) = number_type(descr)?;
     let (rows, cols) = match *shape.as_slice() {
         [rows] => (rows, 1),

@@ -13,7 +13,9 @@ use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, Sources};
-use crate::model::{Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
+use crate::model::{
+    Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel, filled_rows,
+};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -48,7 +50,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let damping = parsed.damping.and_then(|damping| take(&mut diagnostics, damping));
     let geometric_stiffness =
         parsed.geometric_stiffness.into_iter().filter_map(|one| take(&mut diagnostics, one)).collect();
-    let places = Places::of(matrices.as_ref());
+    let places = Places::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
         .interfaces
         .iter()
@@ -128,6 +130,21 @@ struct ModelMatrices {
     /// Files of a job.
     files: Vec<(&'static str, PathBuf)>,
     diagnostics: Vec<Diagnostic>,
+}
+
+impl ModelMatrices {
+    /// Nodes with stiffness or mass; `None` where the rows are not those of the nodes in turn and have no labels.
+    fn moving(&self, dimension: u8) -> Option<HashSet<i64>> {
+        let n = self.stiffness.matrix.n_cols();
+        let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], n);
+        let (d, nodes) = (usize::from(dimension), &self.nodes.ids);
+        let node_of = |row: usize| match &self.dofs {
+            Some(labels) => labels.get(row).map(|label| label.node),
+            None => Some(nodes[row / d]),
+        };
+        let known = self.dofs.is_some() || d * nodes.len() == n;
+        known.then(|| (0..n).filter(|&row| filled[row]).filter_map(node_of).collect())
+    }
 }
 
 impl From<JobModel> for ModelMatrices {
@@ -224,14 +241,13 @@ impl Parsed {
 /// Where the nodes of a model lie, and its sets, for interfaces that name these.
 struct Places<'m> {
     matrices: Option<&'m ModelMatrices>,
-    /// Nodes that have rows, where labels say so.
+    /// Nodes with stiffness or mass, where rows are known.
     moving: Option<HashSet<i64>>,
 }
 
 impl<'m> Places<'m> {
-    fn of(matrices: Option<&'m ModelMatrices>) -> Self {
-        let dofs = matrices.and_then(|matrices| matrices.dofs.as_ref());
-        Self { matrices, moving: dofs.map(|dofs| dofs.iter().map(|label| label.node).collect()) }
+    fn of(matrices: Option<&'m ModelMatrices>, dimension: u8) -> Self {
+        Self { matrices, moving: matrices.and_then(|matrices| matrices.moving(dimension)) }
     }
 
     /// The nodes of an interface. Without a model, whose files say why, regions and sets have none.

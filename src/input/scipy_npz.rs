@@ -1,5 +1,5 @@
-//! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR or COO
-//! form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
+//! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
+//! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
 
 use super::assemble::{Storage, assemble, check_size, push, undeclared_triangle};
 use super::compressed::{Compressed, EntryCheck};
@@ -47,6 +47,9 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
     let &[rows, columns] = shape.as_slice() else {
         return Err(Diagnostic::new(Code::MatrixKind, "`shape` is not two whole numbers").with_help(HELP));
     };
+    if form == "bsr" {
+        return blocks(&mut archive, &shape, path);
+    }
     let data = npy::read(&archive.member("data")?)?;
     let n = check_size(rows.max(0) as u64, columns.max(0) as u64, data.values.len() as u64)?;
     let raw = match form.as_str() {
@@ -73,6 +76,60 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
         }
     };
     Ok(RawMatrix { digits: raw.digits.min(data.digits), ..raw })
+}
+
+/// A matrix in blocks of equal size: `data` (blocks x r x c), the block column of each in `indices`, where each
+/// block row begins in `indptr`.
+fn blocks(
+    archive: &mut Archive<'_>,
+    shape: &[i64],
+    path: &Path,
+) -> std::result::Result<RawMatrix, Diagnostic> {
+    let wrong = |code, message: String| Err(Diagnostic::new(code, message).with_help(HELP));
+    let npy::Blocks { count, rows, columns, values, digits } = npy::read_blocks(&archive.member("data")?)?;
+    let n = check_size(shape[0].max(0) as u64, shape[1].max(0) as u64, values.len() as u64)?;
+    if rows == 0 || columns == 0 || n % rows != 0 || n % columns != 0 {
+        return wrong(
+            Code::MatrixCount,
+            format!("blocks of {rows} x {columns} do not make up {n} rows and columns"),
+        );
+    }
+    let indices = npy::read_integers(&archive.member("indices")?)?;
+    let pointers = npy::read_integers(&archive.member("indptr")?)?;
+    if indices.len() != count {
+        return wrong(Code::MatrixCount, format!("{count} blocks have {} indices", indices.len()));
+    }
+    if pointers.len() != n / rows + 1 {
+        let message = format!(
+            "`indptr` has {} values, expected {} for {} block rows",
+            pointers.len(),
+            n / rows + 1,
+            n / rows
+        );
+        return wrong(Code::MatrixCount, message);
+    }
+    if !pointers.is_sorted() || pointers[0] != 0 || pointers[n / rows] != count as i64 {
+        let message = format!("`indptr` does not rise from 0 to {count}, the number of blocks");
+        return wrong(Code::MatrixSyntax, message);
+    }
+    let (mut pieces, mut check) = (Vec::new(), EntryCheck::new(n, HELP));
+    for (block_row, pair) in pointers.windows(2).enumerate() {
+        for block in pair[0] as usize..pair[1] as usize {
+            let own = &values[block * rows * columns..(block + 1) * rows * columns];
+            for (k, &value) in own.iter().enumerate() {
+                // Zeros fill the blocks up: they are no entries, and an index outside of the matrix is one all the same.
+                let row = (block_row * rows + k / columns) as i64;
+                let column =
+                    indices[block].saturating_mul(columns as i64).saturating_add((k % columns) as i64);
+                push(&mut pieces, check.entry(row, column, value)?);
+            }
+        }
+    }
+    let raw = match undeclared_triangle(check.sides, |_| BOTH_TRIANGLES.into()) {
+        Some(triangle) => return Err(triangle),
+        None => assemble(n, pieces, Storage::Full, 17, path)?,
+    };
+    Ok(RawMatrix { digits: raw.digits.min(digits), ..raw })
 }
 
 fn coordinates(

@@ -2,6 +2,7 @@
 //! tables by themselves.
 
 use super::assembled::Assembled;
+use super::drilling::{Following, with_following_rotations};
 use super::layout::{Layout, layout};
 use super::load_checks::check_loads;
 use super::magnitude::check_magnitudes;
@@ -9,7 +10,7 @@ use super::matrix_checks::{check_diagonal, check_diagonals, check_matrix, symmet
 use super::references::resolve_references;
 use super::rigid::rigid_count;
 use super::wording::name_some;
-use super::{Damping, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel, SurfaceMesh};
+use super::{Damping, GeometricStiffness, Nodes, RawMatrix, RawModel, SurfaceMesh};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Result, stop_on_error};
 use crate::numerics::linalg::SymmetricMatrix;
@@ -46,6 +47,8 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     (raw.nodes, raw.dofs) = (Nodes::default(), None);
     let row_to_internal = (!layout.is_identity()).then_some(layout.row_to_internal);
     let rows = layout.rows;
+    let Following { stiffness, mass, note } = with_following_rotations(&raw, &rows, &nodes, stiffness, mass);
+    found.extend(note);
     let body =
         Assembled { raw, nodes, mesh, rows, stiffness, mass, row_to_internal, damping, geometric_stiffness };
     Ok((body, found))
@@ -85,7 +88,7 @@ fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
     check_places(raw, nodes, found);
     check_names(raw, found);
     resolve_references(raw, nodes, found);
-    check_members(&raw.interfaces, nodes, found);
+    check_members(raw, nodes, found);
     let dimension = usize::from(raw.dimension);
     check_loads(&raw.geometric_stiffness, &raw.interfaces, dimension, found);
     let rows = raw.stiffness.matrix.n_cols();
@@ -129,18 +132,18 @@ fn check_places(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
 }
 
 /// Interfaces name nodes that have rows.
-fn check_members(interfaces: &[NodeSet], nodes: &Nodes, found: &mut Vec<Diagnostic>) {
+fn check_members(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
-    for set in interfaces {
-        let unknown: Vec<i64> = set.nodes.iter().filter(|id| !known.contains(id)).copied().collect();
-        if !unknown.is_empty() {
-            let message = format!(
-                "interface `{}` names {} unknown nodes: {}",
-                set.name,
-                unknown.len(),
-                name_some(&unknown)
-            );
-            found.push(Diagnostic::new(Code::InterfaceNode, message));
+    let placed: HashSet<i64> = raw.nodes.ids.iter().copied().collect();
+    for set in &raw.interfaces {
+        let others = set.nodes.iter().filter(|id| !known.contains(id)).copied();
+        let (at_rest, unknown): (Vec<i64>, Vec<i64>) = others.partition(|id| placed.contains(id));
+        for (members, what) in [(unknown, "unknown nodes"), (at_rest, "nodes without stiffness and mass")] {
+            if !members.is_empty() {
+                let (count, named) = (members.len(), name_some(&members));
+                let message = format!("interface `{}` names {count} {what}: {named}", set.name);
+                found.push(Diagnostic::new(Code::InterfaceNode, message));
+            }
         }
     }
 }

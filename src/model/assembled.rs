@@ -17,7 +17,7 @@ pub(super) struct Assembled {
     pub stiffness: SymmetricMatrix,
     /// M.
     pub mass: SymmetricMatrix,
-    /// Internal row of each matrix row; none when they are the same, or when this is one of several bodies.
+    /// Internal row of each matrix row, `u32::MAX` of those that are left out; none when they are the same, or when this is one of several bodies.
     pub row_to_internal: Option<Vec<u32>>,
     /// Damping, a matrix in the same order.
     pub damping: Option<Damping<SymmetricMatrix>>,

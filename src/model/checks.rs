@@ -283,7 +283,7 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
 const DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {
-    if !raw.units.stated {
+    if !raw.has_units() {
         return;
     }
     let total: f64 = mass.as_csc().values().iter().sum::<f64>() * raw.units.mass.to_si();

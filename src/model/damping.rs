@@ -27,6 +27,55 @@ pub struct DampingBand {
     pub ratio: f64,
 }
 
+/// Damping ratios of modes by their frequencies: bands ascending, the last without end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DampingRatios(Vec<DampingBand>);
+
+impl DampingRatios {
+    /// The ratios of `bands`; `Err` says what is wrong with them.
+    ///
+    /// # Errors
+    /// No band; a ratio that is negative or not finite; ends that are not positive or do not ascend; a last band with
+    /// an end.
+    pub fn new(bands: Vec<DampingBand>) -> Result<Self, String> {
+        match Damping::<()>::Bands(bands.clone()).problem() {
+            Some(problem) => Err(problem),
+            None => Ok(Self(bands)),
+        }
+    }
+
+    /// The bands.
+    pub fn bands(&self) -> &[DampingBand] {
+        &self.0
+    }
+
+    /// The ratio at a frequency in hertz: that of the first band whose end the frequency does not exceed.
+    pub fn at(&self, hertz: f64) -> f64 {
+        ratio_at(&self.0, hertz)
+    }
+}
+
+impl From<f64> for DampingRatios {
+    /// The same ratio at every frequency.
+    fn from(ratio: f64) -> Self {
+        Self(vec![DampingBand { to_hz: f64::INFINITY, ratio }])
+    }
+}
+
+impl std::fmt::Display for DampingRatios {
+    /// `0.02`, or `0.01 to 100 Hz, 0.1 to 1000 Hz, 1 above`.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (last, closed) = self.0.split_last().expect("at least one band");
+        closed.iter().try_for_each(|band| write!(f, "{} to {} Hz, ", band.ratio, band.to_hz))?;
+        write!(f, "{}{}", last.ratio, if closed.is_empty() { "" } else { " above" })
+    }
+}
+
+/// The ratio of the first band that reaches up to `hertz`; the last one has no end.
+pub fn ratio_at(bands: &[DampingBand], hertz: f64) -> f64 {
+    bands.iter().find(|band| hertz <= band.to_hz).map_or(0.0, |band| band.ratio)
+}
+
 impl<D> Damping<D> {
     /// `ratio`, `bands`, `rayleigh`, `matrix`: the key of the manifest.
     pub fn name(&self) -> &'static str {
@@ -71,9 +120,11 @@ impl<D> Damping<D> {
 
     /// What is wrong with its numbers; nothing is known of the matrix here.
     pub fn problem(&self) -> Option<String> {
-        let wrong = |ratio: &f64| !(0.0..1.0).contains(ratio);
+        let wrong = |ratio: &f64| !(ratio.is_finite() && *ratio >= 0.0);
         let ratio = |ratio: &f64| {
-            format!("damping ratio {ratio} is not a number from 0 to less than 1 (2 % is 0.02)")
+            format!(
+                "damping ratio {ratio} is not a finite number from 0 (2 % is 0.02, critical damping is 1)"
+            )
         };
         match self {
             Self::Ratio(value) => wrong(value).then(|| ratio(value)),
@@ -108,6 +159,36 @@ impl<D> Damping<D> {
                 bad.map(|(name, v)| format!("`{name}` of the Rayleigh damping is {v}, expected a finite number that is not negative"))
             }
             Self::Matrix(_) => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_band_ends_at_its_limit() {
+        let band = |to_hz, ratio| DampingBand { to_hz, ratio };
+        let bands = [band(10.0, 0.01), band(20.0, 0.1), band(f64::INFINITY, 1.0)];
+        let ratios = DampingRatios::new(bands.to_vec()).expect("bands");
+        for (hertz, ratio) in
+            [(1e-9, 0.01), (10.0, 0.01), (10.0f64.next_up(), 0.1), (20.5, 1.0), (1e300, 1.0)]
+        {
+            assert_eq!(ratios.at(hertz), ratio, "{hertz}");
+        }
+        assert_eq!(ratios.to_string(), "0.01 to 10 Hz, 0.1 to 20 Hz, 1 above");
+        assert_eq!(DampingRatios::from(0.02).to_string(), "0.02");
+        for (bands, part) in [
+            (vec![], "no bands"),
+            (vec![band(f64::INFINITY, -0.1)], "not a finite number from 0"),
+            (vec![band(f64::INFINITY, f64::INFINITY)], "not a finite number from 0"),
+            (vec![band(10.0, 0.1)], "expected a band without end"),
+            (vec![band(10.0, 0.1), band(5.0, 0.1), band(f64::INFINITY, 0.1)], "ascending"),
+            (vec![band(0.0, 0.1), band(f64::INFINITY, 0.1)], "positive frequency"),
+        ] {
+            let problem = DampingRatios::new(bands).expect_err("refused");
+            assert!(problem.contains(part), "{problem}");
         }
     }
 }

@@ -8,6 +8,7 @@
 //! their volume by some percent.
 
 use super::assembled::Assembled;
+use super::common_units::{fitting_units, state_units};
 use super::local_mass::LocalMass;
 use super::node_pairs::neighbours;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -204,7 +205,9 @@ fn is_middle(positions: &[Vector3<f64>], node: usize) -> bool {
     })
 }
 
-/// An error for densities that no matter has; returns the density in SI where it is known.
+/// An error for densities that no matter has, a warning where they may be meant: returns the density in SI where it is
+/// known. Numbers whose units nothing states are taken for m, kg, s; of matrices in memory, which may have no dimension,
+/// that is a warning.
 pub(super) fn check_density(
     body: &Assembled,
     densities: Option<Densities>,
@@ -212,46 +215,32 @@ pub(super) fn check_density(
     found: &mut Vec<Diagnostic>,
 ) -> Option<f64> {
     let units = &body.raw.units;
-    let Densities { quartiles, nodes } = densities.filter(|_| units.stated)?;
+    let Densities { quartiles, nodes } = densities?;
     let to_si = units.mass.to_si() / units.length.to_si().powi(3);
     let [lower, median, upper] = quartiles.map(|density| density * to_si);
     if upper >= DENSITIES.0 && lower <= DENSITIES.1 {
         return Some(median);
     }
+    let said = if units.stated { "" } else { ", which nothing states" };
     let message = format!(
-        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}",
+        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{said}",
         units.length.name(),
         units.mass.name()
     );
-    if body.raw.allow_implausible {
+    if body.raw.allow_implausible || !body.raw.has_units() {
         found.push(Diagnostic::new(Code::InertiaImplausible, message));
         return None;
     }
     let mut diagnostic = Diagnostic::new(Code::DensityImplausible, message);
     let speed = local.sound_speed(3).map_or(0.0, |speed| speed.median);
     let fitting = fitting_units(quartiles[1], speed).join(", or in ");
-    if !fitting.is_empty() {
+    if !units.stated {
+        diagnostic = diagnostic.with_help(state_units(&fitting));
+    } else if !fitting.is_empty() {
         diagnostic = diagnostic.with_help(format!(
             "the numbers are those of matter in {fitting}: check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant"
         ));
     }
     found.push(diagnostic);
     None
-}
-
-/// Common units in which a density and a speed of sound are those of common materials.
-fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
-    // Length in m, mass in kg, time in s.
-    const COMMON: [(&str, f64, f64); 5] = [
-        ("m, kg, s", 1.0, 1.0),
-        ("mm, t, s", 1e-3, 1e3),
-        ("cm, g, s", 1e-2, 1e-3),
-        ("in, slinch, s", 0.0254, 175.126_835_246_476_36),
-        ("ft, slug, s", 0.3048, 14.593_902_937_206_364),
-    ];
-    let fits = |&&(_, length, mass): &&(&str, f64, f64)| {
-        (500.0..20_000.0).contains(&(density * mass / length.powi(3)))
-            && (500.0..20_000.0).contains(&(speed * length))
-    };
-    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
 }

@@ -40,7 +40,7 @@ pub struct FeModel {
     /// Part of the mass that does not turn with the nodes; zero where that is rounding.
     fixed_mass_share: f64,
     diagonal_mass: bool,
-    /// Internal row of each matrix row; none when they are the same.
+    /// Internal row of each matrix row, `u32::MAX` of those that are left out; none when they are the same.
     row_to_internal: Option<Vec<u32>>,
     number: Option<BodyNumber>,
     elimination: Option<Arc<Analysis>>,
@@ -269,16 +269,26 @@ impl FeModel {
         self.diagonal_mass
     }
 
+    /// Number of rows of the matrices as they were read, with those that no matrix holds.
+    pub fn matrix_rows(&self) -> usize {
+        self.row_to_internal.as_ref().map_or(self.stiffness.n(), Vec::len)
+    }
+
+    /// True if a row of the matrices as they were read has neither stiffness nor mass and is left out.
+    pub fn is_left_out(&self, row: usize) -> bool {
+        self.row_to_internal.as_ref().is_some_and(|to| to[row] == u32::MAX)
+    }
+
     /// Columns that are given by the rows of the matrices as they were read, in the internal order.
     ///
     /// # Panics
     /// When there are not as many rows.
     pub fn in_internal_order(&self, columns: Mat<f64>) -> Mat<f64> {
-        assert_eq!(columns.nrows(), self.stiffness.n(), "rows of the matrices");
+        assert_eq!(columns.nrows(), self.matrix_rows(), "rows of the matrices");
         let Some(to) = &self.row_to_internal else { return columns };
-        let mut ordered = Mat::zeros(columns.nrows(), columns.ncols());
+        let mut ordered = Mat::zeros(self.stiffness.n(), columns.ncols());
         for j in 0..columns.ncols() {
-            for (row, &internal) in to.iter().enumerate() {
+            for (row, &internal) in to.iter().enumerate().filter(|(_, internal)| **internal != u32::MAX) {
                 ordered[(internal as usize, j)] = columns[(row, j)];
             }
         }

@@ -3,15 +3,15 @@
 
 use super::rows::{Recovered, Rows};
 use super::wording::name_some;
-use super::{DofLabel, Nodes, RawModel};
+use super::{Damping, DofLabel, Nodes, RawModel, filled_rows};
 use crate::base::diagnostic::{Code, Diagnostic};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// Where each matrix row goes.
 pub(super) struct Layout {
-    /// Internal row of each matrix row.
+    /// Internal row of each matrix row; `u32::MAX` of those that are left out.
     pub row_to_internal: Vec<u32>,
     /// Indices into the node table of the used nodes, ascending.
     pub used: Vec<usize>,
@@ -46,12 +46,14 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     if found.len() > before {
         return None;
     }
-    let rows = RowsOfNodes::new(raw, &labels, &index, found);
+    let mut rows = RowsOfNodes::new(raw, &labels, &index, found);
+    let empty = rows.leave_out_empty(raw);
     let occupied = Occupied::new(raw, &rows.placed, found);
     if found.len() > before {
         return None;
     }
-    occupied.note_unused(raw, found);
+    found.extend(empty.note(raw));
+    occupied.note_unused(raw, &empty.nodes, found);
     let placeless = sort_without_place(raw, &rows.without_place, occupied.used.is_empty(), found)?;
     Some(in_order(raw, &rows.placed, occupied.used, placeless))
 }
@@ -168,6 +170,66 @@ impl RowsOfNodes {
     }
 }
 
+impl RowsOfNodes {
+    /// Leaves out rows that no matrix holds: all of a node that belongs to no element, and rotations. A displacement
+    /// without stiffness and mass stays where the node has others: it is a mistake.
+    fn leave_out_empty(&mut self, raw: &RawModel) -> LeftOut {
+        let others = raw.damping.as_ref().and_then(Damping::matrix).into_iter();
+        let others = others.chain(raw.geometric_stiffness.iter().map(|one| &one.matrix));
+        let matrices = [&raw.stiffness, &raw.mass].into_iter().chain(others).map(|one| &one.matrix);
+        let filled = filled_rows(matrices, raw.stiffness.matrix.n_cols());
+        let mut left_out = LeftOut::default();
+        if filled.iter().all(|filled| *filled) {
+            return left_out;
+        }
+        let placed = raw.nodes.ids.iter().copied().zip(&mut self.placed);
+        let without_place = self.without_place.iter_mut().map(|(node, rows)| (*node, rows));
+        for (node, rows) in placed.chain(without_place) {
+            let is_empty = |row: u32| row != NONE && !filled[row as usize];
+            let moves = rows.iter().any(|&row| row != NONE && !is_empty(row));
+            let given = rows.iter().filter(|row| **row != NONE).count();
+            if !moves && given > 0 {
+                left_out.nodes.push(node);
+                left_out.of_nodes += given;
+                *rows = [NONE; 6];
+            }
+            for row in rows[3..].iter_mut().filter(|row| is_empty(**row)) {
+                left_out.rotations += 1;
+                *row = NONE;
+            }
+        }
+        left_out
+    }
+}
+
+/// Rows that no matrix holds.
+#[derive(Default)]
+struct LeftOut {
+    /// Numbers of the nodes that have no other.
+    nodes: Vec<i64>,
+    /// Number of rows of these nodes.
+    of_nodes: usize,
+    /// Number of rotations of other nodes.
+    rotations: usize,
+}
+
+impl LeftOut {
+    /// A note about the rows, where there are any.
+    fn note(&self, raw: &RawModel) -> Option<Diagnostic> {
+        let Self { nodes, of_nodes, rotations } = self;
+        let of_nodes =
+            (*of_nodes > 0).then(|| format!("{of_nodes} of nodes without elements ({})", name_some(nodes)));
+        let turning = (*rotations > 0).then(|| format!("{rotations} rotations of other nodes"));
+        let parts: Vec<String> = of_nodes.into_iter().chain(turning).collect();
+        (!parts.is_empty()).then(|| {
+            let count = self.of_nodes + rotations;
+            let message =
+                format!("{count} rows without stiffness and mass are left out: {}", parts.join(", "));
+            Diagnostic::new(Code::RowsEmpty, message).in_file(&raw.stiffness.path)
+        })
+    }
+}
+
 /// Which nodes of the node table have rows.
 struct Occupied {
     /// Indices of the nodes that have all displacements, ascending.
@@ -205,14 +267,15 @@ impl Occupied {
         sorted
     }
 
-    /// A note about nodes that are left out.
-    fn note_unused(&self, raw: &RawModel, found: &mut Vec<Diagnostic>) {
-        let unused = &self.unused;
+    /// A note about nodes that are left out, but for those whose rows are `told` of.
+    fn note_unused(&self, raw: &RawModel, told: &[i64], found: &mut Vec<Diagnostic>) {
+        let told: HashSet<i64> = told.iter().copied().collect();
+        let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !told.contains(node)).collect();
         if !unused.is_empty() {
             let message = format!(
                 "{} nodes have no degree of freedom and are left out: {}",
                 unused.len(),
-                name_some(unused)
+                name_some(&unused)
             );
             found.push(Diagnostic::new(Code::NodesUnused, message).in_file(&raw.nodes_path));
         }
@@ -233,7 +296,7 @@ fn in_order(raw: &RawModel, placed: &[[u32; 6]], used: Vec<usize>, placeless: Wi
         }
     }
     order.extend(placeless.others.iter().map(|(_, row)| row));
-    let mut row_to_internal = vec![0u32; raw.stiffness.matrix.n_cols()];
+    let mut row_to_internal = vec![NONE; raw.stiffness.matrix.n_cols()];
     for (internal, row) in order.into_iter().enumerate() {
         row_to_internal[row as usize] = internal as u32;
     }

@@ -8,6 +8,7 @@
 //! speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
 
 use super::assembled::Assembled;
+use super::common_units::{state_units, units_of_speed};
 use super::node_pairs::neighbours;
 use super::wording::name_some;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -169,7 +170,8 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
     pairs.len()
 }
 
-/// A warning when the speed of sound is that of no matter; `density` (SI) where it is known.
+/// A warning when the speed of sound is that of no matter; `density` (SI) where it is known. An error where nothing states
+/// the units and the speed is that of matter in common ones: beams and shells have no density that K and M tell.
 pub(super) fn check_speed(
     body: &Assembled,
     local: &LocalMass,
@@ -177,7 +179,9 @@ pub(super) fn check_speed(
     found: &mut Vec<Diagnostic>,
 ) {
     let units = &body.raw.units;
-    let Some(speeds) = local.sound_speed(body.rows.dimension).filter(|_| units.stated) else { return };
+    let Some(speeds) = local.sound_speed(body.rows.dimension).filter(|_| body.raw.has_units()) else {
+        return;
+    };
     let to_si = units.length.to_si() / units.time.to_si();
     let (whole, median) = (speeds.whole * to_si, speeds.median * to_si);
     let heavy = density.filter(|density| *density > HEAVY);
@@ -187,6 +191,15 @@ pub(super) fn check_speed(
         let message = format!(
             "stiffness, mass and coordinates give a speed of sound of {median:.3e} m/s{matter} (median of the nodes; {whole:.3e} m/s of the whole body)"
         );
-        found.push(Diagnostic::new(Code::SpeedImplausible, message));
+        let fitting = units_of_speed(speeds.median).join(", or in ");
+        let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
+        found.push(match unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
+            true => Diagnostic::new(
+                Code::DensityImplausible,
+                format!("{message}, with numbers in m, kg, s, which nothing states"),
+            )
+            .with_help(state_units(&fitting)),
+            false => Diagnostic::new(Code::SpeedImplausible, message),
+        });
     }
 }

@@ -173,6 +173,9 @@ type Order<'o> = (bool, &'o dyn Fn(usize) -> usize, &'static str);
 fn other_order(body: &Assembled) -> Option<&'static str> {
     let Assembled { nodes, rows, row_to_internal, .. } = body;
     let n = rows.len();
+    if row_to_internal.as_ref().is_some_and(|to| to.len() != n) {
+        return None;
+    }
     let internal = |row: usize| row_to_internal.as_ref().map_or(row, |to| to[row] as usize);
     let mut by_label: Vec<usize> = (0..n).collect();
     by_label.sort_by_key(|&row| {

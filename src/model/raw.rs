@@ -92,6 +92,12 @@ pub struct RawModel {
 }
 
 impl RawModel {
+    /// True if the numbers can be held to matter: units are stated, or the model comes from files, whose numbers are
+    /// taken for m, kg, s where nothing states their units. Matrices in memory without units may have no dimension.
+    pub fn has_units(&self) -> bool {
+        self.units.stated || !self.stiffness.path.as_os_str().is_empty()
+    }
+
     /// A model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all digits valid,
     /// units m, kg, s not stated. Whatever else is known about it is set in the fields.
     /// `examples/from_memory.rs` goes on from here to a written file.

@@ -79,7 +79,10 @@ impl CouplingFacts<'_> {
             || "the effect of the coupling is not known".to_owned(),
             |at| {
                 let hertz = significant(at.hertz, 4);
-                format!("the coupling changes the response of the model by up to {} (at {hertz} Hz)", percent(at.value))
+                format!(
+                    "the coupling changes the response of the model by up to {} (at {hertz} Hz)",
+                    percent(at.value)
+                )
             },
         );
         format!("{which} rigid, in the body and in the model it is compared with; {effect}")

@@ -65,7 +65,7 @@ impl ModelCheckpoint {
         let written = flex_body_file::prepare_output(&self.path)
             .and_then(|slot| flex_body_file::write_checkpoint(snapshot, &self.model, slot));
         let failure = written.err().map(|error| {
-            let message = error.diagnostics()[0].message();
+            let message = error.first_error().message();
             Diagnostic::new(Code::CheckpointUnwritten, format!("the checkpoint is not up to date: {message}"))
         });
         *self.failure.lock().unwrap_or_else(PoisonError::into_inner) = failure;

@@ -11,7 +11,7 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, condense, primary_differences};
 use flexbody::formats::import::{
-    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, audit, import_body,
+    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, accept_imported, audit, import_body,
 };
 use flexbody::model::{FeModel, GeometricStiffness};
 use flexbody::report::{Tolerances, compare};
@@ -202,6 +202,22 @@ fn what_is_no_body_is_refused_in_words() {
         Code::ForeignIncomplete,
         "depend on each other",
     );
+}
+
+/// A file whose body breaks an identity is refused as such: the message speaks of the file, not of a model.
+#[test]
+fn a_file_that_breaks_an_identity_is_told_to_be_wrong() {
+    let (_, body) = block(3);
+    let good = file_with(&body, &body.modes().shape, body.invariants());
+    accept_imported(&imported(&good).expect("a body")).expect("a sound file");
+    let mut bad = good.clone();
+    let i9 = bad.body.inertia.i9.as_mut().expect("all groups");
+    *i9 *= faer::Scale(0.01);
+    let error = accept_imported(&imported(&bad).expect("a body"))
+        .expect_err("a hundredth of the inertia of the modes");
+    let told = error.to_string();
+    assert!(error.has(Code::ForeignUnsound) && told.contains("the file states a body that breaks"), "{told}");
+    assert!(told.contains("write it anew") && !told.contains("report the model"), "{told}");
 }
 
 #[test]

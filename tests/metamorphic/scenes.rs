@@ -262,7 +262,7 @@ impl Scales<'_> {
 
     /// Damping of the scene, and tolerances.
     fn demands(&mut self, scene: &mut Scene) {
-        scene.requirements.damping = one_in(self.random, 3).then_some(0.02);
+        scene.requirements.damping = one_in(self.random, 3).then_some(0.02.into());
         // The models may have a damping of their own.
         scene.requirements.replaces_damping = true;
         if one_in(self.random, 4) {

@@ -101,8 +101,9 @@ impl Text {
             }
         }
         let demands = &scene.requirements;
-        if let Some(ratio) = demands.damping {
-            self.line(&format!("[damping]\nratio = {ratio:?}\nreplace = {}", demands.replaces_damping));
+        if let Some(ratios) = &demands.damping {
+            // One ratio: no scene is drawn with bands.
+            self.line(&format!("[damping]\nratio = {ratios}\nreplace = {}", demands.replaces_damping));
         }
         if let Some(Range::Any(length)) = demands.motion.angular_velocity {
             self.line(&format!("[motion]\nangular_velocity = {length:?}"));

@@ -73,7 +73,12 @@ fn every_registered_reader_reads_its_fixtures_and_nobody_elses() {
 
 /// An array of NumPy.
 fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-    let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}\n");
+    npy_in_order("False", descr, shape, data)
+}
+
+/// An array of NumPy whose first index runs fastest where `fortran` is `True`.
+fn npy_in_order(fortran: &str, descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+    let header = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}\n");
     [&b"\x93NUMPY\x01\0"[..], &(header.len() as u16).to_le_bytes(), header.as_bytes(), data].concat()
 }
 
@@ -94,10 +99,8 @@ fn archives_of_scipy_are_read_or_refused() {
         let data: Vec<u8> = values.iter().flat_map(|value| value.to_be_bytes()).collect();
         npy(">i2", &format!("({},)", values.len()), &data)
     };
-    let real = |values: &[f64]| {
-        let data: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-        npy("<f8", &format!("({},)", values.len()), &data)
-    };
+    let bytes_of = |values: &[f64]| values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>();
+    let real = |values: &[f64]| npy("<f8", &format!("({},)", values.len()), &bytes_of(values));
     let form = |name: &str| npy("|S3", "()", name.as_bytes());
     let coo = |form_name: &str, rows: &[i16], columns: &[i16], values: &[f64]| {
         archive(&[
@@ -121,8 +124,30 @@ fn archives_of_scipy_are_read_or_refused() {
         ])
     };
     assert_eq!(read_bytes("K.npz", &csc(&[0, 1, 2])).expect("a matrix").matrix.values(), [2.0, 3.0]);
+    // Blocks of 2 x 1, in both orders of numpy.
+    let bsr = |fortran: &str, shape: &str, columns: &[i16], pointers: &[i16], values: &[f64]| {
+        archive(&[
+            ("indices", whole(columns)),
+            ("indptr", whole(pointers)),
+            ("format", form("bsr")),
+            ("shape", whole(&[2, 2])),
+            ("data", npy_in_order(fortran, "<f8", shape, &bytes_of(values))),
+        ])
+    };
+    for (fortran, values) in [("False", [2.0, 1.0, 1.0, 3.0]), ("True", [2.0, 1.0, 1.0, 3.0])] {
+        let read = read_bytes("K.npz", &bsr(fortran, "(2, 2, 1)", &[0, 1], &[0, 2], &values));
+        assert_eq!(read.expect("a matrix").matrix, expected, "{fortran}");
+    }
     for (bytes, code) in [
-        (coo("bsr", &[0], &[0], &[1.0]), Code::MatrixKind),
+        (coo("dia", &[0], &[0], &[1.0]), Code::MatrixKind),
+        (bsr("False", "(2, 2)", &[0, 1], &[0, 2], &[1.0; 4]), Code::MatrixKind),
+        (bsr("False", "(2, 2, 2)", &[0, 1], &[0, 2], &[1.0; 4]), Code::MatrixCount),
+        (bsr("False", "(2, 1, 2)", &[0], &[0, 1, 2], &[1.0; 4]), Code::MatrixCount),
+        (bsr("False", "(1, 4, 1)", &[0], &[0, 1], &[1.0; 4]), Code::MatrixCount),
+        (bsr("False", "(2, 2, 1)", &[0, 1], &[0, 1, 2], &[1.0; 4]), Code::MatrixCount),
+        (bsr("False", "(2, 2, 1)", &[0, 1], &[1, 2], &[1.0; 4]), Code::MatrixSyntax),
+        (bsr("False", "(2, 2, 1)", &[0, 2], &[0, 2], &[1.0; 4]), Code::MatrixIndex),
+        (bsr("False", "(2, 2, 1)", &[0, 1], &[0, 2], &[1.0, 0.0, 1.0, 1.0]), Code::MatrixAsymmetric),
         (coo("coo", &[0, 2], &[0, 0], &[1.0, 1.0]), Code::MatrixIndex),
         (coo("coo", &[0, -1], &[0, 0], &[1.0, 1.0]), Code::MatrixIndex),
         (coo("coo", &[0, 1], &[0], &[1.0, 1.0]), Code::MatrixCount),

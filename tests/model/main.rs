@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod empty_rows;
 mod general_models;
 mod input_fuzz;
 mod input_hdf5;

@@ -333,9 +333,40 @@ fn densities_of_no_matter_are_refused() {
     let help =
         error.diagnostics().iter().find(|d| d.code() == Code::DensityImplausible).expect("told").help();
     assert!(help.contains("mm, t, s"), "{help}");
-    // Without stated units there is nothing to compare with.
-    let unstated = RawModel { units: UnitSystem::default(), ..with_mass_times(&bracket, 1e-3) };
-    assert_eq!(told(unstated), []);
+}
+
+/// Numbers whose units nothing states are taken for m, kg, s, and refused with the units in which they are those of matter:
+/// densities of solids, speeds of sound of everything else.
+#[test]
+fn numbers_without_units_are_those_of_matter() {
+    let unstated = |raw: RawModel| RawModel { units: UnitSystem::default(), ..raw };
+    let bracket = unstated(raw_fixture("bracket_hex20"));
+    let shell = unstated(with_stiffness_times(&raw_fixture("shell_folded"), 1e6));
+    let frame = unstated(with_stiffness_times(&raw_fixture("frame_beams"), 1e6));
+    for (raw, said) in
+        [(&bracket, "e-9 kg/m^3"), (&shell, "a speed of sound of 5.0"), (&frame, "a speed of sound of 2.9")]
+    {
+        let error = refused(raw.clone());
+        let found = error.diagnostics().iter().find(|d| d.code() == Code::DensityImplausible).expect("told");
+        assert!(
+            found.message().contains(said) && found.message().contains("which nothing states"),
+            "{error}"
+        );
+        assert!(
+            found.help().contains("those of matter in mm, t, s: state the units with --units"),
+            "{error}"
+        );
+        let codes = told(RawModel { allow_implausible: true, ..raw.clone() });
+        assert!(!codes.is_empty() && !codes.contains(&Code::DensityImplausible), "{codes:?}");
+    }
+    // What is that of matter in m, kg, s needs no units.
+    for name in ["cube_hex8", "shell_folded", "frame_beams", "bar_c3d8r"] {
+        assert_eq!(told(unstated(raw_fixture(name))), [], "{name}");
+    }
+    // Matrices in memory may have no dimension.
+    let mut in_memory = bracket.clone();
+    in_memory.stiffness.path = Default::default();
+    assert_eq!(told(in_memory), [Code::InertiaImplausible]);
 }
 
 #[test]

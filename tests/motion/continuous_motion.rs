@@ -47,7 +47,7 @@ fn scene(body: &FlexBody, periods: f64, outputs: usize, history: &History) -> Sc
         spin: None,
         carried: None,
         watched: ends.map(Point::Node).to_vec(),
-        requirements: Requirements { damping: Some(0.05), ..Requirements::default() },
+        requirements: Requirements { damping: Some(0.05.into()), ..Requirements::default() },
         source: None,
         series: Vec::new(),
         resolved: false,

@@ -27,6 +27,8 @@ VENV = ROOT / "target/peers"
 PIP = ["exudyn==1.13.6", "pyyeti==1.4.7", "pyNastran==1.4.1", "abaqus-mtx-parser==1.1.4", "welib==4.2.0", "h5py", "numpy", "scipy", "scikit-fem==12.0.2", "ngsolve==6.2.2608", "mfem==4.10.0.1", "pyvista", "meshio", "trimesh", "pygltflib"]
 NPM = ["gltf-validator@2.0.0-dev.3.10"]
 APT = ["octave", "g++", "gcc-arm-none-eabi", "libnewlib-arm-none-eabi", "calculix-ccx"]
+# Public decks (GPL), read where they lie.
+APT_DECKS = ["calculix-ccx-test"]
 # Packages of modules for Debian's own Python.
 APT_MODULES = {"python3-getfem": "getfem", "python3-dolfinx-real": "dolfinx"}
 # Debian keeps these where its Python does not look by itself.
@@ -59,6 +61,7 @@ TABLES = {}
 # Those of the peers that have a table of their own.
 PLACES = {
     "calculix.rows": ("docs/fe_programs.md", "calculix"),
+    "public_decks.rows": ("docs/fe_programs.md", "public decks"),
     "nastran.rows": ("docs/fe_programs.md", "nastran"),
     "abaqus.rows": ("docs/fe_programs.md", "abaqus"),
     "open_codes.rows": ("docs/recipes.md", "recipes"),
@@ -82,6 +85,8 @@ PEERS = [
     ("trimesh, pygltflib", "pictures.gltf", True),
     ("validator of glTF", "pictures.validator", True),
     ("CalculiX", "calculix.rows", True),
+    ("public decks of CalculiX", "public_decks.rows", False),
+    ("public decks of CalculiX, a part", "public_decks.some", True),
     ("open FE codes", "open_codes.rows", True),
     ("pyNastran, pyYeti", "nastran.rows", True),
     ("abaqus-mtx-parser", "abaqus.rows", True),
@@ -148,7 +153,7 @@ def install():
     debian = "/usr/bin/python3"
     missing += [name for name, module in APT_MODULES.items() if subprocess.run([debian, "-c", f"import {module}"], capture_output=True).returncode]
     if shutil.which("dpkg"):
-        missing += [name for name in APT_CLUSTER if subprocess.run(["dpkg", "--status", name], capture_output=True).returncode]
+        missing += [name for name in [*APT_CLUSTER, *APT_DECKS] if subprocess.run(["dpkg", "--status", name], capture_output=True).returncode]
     if missing:
         command = ["apt-get", "install", "--yes", "--no-install-recommends", *missing]
         if shutil.which("apt-get") and os.geteuid() == 0:
@@ -174,7 +179,7 @@ def main():
     rows, absent = measure(args.flexbody.resolve(), args.small)
     bad = [row for row in rows if not row.good()]
     if args.write and not (bad or args.small):
-        elsewhere = ("CalculiX", "Abaqus", "pyNastran", "pyYeti", "NX Nastran")
+        elsewhere = ("CalculiX", "Abaqus", "pyNastran", "pyYeti", "NX Nastran", "public decks")
         of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith(("recipe", "cluster")))]
         TABLES["docs/export.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():

@@ -353,6 +353,29 @@ fn a_batch_makes_what_is_not_there_and_tells_of_all() {
     assert_eq!((exit, states(&told)), (0, vec!["unchanged", "unchanged"]), "{told:#}");
 }
 
+/// A note that comes before the error is not the cause of a failure.
+#[test]
+fn a_batch_tells_the_first_error_of_what_fails() {
+    let place = tempfile::tempdir().expect("a folder");
+    let place = place.path();
+    let brick = fixtures().join("small/brick");
+    for file in members(&brick) {
+        fs::copy(brick.join(&file), place.join(&file)).expect("copied");
+    }
+    // Node 9 has no rows, which is noted; node 8 lies elsewhere, so that rigid motion strains the body.
+    let nodes = fs::read_to_string(place.join("nodes.csv")).expect("nodes");
+    let moved: String = nodes
+        .lines()
+        .map(|line| if line.starts_with("8,") { "8,0.3,0.3,0.3\n".to_owned() } else { format!("{line}\n") })
+        .collect();
+    fs::write(place.join("nodes.csv"), moved + "9,1,1,1\n").expect("written");
+    fs::write(place.join("list.toml"), "[[body]]\nmodel = \"model.toml\"\noutput = \"b.h5\"\n")
+        .expect("written");
+    let (exit, told) = batch(place);
+    let error = told["results"]["bodies"][0]["error"].as_str().expect("a text");
+    assert!(exit == 1 && error.starts_with("FB410"), "{told:#}");
+}
+
 #[test]
 fn a_list_that_cannot_be_read_is_refused() {
     let place = tempfile::tempdir().expect("a folder");

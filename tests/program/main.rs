@@ -19,6 +19,7 @@ mod json_output;
 mod kept_in_files;
 mod licences;
 mod limits;
+mod replaced_inputs;
 mod report;
 mod report_comparison;
 mod view;

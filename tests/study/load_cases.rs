@@ -324,7 +324,7 @@ fn keys_of_a_case_take_the_place_of_those_of_the_scene() {
     assert_eq!((other.run.duration, other.run.outputs), (Some(2.0), 7));
     assert_eq!((other.initial.origin.y, other.initial.rotation.x), (1.0, 1.0));
     assert_eq!(other.gravity.map(|gravity| gravity.y), Some(9.81));
-    assert_eq!(other.requirements.damping, Some(0.02));
+    assert_eq!(other.requirements.damping, Some(0.02.into()));
     // A prescribed motion is one thing.
     assert!(!other.spin.as_ref().expect("a spin").hold && first.spin.as_ref().expect("a spin").hold);
     assert_eq!((other.loads.len(), other.watched.len()), (2, 2));

@@ -327,7 +327,7 @@ fn ratios_damp_the_modes_on_the_nodes() {
     let scene = |size: &Size, scheme| {
         let mut scene =
             Scene { loads: size.at_interfaces(true), spin: size.spin(false), ..size.scene(scheme) };
-        scene.requirements.damping = Some(0.05);
+        scene.requirements.damping = Some(0.05.into());
         scene
     };
     assert_same("solid", &solid(), scene);
@@ -365,7 +365,7 @@ fn what_carries_a_body_moves_it() {
                 gravity: size.gravity([0.01, -0.02, 0.02]),
                 ..size.scene(scheme)
             };
-            scene.requirements.damping = Some(0.03);
+            scene.requirements.damping = Some(0.03.into());
             scene
         });
     }
@@ -509,7 +509,7 @@ proptest! {
         };
         let scheme = Scheme::Conserving { order: 2 * order, step: Some(step / size.rate) };
         let mut scene = Scene { loads: vec![load], spin: Some(spin), ..size.scene(scheme) };
-        scene.requirements.damping = Some(damping);
+        scene.requirements.damping = Some(damping.into());
         let (_, errors) = errors(&model, &whole, &scene);
         let worst = [Some(errors.attitude), errors.deflection, errors.stress, errors.reaction];
         prop_assert!(worst.into_iter().flatten().all(|error| error < SAME_STEPS), "{:?}", errors);

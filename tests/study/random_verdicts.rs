@@ -274,7 +274,7 @@ fn case(seed: u64) -> Case {
         start: None,
         hold: true,
     });
-    scene.requirements.damping = (pick(random, 2) == 0).then_some(0.02);
+    scene.requirements.damping = (pick(random, 2) == 0).then_some(0.02.into());
     scene.requirements.tolerance = Tolerance {
         attitude: tolerance,
         deflection: tolerance,

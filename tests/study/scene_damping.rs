@@ -11,6 +11,7 @@ use flexbody::input::{read_manifest, read_model};
 use flexbody::model::{Damping, FeModel, RawModel};
 use flexbody::motion::scene::{Scene, read_scene, simulate};
 use flexbody::numerics::eigen::{Resume, Wanted};
+use flexbody::numerics::integration::free_oscillation;
 use flexbody::study::tailoring::Tailoring;
 use std::fs;
 use std::path::Path;
@@ -155,4 +156,76 @@ fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     assert!(!bare.is_empty());
     assert_eq!(lacks(Some(Damping::Rayleigh { alpha: 4e3, beta: 1e-5 })), bare);
     assert_eq!(lacks(Some(Damping::Ratio(0.3))), bare);
+}
+
+/// Bands of 1, 10 and 100 % and one ratio beyond the critical damping: free modes at rest fade as the closed form says, also
+/// where they creep; exports hold them.
+#[test]
+fn bands_and_ratios_beyond_the_critical_damping_are_those_of_the_modes() {
+    let folder = folder("");
+    let place = folder.path();
+    let hertz = body(place).frequencies_hz();
+    let (first, second) = (0.5 * (hertz[0] + hertz[1]), 0.5 * (hertz[2] + hertz[3]));
+    let bands = format!(
+        "bands = [{{ to_hz = {first}, ratio = 0.01 }}, {{ to_hz = {second}, ratio = 0.1 }}, {{ ratio = 1 }}]"
+    );
+    let (amplitude, duration) = (1e-9, 0.002);
+    for (damping, ratio_of) in [
+        (bands.as_str(), [0.01, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0]),
+        ("ratio = 3.0", [3.0; 8]),
+        ("bands = [{ ratio = 0.5 }]", [0.5; 8]),
+    ] {
+        let modes: String = (1..=8)
+            .map(|number| format!("[[initial.mode]]\nnumber = {number}\namplitude = {amplitude}\n"))
+            .collect();
+        let text = format!("[run]\nduration = {duration}\noutputs = 20\n{modes}[damping]\n{damping}\n");
+        fs::write(place.join("fades.toml"), text).expect("written");
+        let (recording, _) =
+            simulate(&body(place), &scene(place, "fades.toml"), None, |_| ()).expect("a motion");
+        for (time, state) in recording.time.iter().zip(&recording.states) {
+            for (j, (lambda, ratio)) in body(place).modes().eigenvalue.iter().zip(ratio_of).enumerate() {
+                let decay = ratio * lambda.sqrt();
+                let [c, s] = free_oscillation(*lambda, decay, *time);
+                let expected = amplitude * (c + s * decay);
+                let error = (state.q[j] - expected).abs() / amplitude;
+                assert!(error < 1e-6, "{damping}: mode {} at {}: {error:e}", j + 1, time);
+            }
+        }
+    }
+    // In the file of the model, and beside the body.
+    let damped = self::folder(&format!("[damping]\n{bands}\n"));
+    let place = damped.path();
+    let own = body(place);
+    assert_eq!(own.modes().damping_ratio, [0.01, 0.1, 0.1, 1.0, 1.0, 1.0, 1.0, 1.0]);
+    for (format, file) in
+        [("mbdyn", "b.fem"), ("sid", "b.SID_FEM"), ("json", "b.json"), ("embedded", "b.bin")]
+    {
+        let words = ["export", "body.flex.h5", "--to", format, "-o", file, "--quiet"];
+        let run = flexbody(place, &words);
+        assert!(run.status.success(), "{format}: {}", String::from_utf8_lossy(&run.stderr));
+    }
+    for format in ["mbdyn", "sid"] {
+        let file = if format == "mbdyn" { "b.fem" } else { "b.SID_FEM" };
+        let words = ["convert", file, "--from", format, "--units", "mm,t,s", "-o", "back.flex.h5", "--quiet"];
+        let run = flexbody(place, &words);
+        assert!(run.status.success(), "{format}: {}", String::from_utf8_lossy(&run.stderr));
+        let back = flex_body_file::read(place.join("back.flex.h5")).expect("a body");
+        for (found, given) in back.modes().damping_ratio.iter().zip(&own.modes().damping_ratio) {
+            assert!((found / given - 1.0).abs() < 1e-6, "{format}: {found} {given}");
+        }
+    }
+    let words = [
+        "response",
+        "body.flex.h5",
+        "--band",
+        "0..9000",
+        "--from",
+        "bolt_wall",
+        "--to",
+        "bolt_base",
+        "--quiet",
+    ];
+    assert!(
+        flexbody(self::folder("").path(), &[&words[..], &["--damping", "1.5"]].concat()).status.success()
+    );
 }

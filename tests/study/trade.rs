@@ -339,7 +339,7 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     let Conversions { sources, .. } = without_scene(&model, 4);
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.15 * rate, 0.3);
-    scene.requirements.damping = Some(0.02);
+    scene.requirements.damping = Some(0.02.into());
     scene.run.scheme = Scheme::Conserving { order: 4, step: Some(0.1 / rate) };
     let found = trade(&sources, &scene, Some(&model), &QUICK, SILENT).expect("a study");
     let nodal = found.cases[0].nodal.expect("the nodes are the reference");

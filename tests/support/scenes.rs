@@ -236,7 +236,7 @@ impl Doing {
             carried: None,
             watched: self.watched.iter().map(|&part| node(part)).collect(),
             requirements: Requirements {
-                damping: Some(self.damping).filter(|&d| d > 0.0),
+                damping: (self.damping > 0.0).then_some(self.damping.into()),
                 // Bodies of some tests have it already.
                 replaces_damping: true,
                 ..Default::default()

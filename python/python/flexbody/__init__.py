@@ -96,21 +96,24 @@ def model(
     nodes
         Positions of the nodes (n x 3), of a plane model (n x 2). Unit: length.
     node_ids
-        Numbers of the nodes (n); 1, 2, ... without.
+        Numbers of the nodes (n). Without, the number of a node is its position from 0, as numpy counts: in
+        `dofs` and `interfaces`, in scenes and files, and for `EquationsOfMotion.node`.
     dofs
-        Node number and direction of every row (N x 2), directions 1, 2, 3 being displacements along x, y, z
+        Node number (without `node_ids` its position from 0) and direction of every row (N x 2), directions 1, 2, 3 being displacements along x, y, z
         and 4, 5, 6 rotations about them. A number 2, 3 or 6 for so many directions of every node, node by
         node. Without: x, y, z of every node, node by node (in the plane x, y).
     interfaces
-        Sets of nodes that joints and loads act on: name to node numbers, or to a tuple of these with a
-        coupling ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes; without one
-        it is the mean of the nodes.
+        Sets of nodes that joints and loads act on: name to nodes, or to a tuple of these with a coupling
+        ("rigid", "averaging", "free") and perhaps a reference point (3) in model axes; without one it is the
+        mean of the nodes. With `node_ids` nodes are given by their numbers, without by positions from 0 (as
+        `numpy.flatnonzero` has them); in both cases also by a boolean mask (n).
     units
         Units of length, mass and time, as in ("mm", "t", "s"); a number is a factor to SI. Without, they are
-        m, kg, s and plausibility is not checked.
+        m, kg, s; a density that no matter has in these is a warning.
     damping
-        A damping ratio for all modes, a tuple (alpha, beta) for D = alpha M + beta K in 1/time and time, or
-        a matrix D with the rows of K in mass/time.
+        A damping ratio for all modes (1 is critical), a tuple (alpha, beta) for D = alpha M + beta K in 1/time
+        and time, ratios by frequency as a list of tuples (end of the band in Hz, ratio), the last with the end
+        None, as in [(100, 0.01), (1000, 0.1), (None, 1.0)], or a matrix D with the rows of K in mass/time.
     residual_vectors
         Loads whose static responses join free modes: "interfaces", "centrifugal", or both in a list.
     allow_implausible
@@ -133,7 +136,7 @@ def model(
         positions,
         plane=plane,
         dofs=_inputs.labels(dofs, ids),
-        interfaces=_inputs.interface_list(interfaces),
+        interfaces=_inputs.interface_list(interfaces, ids, node_ids is not None),
         units=_inputs.unit_names(units),
         damping=_inputs.damping_of(damping),
         residual_vectors=_inputs.residual_loads(residual_vectors),

@@ -35,7 +35,7 @@ class Model:
         dofs: NDArray[np.int64] | None,
         interfaces: Sequence[tuple[str, list[int], str | None, tuple[float, float, float] | None]],
         units: tuple[str, str, str] | None,
-        damping: float | tuple[float, float] | _Compressed | None,
+        damping: float | tuple[float, float] | list[tuple[float, float]] | _Compressed | None,
         residual_vectors: tuple[bool, bool],
         allow_implausible: bool,
     ) -> Model: ...

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ._errors import Diagnostic, error_of
+
 Compressed = tuple[int, NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]
 
 _DIRECTIONS = {2: (1, 2), 3: (1, 2, 3), 6: (1, 2, 3, 4, 5, 6)}
@@ -68,9 +70,9 @@ def coordinates(nodes: ArrayLike) -> tuple[NDArray[np.float64], bool]:
 
 
 def numbers(node_ids: ArrayLike | None, count: int) -> NDArray[np.int64]:
-    """Node numbers, 1, 2, ... where none are given."""
+    """Node numbers; positions from 0 where none are given."""
     if node_ids is None:
-        return np.arange(1, count + 1, dtype=np.int64)
+        return np.arange(count, dtype=np.int64)
     ids = _integers(node_ids, "node_ids")
     if ids.shape != (count,):
         raise ValueError(f"node_ids have the shape {ids.shape}, expected ({count},)")
@@ -102,8 +104,36 @@ def labels(dofs: ArrayLike | int | None, node_ids: NDArray[np.int64]) -> NDArray
     return array
 
 
+def _members(nodes: ArrayLike, name: str, node_ids: NDArray[np.int64], numbered: bool) -> list[int]:
+    """Numbers of the nodes of an interface, which are given by a mask, by numbers, or (not `numbered`) by positions."""
+    array = np.asarray(nodes)
+    if array.dtype == np.bool_:
+        if array.shape != node_ids.shape:
+            raise ValueError(
+                f"the mask of interface {name!r} has the shape {array.shape}, expected {node_ids.shape}: one entry for each node"
+            )
+        members: list[int] = node_ids[array].tolist()
+        return members
+    given = _integers(array, f"nodes of interface {name!r}").ravel()
+    unknown = given[~np.isin(given, node_ids)]
+    if unknown.size:
+        named = ", ".join(map(str, unknown[:5].tolist())) + (", ..." if unknown.size > 5 else "")
+        what, help_text = (
+            ("unknown node numbers", "give numbers of node_ids, or a boolean mask")
+            if numbered
+            else (
+                f"positions outside of 0 to {len(node_ids) - 1}",
+                "without node_ids nodes are positions from 0, or a boolean mask; give node_ids for numbers",
+            )
+        )
+        message = f"interface `{name}` names {unknown.size} {what}: {named}"
+        raise error_of(2, (Diagnostic("FB209", "error", message, None, None, help_text),))
+    found: list[int] = given.tolist()
+    return found
+
+
 def interface_list(
-    interfaces: Mapping[str, Any] | None,
+    interfaces: Mapping[str, Any] | None, node_ids: NDArray[np.int64], numbered: bool
 ) -> list[tuple[str, list[int], str | None, tuple[float, float, float] | None]]:
     """Name, nodes, coupling and reference point of every interface."""
     found = []
@@ -112,7 +142,7 @@ def interface_list(
         if isinstance(given, tuple) and len(given) in (2, 3) and isinstance(given[1], (str, type(None))):
             nodes, coupling = given[0], given[1]
             reference = given[2] if len(given) == 3 else None
-        ids = _integers(nodes, f"nodes of interface {name!r}").ravel().tolist()
+        ids = _members(nodes, name, node_ids, numbered)
         if reference is not None:
             point = np.asarray(reference, dtype=np.float64)
             if point.shape != (3,):
@@ -135,11 +165,13 @@ def unit_names(units: Sequence[object] | None) -> tuple[str, str, str] | None:
 
 
 def damping_of(damping: Any) -> Any:
-    """A ratio, the two numbers of Rayleigh damping, or a compressed matrix."""
+    """A ratio, the two numbers of Rayleigh damping, bands of ratios, or a compressed matrix."""
     if damping is None or isinstance(damping, (float, int)):
         return None if damping is None else float(damping)
     if isinstance(damping, tuple) and len(damping) == 2:
         return float(damping[0]), float(damping[1])
+    if isinstance(damping, list) and damping and all(isinstance(band, tuple) and len(band) == 2 for band in damping):
+        return [(np.inf if end is None else float(end), float(ratio)) for end, ratio in damping]
     return compressed(damping, "damping")
 
 

@@ -7,7 +7,7 @@ mod record;
 mod value;
 
 pub(crate) use create::{create, library_version, make, put_text};
-pub(crate) use open::open_sound;
+pub(crate) use open::{open_kept, open_sound};
 pub(crate) use record::{Record, attribute_record, dataset_record};
 pub(crate) use value::{
     Array, Element, NOTHING, Stored, attribute_names, dataset, elements, float, int, members, open_dataset,

@@ -3,13 +3,20 @@
 use super::heap;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
+use crate::base::read_files::note_read;
 use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
-/// Opens an HDF5 file whose texts can be read without harm; `what` it should be, and the code when it is not
-/// HDF5.
+/// Opens an HDF5 file of an input whose texts can be read without harm; `what` it should be, and the code when it is
+/// not HDF5.
 pub(crate) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
+    note_read(path);
+    open_kept(path, what, foreign)
+}
+
+/// The same for a file that the run keeps for itself and replaces.
+pub(crate) fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
     };

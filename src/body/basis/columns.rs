@@ -13,8 +13,8 @@ use faer::Mat;
 pub(super) fn columns(model: &FeModel, raw: RawShapes, what: &str) -> Result<Mat<f64>> {
     let (n, k) = (raw.matrix.nrows(), raw.matrix.ncols());
     let refuse = |code, message: String| Diagnostic::new(code, message).in_file(&raw.path);
-    if n != model.stiffness().n() || k == 0 {
-        let message = format!("{k} {what}s have {n} rows, the matrices have {}", model.stiffness().n());
+    if n != model.matrix_rows() || k == 0 {
+        let message = format!("{k} {what}s have {n} rows, the matrices have {}", model.matrix_rows());
         return Err(refuse(Code::ShapesSize, message).into());
     }
     let mut found = Vec::new();

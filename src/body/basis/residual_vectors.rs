@@ -116,9 +116,18 @@ impl UserLoads {
     /// Loads for `model`, given by its matrix rows.
     ///
     /// # Errors
-    /// As [`ImportedShapes::new`](super::ImportedShapes::new).
+    /// As [`ImportedShapes::new`](super::ImportedShapes::new); [`ShapesSize`](Code::ShapesSize) for a load on a row that
+    /// has neither stiffness nor mass.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let source = raw.source.clone();
+        let (n, k) = (raw.matrix.nrows().min(model.matrix_rows()), raw.matrix.ncols());
+        let mut acting = (0..k).flat_map(|j| (0..n).map(move |row| (row, j)));
+        let lost = acting.find(|&(row, j)| model.is_left_out(row) && raw.matrix[(row, j)] != 0.0);
+        if let Some((row, j)) = lost {
+            let message =
+                format!("load {} acts on row {}, which has neither stiffness nor mass", j + 1, row + 1);
+            return Err(Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).into());
+        }
         Ok(Self { loads: columns(model, raw, "load")?, source })
     }
 }

@@ -4,7 +4,7 @@ use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::invariants::Invariants;
-use crate::model::{Damping, DampingBand, FeModel};
+use crate::model::{Damping, FeModel, ratio_at};
 use crate::numerics::eigen::energy_noise;
 use crate::numerics::linalg::{SymmetricMatrix, symmetric_eigen};
 use faer::{Mat, MatRef};
@@ -80,11 +80,6 @@ pub(crate) fn modal_damping(
     Ok(Some(ModalDamping { matrix, ratio, warning }))
 }
 
-/// The ratio of the first band that reaches up to `hertz`; the last one has no end.
-fn ratio_at(bands: &[DampingBand], hertz: f64) -> f64 {
-    bands.iter().find(|band| hertz <= band.to_hz).map_or(0.0, |band| band.ratio)
-}
-
 /// D must not feed energy to any motion of the modes, but for what its digits leave.
 fn check_semidefinite(
     model: &FeModel,
@@ -121,21 +116,5 @@ fn check_semidefinite(
             ))
         }
         None => refuse("the reduced damping matrix has entries that are not finite".to_owned()),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_band_ends_at_its_limit() {
-        let band = |to_hz, ratio| DampingBand { to_hz, ratio };
-        let bands = [band(10.0, 0.01), band(20.0, 0.02), band(f64::INFINITY, 0.03)];
-        for (hertz, ratio) in
-            [(1e-9, 0.01), (10.0, 0.01), (10.0f64.next_up(), 0.02), (20.5, 0.03), (1e300, 0.03)]
-        {
-            assert_eq!(ratio_at(&bands, hertz), ratio, "{hertz}");
-        }
     }
 }

@@ -176,7 +176,7 @@ fn own_modes(
     let settings = ModeSettings { wanted, accuracy, ..modal.settings.modes };
     let lumped = modal.model.with_nodal_masses(masses.masses());
     let found = free_surface(&lumped, &settings, watch)
-        .map_err(|error| error.diagnostics()[0].message().to_owned())?
+        .map_err(|error| error.first_error().message().to_owned())?
         .solution;
     if found.eigenvalues.len() < modal.n_modes() {
         return Err(format!("the lumped mass has {} modes only", found.eigenvalues.len()));

@@ -14,7 +14,7 @@
 use super::{FlexBody, Groups, LoadKind};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::model::Coupling;
+use crate::model::{Coupling, DampingRatios};
 use crate::numerics::linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -133,14 +133,15 @@ impl FlexBody {
         Some(self.eigenpairs_in_frame()?.0)
     }
 
-    /// The same body with the damping ratio `ratio` for each of its eigenpairs in its frame: D = m_ff X
-    /// diag(2 ratio omega) X' m_ff. For a body of free modes these are the modes.
+    /// The same body with the damping ratio of `ratios` at its frequency for each of its eigenpairs in its frame: D =
+    /// m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes these are the modes.
     ///
     /// # Errors
     /// Those of [`FlexBody::new`].
-    pub fn with_damping_ratio(&self, ratio: f64) -> Result<Self> {
+    pub fn with_damping_ratios(&self, ratios: &DampingRatios) -> Result<Self> {
         let mut parts = self.clone().into_parts();
-        parts.modes.damping_ratio.fill(ratio);
+        let ratio = |eigenvalue: f64| ratios.at(self.units().frequency_of(eigenvalue.max(0.0)));
+        parts.modes.damping_ratio = self.modes().eigenvalue.iter().map(|&lambda| ratio(lambda)).collect();
         parts.modes.modal_damping = None;
         let mass = self.invariants().modal_mass();
         let apart = |i: usize, j: usize| (mass[(i, j)] - f64::from(i == j)).abs();
@@ -148,7 +149,7 @@ impl FlexBody {
         let normalised = (0..nf).all(|i| (0..nf).all(|j| apart(i, j) < 1e-6));
         if let Some((values, vectors)) = (!normalised).then(|| self.eigenpairs_in_frame()).flatten() {
             let moved = &mass * &vectors;
-            let rate = |p: usize| 2.0 * ratio * values[p].max(0.0).sqrt();
+            let rate = |p: usize| 2.0 * ratio(values[p]) * values[p].max(0.0).sqrt();
             let entry = |i: usize, j: usize| (0..nf).map(|p| moved[(i, p)] * rate(p) * moved[(j, p)]).sum();
             parts.modes.modal_damping = Some(Mat::from_fn(nf, nf, entry));
         }

@@ -80,10 +80,10 @@ fn band(text: &str) -> Result<Band, String> {
     band.ok_or_else(|| "two frequencies in hertz are expected, the lower one first: 0..2000".to_owned())
 }
 
-/// From 0 to less than 1.
+/// A finite number from 0.
 fn damping_ratio(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
-        Ok(ratio) if (0.0..1.0).contains(&ratio) => Ok(ratio),
-        _ => Err("a number from 0 to less than 1 is expected (2 % is 0.02)".to_owned()),
+        Ok(ratio) if ratio.is_finite() && ratio >= 0.0 => Ok(ratio),
+        _ => Err("a finite number from 0 is expected (2 % is 0.02, critical damping is 1)".to_owned()),
     }
 }

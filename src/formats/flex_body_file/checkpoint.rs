@@ -6,7 +6,7 @@ use super::item::Extent;
 use super::write::system_error;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
-use crate::base::hdf5_file::{self as hdf5_file, Stored, create, open_sound, put_text};
+use crate::base::hdf5_file::{self as hdf5_file, Stored, create, open_kept, put_text};
 use crate::base::output::OutputSlot;
 use crate::base::provenance::{Fingerprint, generator};
 use crate::numerics::eigen::Snapshot;
@@ -106,7 +106,7 @@ fn digest(snapshot: &Snapshot, model: &str) -> String {
 /// or damaged; [`CheckpointVersion`](Code::CheckpointVersion): of another format version.
 pub fn read_checkpoint(path: impl AsRef<Path>) -> Result<Checkpoint> {
     let path = path.as_ref();
-    let (file, bytes) = open_sound(path, "checkpoint", Code::CheckpointUnreadable)?;
+    let (file, bytes) = open_kept(path, "checkpoint", Code::CheckpointUnreadable)?;
     let fail = |code, message: String| Diagnostic::new(code, message).in_file(path);
     let damaged =
         |what: String| fail(Code::CheckpointUnreadable, format!("cannot read the checkpoint: {what}"));

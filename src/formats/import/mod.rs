@@ -1,6 +1,7 @@
 //! What the formats that are read share: the trait, the body as a file has it, its audit, and the way to a
 //! flexible body.
 
+mod accepted;
 mod any_body;
 mod audit;
 mod body;
@@ -13,6 +14,7 @@ pub(crate) mod hdf5_arrays;
 mod import_body;
 pub(crate) mod redundant;
 
+pub use accepted::accept_imported;
 pub use audit::{Audit, audit};
 pub use body::{ImportedBody, ImportedFrame};
 pub use check::AuditCheck;

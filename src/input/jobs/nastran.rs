@@ -16,7 +16,7 @@ use crate::input::bytes::InputFile;
 use crate::input::dmig::{Dmigs, Point};
 use crate::input::nastran_names::pair;
 use crate::input::output4;
-use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
+use crate::model::{DofLabel, Elements, Nodes, RawMatrix, filled_rows};
 use crate::numerics::linalg::CscMatrix;
 use axes::Turn;
 use bulk::Bulk;
@@ -282,20 +282,6 @@ impl Matrices {
         let named = self.labels.iter().map(|label| label.node);
         named.filter(|node| bulk.grids.contains_key(node)).collect::<HashSet<i64>>().len()
     }
-}
-
-/// Which rows have an entry, in their row or their column, in one of the matrices. Both count: whether the
-/// matrices are symmetric is checked later, with the model.
-fn filled_rows(matrices: [&CscMatrix; 2], n: usize) -> Vec<bool> {
-    let mut filled = vec![false; n];
-    for matrix in matrices {
-        for column in 0..n {
-            let (rows, _) = matrix.column(column);
-            filled[column] |= !rows.is_empty();
-            rows.iter().for_each(|&row| filled[row as usize] = true);
-        }
-    }
-    filled
 }
 
 /// Some rows, ascending, and the same columns of a matrix that has no entries elsewhere.

@@ -24,7 +24,7 @@ impl Walk<'_> {
         };
         let damping = match key {
             "ratio" => Damping::Ratio(self.number(table, key, &span)?),
-            "bands" => Damping::Bands(self.bands(table.get(key)?)?),
+            "bands" => Damping::Bands(self.damping_bands(table.get(key)?)?),
             "rayleigh" => {
                 let (table, span) = self.table(table, key)?;
                 self.known_keys(table, "`rayleigh`", RAYLEIGH);
@@ -43,7 +43,9 @@ impl Walk<'_> {
         Some(damping)
     }
 
-    fn bands(&mut self, value: &Value) -> Option<Vec<DampingBand>> {
+    /// Damping ratios by frequency, a list of `{ to_hz, ratio }` with ends in hertz; whether the numbers are sound is for
+    /// the caller to see. `None` only with something in `found`.
+    pub(crate) fn damping_bands(&mut self, value: &Value) -> Option<Vec<DampingBand>> {
         const EXPECTED: &str = "a list of tables { to_hz, ratio }, the last without to_hz";
         let DeValue::Array(list) = value.get_ref() else {
             self.mistyped("bands", value, EXPECTED);

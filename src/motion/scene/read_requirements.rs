@@ -5,6 +5,7 @@ use super::read_numbers::{finite, place_of, positive};
 use super::read_values::{axes, list, mode_number, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 use crate::input::{Table, Value, Walk, integer, real};
+use crate::model::DampingRatios;
 use nalgebra::{Matrix3, Vector3};
 use toml::de::DeValue;
 
@@ -14,15 +15,12 @@ pub(super) const TABLES: [(&str, &[&str]); 7] = [
     ("attachment", &["kind", "inertia", "axes", "first_frequency"]),
     ("limits", &["deflection", "stress", "mode_stress", "mode"]),
     ("band", &["frequency"]),
-    ("damping", &["ratio", "replace"]),
+    ("damping", &["ratio", "bands", "replace"]),
     ("tolerance", &["attitude", "deflection", "stress", "reaction", "least_deflection"]),
     ("cost", &["multiplications"]),
 ];
 
 const LIMITED_MODE: &[&str] = &["number", "amplitude"];
-
-/// Damping ratios from this on are no oscillations.
-const CRITICAL: f64 = 1.0;
 
 /// `None` only with something in `found`.
 pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requirements> {
@@ -57,8 +55,8 @@ impl Section<'_, '_> {
             "limits" => requirements.limits = limits(self.walk, self.table, &self.span)?,
             "band" => requirements.band = Some(positive(self.walk, self.table, "frequency", &self.span)?),
             "damping" => {
-                let (ratio, replaces) = (self.damping_ratio(), self.replaces_damping());
-                (requirements.damping, requirements.replaces_damping) = (Some(ratio?), replaces?);
+                let (ratios, replaces) = (self.damping_ratios(), self.replaces_damping());
+                (requirements.damping, requirements.replaces_damping) = (Some(ratios?), replaces?);
             }
             "tolerance" => requirements.tolerance = self.tolerance()?,
             _ => requirements.multiplications = Some(self.multiplications()?),
@@ -94,14 +92,20 @@ impl Section<'_, '_> {
         })
     }
 
-    fn damping_ratio(&mut self) -> Option<f64> {
-        let ratio = positive(self.walk, self.table, "ratio", &self.span)?;
-        if ratio >= CRITICAL {
-            let message = format!("`ratio` is {ratio}, expected a number below 1");
-            self.walk.wrong(place_of(self.table, "ratio", &self.span), message);
-            return None;
+    /// One ratio, or ratios by frequency.
+    fn damping_ratios(&mut self) -> Option<DampingRatios> {
+        match (self.table.get("bands"), self.table.contains_key("ratio")) {
+            (None, _) => positive(self.walk, self.table, "ratio", &self.span).map(DampingRatios::from),
+            (Some(_), true) => {
+                let message = "[damping] has both `ratio` and `bands`, expected one of them".to_owned();
+                self.walk.wrong(self.span.clone(), message);
+                None
+            }
+            (Some(value), false) => {
+                let ratios = DampingRatios::new(self.walk.damping_bands(value)?);
+                ratios.map_err(|problem| self.walk.wrong(value.span(), problem)).ok()
+            }
         }
-        Some(ratio)
     }
 
     fn replaces_damping(&mut self) -> Option<bool> {

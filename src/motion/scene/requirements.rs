@@ -5,7 +5,7 @@ use super::Axes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::FlexBody;
-use crate::model::{Damping, FeModel};
+use crate::model::{Damping, DampingRatios, FeModel};
 use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
 
@@ -20,8 +20,8 @@ pub struct Requirements {
     pub limits: Limits,
     /// Highest frequency of interest, oscillations per time.
     pub band: Option<f64>,
-    /// Modal damping ratio of the body in this scene; none: that of the body.
-    pub damping: Option<f64>,
+    /// Damping ratios of the modes of the body in this scene; none: those of the body.
+    pub damping: Option<DampingRatios>,
     /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
     pub replaces_damping: bool,
     /// Largest errors.
@@ -39,11 +39,11 @@ impl Requirements {
     /// [`SceneDamping`](Code::SceneDamping) when the body has one of its own that this does not replace; those of
     /// [`FlexBody::new`].
     pub fn damped<'b>(&self, body: &'b FlexBody, by: &str) -> Result<Cow<'b, FlexBody>> {
-        let Some(ratio) = self.damping else { return Ok(Cow::Borrowed(body)) };
+        let Some(ratios) = &self.damping else { return Ok(Cow::Borrowed(body)) };
         if body.damping().norm_max() > 0.0 {
             self.refuse_second_damping("body", by)?;
         }
-        Ok(Cow::Owned(body.with_damping_ratio(ratio)?))
+        Ok(Cow::Owned(body.with_damping_ratios(ratios)?))
     }
 
     /// Refuses damping beside that of a body or model, unless it takes the place of that.
@@ -53,10 +53,10 @@ impl Requirements {
     /// # Errors
     /// [`SceneDamping`](Code::SceneDamping).
     fn refuse_second_damping(&self, of: &str, by: &str) -> Result<()> {
-        match self.damping {
-            Some(ratio) if !self.replaces_damping => {
+        match &self.damping {
+            Some(ratios) if !self.replaces_damping => {
                 let message =
-                    format!("{by} states the damping ratio {ratio}, and the {of} has damping of its own");
+                    format!("{by} states the damping ratio {ratios}, and the {of} has damping of its own");
                 Err(Diagnostic::new(Code::SceneDamping, message).into())
             }
             _ => Ok(()),

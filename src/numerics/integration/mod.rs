@@ -2,12 +2,14 @@
 
 mod dormand_prince;
 mod explicit;
+mod free_oscillation;
 mod gauss;
 mod schedule;
 mod stages;
 mod system;
 
 pub use explicit::Explicit;
+pub use free_oscillation::free_oscillation;
 pub use gauss::Gauss;
 pub use schedule::{Method, Sight, integrate, integrate_closely};
 pub use stages::{STAGES, StageMode};

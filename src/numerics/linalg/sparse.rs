@@ -153,15 +153,17 @@ impl CscMatrix {
         rows.binary_search(&(row as u32)).map_or(0.0, |k| values[k])
     }
 
-    /// The square matrix with row and column i moved to `to[i]`.
+    /// The square matrix with row and column i moved to `to[i]`; those that go to `u32::MAX`, which have no entries, are
+    /// left out.
     ///
     /// # Panics
-    /// When `to` is not a permutation of the rows.
+    /// When `to` is not a permutation of the rows that stay, or one that is left out has entries.
     pub fn permuted(&self, to: &[u32]) -> Self {
-        let n = self.n_cols;
-        assert!(self.n_rows == n && to.len() == n, "permutation of a square matrix");
+        assert!(self.n_rows == self.n_cols && to.len() == self.n_cols, "permutation of a square matrix");
+        let stays = |new: &u32| *new != u32::MAX;
+        let n = to.iter().filter(|new| stays(new)).count();
         let mut from = vec![u32::MAX; n];
-        for (old, &new) in to.iter().enumerate() {
+        for (old, &new) in to.iter().enumerate().filter(|(_, new)| stays(new)) {
             from[new as usize] = old as u32;
         }
         let mut col_ptr = vec![0usize; n + 1];

@@ -5,6 +5,7 @@ use super::compressed::principal;
 use super::grid::Grid;
 use crate::body::invariants::symmetric_part;
 use crate::motion::scene::{Interpolation, Sample, Samples};
+use crate::numerics::integration::free_oscillation;
 use crate::numerics::linalg::{
     add_combination, combine, dense_cholesky, gram, solve_lower, solve_upper, symmetric_eigen,
 };
@@ -14,9 +15,6 @@ use std::ops::Range;
 
 /// Part of the trace of E'K E below which a direction is rounding.
 pub(super) const ROUNDING: f64 = 1e-12;
-
-/// Damping ratio from which on an oscillation is taken for one of this ratio.
-const MOST_DAMPED: f64 = 0.99;
 
 /// The equations of the displacements Psi y + E z that the modes Psi of a body and static responses E, which
 /// are K-orthogonal to these, have under the forces whose static responses are E c(t), and under forces M Psi
@@ -188,11 +186,9 @@ impl Oscillator {
         ]
     }
 
-    /// Decay, and the circular frequency with that decay.
-    fn rates(self) -> (f64, f64) {
-        let undamped = self.inertia.sqrt().recip();
-        let ratio = (0.5 * self.damping * undamped).min(MOST_DAMPED);
-        (ratio * undamped, undamped * (1.0 - ratio * ratio).sqrt())
+    /// Half the damping over the inertia: the rate at which an oscillation fades.
+    fn decay(self) -> f64 {
+        0.5 * self.damping / self.inertia
     }
 
     /// Value, rate and acceleration.
@@ -201,7 +197,7 @@ impl Oscillator {
             return force;
         }
         let steady = self.steady(force, third);
-        let (decay, _) = self.rates();
+        let decay = self.decay();
         let [away, speed] = [state[0] - steady[0], state[1] - steady[1]];
         [state[0], state[1], steady[2] - 2.0 * decay * speed - away / self.inertia]
     }
@@ -213,12 +209,11 @@ impl Oscillator {
         }
         let (first, last) = (self.steady(now, third), self.steady(next, third));
         let [away, speed] = [state[0] - first[0], state[1] - first[1]];
-        let (decay, rate) = self.rates();
-        let (sin, cos) = (rate * step).sin_cos();
-        let fades = (-decay * step).exp();
+        let (decay, square) = (self.decay(), self.inertia.recip());
+        let [c, s] = free_oscillation(square, decay, step);
         [
-            last[0] + fades * (away * cos + (speed + decay * away) / rate * sin),
-            last[1] + fades * (speed * cos - (decay * speed + away / self.inertia) / rate * sin),
+            last[0] + c * away + s * (speed + decay * away),
+            last[1] + c * speed - s * (decay * speed + square * away),
         ]
     }
 }

@@ -14,6 +14,10 @@ const BESIDE: f64 = 1e-6;
 /// their pole.
 const DAMPED: f64 = 1e-5;
 
+/// How far below the natural frequency, relative, the peak of a strongly damped resonance is looked for at most: beyond a
+/// ratio of 0.7 the response has no peak.
+const MOST_SHIFTED: f64 = 0.5;
+
 /// How near to a natural frequency, relative, no response is evaluated: without damping it has no finite
 /// value there, and with damping the matrix without it cannot be solved with.
 const POLE: f64 = 1e-4;
@@ -141,7 +145,11 @@ impl Resonance {
     /// The peak, and both sides of it, the most telling first.
     fn looked_at(&self) -> [f64; 3] {
         let side = self.half_width();
-        let peak = if self.ratio > DAMPED { (self.ratio * self.ratio).max(BESIDE) } else { 0.3 * side };
+        let peak = if self.ratio > DAMPED {
+            (self.ratio * self.ratio).clamp(BESIDE, MOST_SHIFTED)
+        } else {
+            0.3 * side
+        };
         [-peak, side, -side].map(|at| self.hertz * (1.0 + at))
     }
 }

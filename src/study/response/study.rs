@@ -13,7 +13,7 @@ use crate::base::progress::{Event, Watch};
 use crate::base::units::UnitSystem;
 use crate::body::basis::{CoupledModel, rigid_modes};
 use crate::body::flex_body::FlexBody;
-use crate::model::FeModel;
+use crate::model::{DampingRatios, FeModel};
 use crate::motion::scene::Requirements;
 use crate::numerics::linalg::{gram, largest, side_by_side};
 use faer::Mat;
@@ -34,8 +34,8 @@ pub struct Settings {
     pub points: usize,
     /// At about as many of them the equations of all nodes are solved.
     pub solves: usize,
-    /// Damping ratio of the modes, where it is not that of the body.
-    pub damping: Option<f64>,
+    /// Damping ratios of the modes, where they are not those of the body.
+    pub damping: Option<DampingRatios>,
     /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
     pub replaces_damping: bool,
     /// Largest relative error.
@@ -202,8 +202,12 @@ pub fn respond(
 
 /// The body with the damping ratio of the settings for its modes, where they state one.
 fn damped<'b>(body: &'b FlexBody, settings: &Settings) -> Result<Cow<'b, FlexBody>> {
-    let Settings { damping, replaces_damping, .. } = *settings;
-    let stated = Requirements { damping, replaces_damping, ..Requirements::default() };
+    let Settings { damping, replaces_damping, .. } = settings;
+    let stated = Requirements {
+        damping: damping.clone(),
+        replaces_damping: *replaces_damping,
+        ..Requirements::default()
+    };
     stated.damped(body, "--damping or the scene")
 }
 

@@ -2,6 +2,7 @@
 
 use super::bounds::{ErrorBound, LoadSizes, TurnedTorques};
 use crate::body::flex_body::FlexBody;
+use crate::numerics::integration::free_oscillation;
 use crate::numerics::linalg::larger;
 
 /// How far instants may be from even, relative to the time between two.
@@ -62,12 +63,12 @@ pub(super) struct Oscillators {
     decay: Vec<f64>,
     /// |D| where the modes are damped together: left to the rest.
     damping_left: f64,
-    /// exp(-d h / 2) cos(w h), exp(-d h / 2) sin(w h) / w, with w = sqrt(lambda - d^2 / 4).
+    /// The free motion of every mode over a step, see [`free_oscillation`].
     turns: Vec<[f64; 2]>,
 }
 
 impl Oscillators {
-    /// `None` where a mode does not oscillate, or `times` are not even.
+    /// `None` where `times` are not even.
     pub fn new(body: &FlexBody, times: &[f64]) -> Option<Self> {
         let (&first, &last) = (times.first()?, times.last()?);
         let step = (last - first) / (times.len() - 1) as f64;
@@ -80,12 +81,8 @@ impl Oscillators {
             }
             Some(damping) => (vec![0.0; root.len()], damping.norm_l2()),
         };
-        let turns = root.iter().zip(&decay).map(|(root, decay): (&f64, &f64)| {
-            let squared = root * root - 0.25 * decay * decay;
-            let (left, w) = ((-0.5 * decay * step).exp(), squared.sqrt());
-            (squared > 0.0).then(|| [left * (w * step).cos(), left * (w * step).sin() / w])
-        });
-        let turns = turns.collect::<Option<Vec<_>>>()?;
+        let free = |(root, decay): (&f64, &f64)| free_oscillation(root * root, 0.5 * decay, step);
+        let turns = root.iter().zip(&decay).map(free).collect();
         (even && step > 0.0).then_some(Self { step, root, decay, damping_left, turns })
     }
 

@@ -168,7 +168,7 @@ impl TrialRuns<'_> {
         let history = match trace_at(body, &scene, &measure.trace().time, self.memory) {
             Ok(trace) => Ok(measure.of_subset(&trace, modes)),
             Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
-                Err(error.diagnostics()[0].message().to_owned())
+                Err(error.first_error().message().to_owned())
             }
             Err(error) => return Err(error),
         };

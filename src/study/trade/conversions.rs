@@ -87,7 +87,7 @@ pub fn conversions_for_cases(
         let source = match making.make(&wish, &Mat::new(), Vec::new()) {
             Ok((source, _)) => source,
             Err(error)
-                if wish.accuracy == Accuracy::Certified && error.diagnostics()[0].code() == Code::Usage =>
+                if wish.accuracy == Accuracy::Certified && error.first_error().code() == Code::Usage =>
             {
                 continue;
             }
@@ -291,7 +291,7 @@ impl<'m> Making<'m> {
         let own = Making { model: &lumped, loads: self.loads.clone(), ..*self };
         match own.make(&name, motion, Vec::new()) {
             Ok((source, _)) => Ok(Ok(source.of_lumped_mass(scheme))),
-            Err(error) => no_body(error.diagnostics()[0].message().to_owned()),
+            Err(error) => no_body(error.first_error().message().to_owned()),
         }
     }
 }

@@ -306,7 +306,7 @@ impl Job<'_> {
             Err(error)
                 if candidate.lumped.is_some() || error.diagnostics().iter().all(|d| ends_a_run(d.code())) =>
             {
-                Err(Failed(error.diagnostics()[0].clone()))
+                Err(Failed(error.first_error().clone()))
             }
             Err(error) => return Err(error),
         };
@@ -361,7 +361,7 @@ impl Job<'_> {
                     all.work.rates += work.rates;
                 }
                 Err(error) => {
-                    row.outcome = Err(Failed(case.about(error.diagnostics()[0].clone())));
+                    row.outcome = Err(Failed(case.about(error.first_error().clone())));
                     return Ok(());
                 }
             }

@@ -24,7 +24,7 @@ pub fn response(subject: &Subject) -> Result<Outputs> {
         band: Band::new(0.3 * first, 1.2 * third).expect("a band"),
         points: 40,
         solves: 8,
-        damping: Some(RATIO),
+        damping: Some(RATIO.into()),
         replaces_damping: true,
         tolerance: Settings::TOLERANCE,
         memory: None,

@@ -49,7 +49,7 @@ impl<'a> Staged<'a> {
             None => ReferenceConditions::MeanAxes,
         };
         let body = &*damped(body, scene)?;
-        let equations = match scene.requirements.damping {
+        let equations = match &scene.requirements.damping {
             Some(_) => NodalEquations::of_damped_body(model, body, &conditions),
             None => NodalEquations::of_body(model, body, &conditions),
         };

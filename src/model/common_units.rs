@@ -1,0 +1,36 @@
+//! Units in which numbers of a model are those of common materials.
+
+/// What to do about numbers whose units nothing states, with the units in which they are those of matter.
+pub(super) fn state_units(fitting: &str) -> String {
+    let those = match fitting {
+        "" => "state the units".to_owned(),
+        fitting => format!("the numbers are those of matter in {fitting}: state the units"),
+    };
+    format!(
+        "{those} with --units LENGTH,MASS,TIME, or [model.units] in the manifest; --allow-implausible (or allow_implausible in [model]) if m, kg, s are meant"
+    )
+}
+
+/// Common units: their names, length in m and mass in kg; time is in s.
+const COMMON: [(&str, f64, f64); 5] = [
+    ("m, kg, s", 1.0, 1.0),
+    ("mm, t, s", 1e-3, 1e3),
+    ("cm, g, s", 1e-2, 1e-3),
+    ("in, slinch, s", 0.0254, 175.126_835_246_476_36),
+    ("ft, slug, s", 0.3048, 14.593_902_937_206_364),
+];
+
+/// Common units in which a density and a speed of sound are those of common materials.
+pub(super) fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
+    let of_speed = units_of_speed(speed);
+    let fits = |&&(name, length, mass): &&(&str, f64, f64)| {
+        (500.0..20_000.0).contains(&(density * mass / length.powi(3))) && of_speed.contains(&name)
+    };
+    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
+}
+
+/// Common units in which a speed of sound is that of common materials.
+pub(super) fn units_of_speed(speed: f64) -> Vec<&'static str> {
+    let fits = |&&(_, length, _): &&(&str, f64, f64)| (500.0..20_000.0).contains(&(speed * length));
+    COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
+}
