@@ -215,6 +215,9 @@ pub struct JobArguments {
     /// FE program that has written the job [default: by its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]
     pub format: Option<String>,
+    /// Names of the stiffness and the mass matrix of the job, where it has several pairs (Nastran)
+    #[arg(long, value_name = "K,M")]
+    pub matrices: Option<String>,
     /// Units of length, mass and time where no manifest states them [default: m,kg,s, not checked]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,

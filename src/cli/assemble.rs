@@ -28,6 +28,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         model: Some(model),
         from: None,
         job: JobArguments {
+            matrices: None,
             format: prepared.model.format.clone(),
             units: prepared.model.units.clone(),
             interface: prepared.model.interfaces.clone(),

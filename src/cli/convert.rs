@@ -366,7 +366,7 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
     match (arguments.basis, &arguments.shapes) {
         (BasisName::Imported, Some(shapes)) => {
             let location = MatrixLocation::parse(shapes);
-            let imported = match read_imported(&location, model.stiffness().n(), "shapes")? {
+            let imported = match read_imported(&location, &model.row_counts(), "shapes")? {
                 ImportedColumns::Rows(raw) => ImportedShapes::new(model, raw),
                 ImportedColumns::Modes(raw) => ImportedShapes::of_modes(model, raw),
             };

@@ -20,6 +20,9 @@ pub(super) use columns::Point;
 /// Bad cards that are told one by one.
 const SHOWN: usize = 5;
 
+/// Form of rectangular matrices, such as loads.
+const RECTANGULAR: i64 = 9;
+
 /// All matrices of a deck.
 #[derive(Default)]
 pub(super) struct Dmigs {
@@ -171,6 +174,13 @@ impl Dmigs {
     /// Names of the matrices, in the order of the deck.
     pub(super) fn names(&self) -> Vec<String> {
         self.matrices.iter().map(|matrix| matrix.name.clone()).collect()
+    }
+
+    /// The matrices that may be K or M: square ones with entries; all if there are none.
+    pub(super) fn candidates(&self) -> Vec<usize> {
+        let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && self.matrices[*k].count() > 0;
+        let some: Vec<usize> = (0..self.matrices.len()).filter(is_one).collect();
+        if some.is_empty() { (0..self.matrices.len()).collect() } else { some }
     }
 
     /// The points that entries of some matrices which are not zero name, ascending.

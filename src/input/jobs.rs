@@ -18,7 +18,7 @@ mod rotation_nodes;
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
+use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
@@ -34,6 +34,8 @@ pub struct JobFile {
     pub path: PathBuf,
     /// Name of the program; `None`: by the content of the file and what stands beside it.
     pub program: Option<String>,
+    /// Names of the stiffness and the mass matrix, where the job has several pairs and the user said which.
+    pub matrices: Option<[String; 2]>,
 }
 
 impl JobFile {
@@ -59,6 +61,8 @@ pub(super) struct JobModel {
     pub nodes: Nodes,
     /// Label of every matrix row.
     pub dofs: Vec<DofLabel>,
+    /// How what is given by rows of the files becomes what is given by the rows here.
+    pub given_rows: GivenRows,
     /// Names are compared without regard to case.
     pub sets: NodeSets,
     /// What the part is drawn by.
@@ -90,7 +94,12 @@ pub(super) trait JobReader: Sync {
     ///
     /// # Errors
     /// FB101 to FB112, FB2xx and FB3xx, as many as are found.
-    fn read(&self, path: &Path) -> Found<JobModel>;
+    fn read(&self, job: &JobFile) -> Found<JobModel>;
+
+    /// True if the matrices of a job have names by which a user may choose.
+    fn names_matrices(&self) -> bool {
+        false
+    }
 }
 
 /// Every FE program whose jobs are read; the first that recognises a file takes it.
@@ -120,7 +129,13 @@ pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
         }
     };
     match reader {
-        Some(reader) => reader.read(&job.path),
+        Some(reader) if job.matrices.is_some() && !reader.names_matrices() => {
+            let message = format!("the matrices of a job of {} have no names to choose by", reader.name());
+            Err(vec![
+                Diagnostic::new(Code::Usage, message).in_file(&job.path).with_help("leave the names out"),
+            ])
+        }
+        Some(reader) => reader.read(job),
         None => Err(vec![unknown(job)]),
     }
 }

@@ -38,6 +38,7 @@ mod readers;
 mod recent;
 mod recipes;
 mod region;
+mod row_axes;
 mod scipy_npz;
 mod series;
 mod shapes;

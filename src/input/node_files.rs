@@ -1,6 +1,7 @@
 //! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its
 //! content.
 
+mod ansys_axes;
 mod ansys_list;
 mod cdb;
 mod exodus;
@@ -17,8 +18,8 @@ use super::compression::refuse_packed;
 use super::jobs::{NodeSets, nodes_of_bulk, nodes_of_deck};
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{Elements, Nodes};
-use std::collections::HashSet;
+use crate::model::{Elements, NodeAxes, Nodes};
+use std::collections::{HashMap, HashSet};
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
@@ -28,6 +29,8 @@ pub(super) struct NodeFile {
     pub nodes: Nodes,
     pub sets: NodeSets,
     pub elements: Elements,
+    /// Unit vectors along the rows of nodes, where these are not the axes of the model.
+    pub axes: HashMap<i64, NodeAxes>,
 }
 
 /// A format of node files besides our table.
@@ -77,6 +80,11 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile>
             format!("node {} has no finite coordinates", read.nodes.ids[at]),
         );
     }
+    let mut turned: Vec<_> = read.axes.iter().collect();
+    turned.sort_unstable_by_key(|(node, _)| **node);
+    if let Some((node, _)) = turned.iter().find(|(_, axes)| axes.iter().flatten().any(|x| !x.is_finite())) {
+        return wrong(Code::CoordinateNotFinite, format!("node {node} has no finite angles"));
+    }
     if let Some(at) = read.nodes.positions.iter().position(|x| dimension == 2 && x[2] != 0.0) {
         let message =
             format!("node {} has z = {} in a plane model", read.nodes.ids[at], read.nodes.positions[at][2]);
@@ -93,11 +101,21 @@ fn is_deck(head: &str) -> bool {
 }
 
 fn deck(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_deck(file).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
+    nodes_of_deck(file).map(|(nodes, sets, elements)| NodeFile {
+        nodes,
+        sets,
+        elements,
+        ..NodeFile::default()
+    })
 }
 
 fn bulk(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_bulk(file.path()).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
+    nodes_of_bulk(file.path()).map(|(nodes, sets, elements)| NodeFile {
+        nodes,
+        sets,
+        elements,
+        ..NodeFile::default()
+    })
 }
 
 /// FB115 at a line.

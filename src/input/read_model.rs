@@ -9,12 +9,16 @@ use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelF
 use super::node_files::{NodeFile, read_node_file};
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
+use super::row_axes::Turn;
 use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, Sources};
-use crate::model::{Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel};
-use std::collections::HashSet;
+use crate::model::{
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, NodeAxes, NodeSet, Nodes, RawMatrix,
+    RawModel, RowMap,
+};
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Below this many significant digits a matrix is warned about.
@@ -45,9 +49,18 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
         Matrices::Job(job) => take(&mut diagnostics, *job),
     };
-    let damping = parsed.damping.and_then(|damping| take(&mut diagnostics, damping));
-    let geometric_stiffness =
-        parsed.geometric_stiffness.into_iter().filter_map(|one| take(&mut diagnostics, one)).collect();
+    let no_rows = GivenRows::default();
+    let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);
+    let damping = parsed.damping.and_then(|damping| {
+        let damping = take(&mut diagnostics, damping)?;
+        take(&mut diagnostics, damping.try_map(|raw| by_rows_of_model(raw, rows)))
+    });
+    let geometric = parsed.geometric_stiffness.into_iter().filter_map(|one| {
+        let GeometricStiffness { load, matrix } = take(&mut diagnostics, one)?;
+        let matrix = take(&mut diagnostics, by_rows_of_model(matrix, rows))?;
+        Some(GeometricStiffness { load, matrix })
+    });
+    let geometric_stiffness = geometric.collect();
     let places = Places::of(matrices.as_ref());
     let interfaces: Vec<NodeSet> = files
         .interfaces
@@ -81,6 +94,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         mesh,
         dofs: matrices.dofs,
         dofs_path: matrices.dofs_path,
+        given_rows: matrices.given_rows,
         interfaces,
         damping,
         geometric_stiffness,
@@ -121,6 +135,7 @@ struct ModelMatrices {
     nodes_path: PathBuf,
     dofs: Option<Vec<DofLabel>>,
     dofs_path: PathBuf,
+    given_rows: GivenRows,
     /// Node sets of a job.
     sets: NodeSets,
     /// What the part is drawn by.
@@ -132,14 +147,26 @@ struct ModelMatrices {
 
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
-        let JobModel { stiffness, mass, nodes, dofs, sets, elements, files, diagnostics } = job;
+        let JobModel { stiffness, mass, nodes, dofs, given_rows, sets, elements, files, diagnostics } = job;
         let path = |role: &str| {
             let file = files.iter().find(|(own, _)| *own == role).or(files.first());
             file.map(|(_, path)| path.clone()).unwrap_or_default()
         };
         let (nodes_path, dofs_path) = (path("deck"), path("dofs"));
         let dofs = Some(dofs);
-        Self { stiffness, mass, nodes, nodes_path, dofs, dofs_path, sets, elements, files, diagnostics }
+        Self {
+            stiffness,
+            mass,
+            nodes,
+            nodes_path,
+            dofs,
+            dofs_path,
+            given_rows,
+            sets,
+            elements,
+            files,
+            diagnostics,
+        }
     }
 }
 
@@ -161,12 +188,14 @@ impl ParsedTables {
             None => None,
         };
         let tables = files.tables().expect("tables were read");
-        let (stiffness, mass, NodeFile { nodes, sets, elements }) = (stiffness?, mass?, nodes?);
+        let (stiffness, mass, NodeFile { nodes, sets, elements, axes }) = (stiffness?, mass?, nodes?);
         let dofs_path = tables.dofs.clone().unwrap_or_default();
         let dofs = match dofs {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
             None => None,
         };
+        let turned = turned([stiffness, mass], &nodes, dofs.as_deref(), axes);
+        let ([stiffness, mass], given_rows) = take(diagnostics, turned)?;
         Some(ModelMatrices {
             stiffness,
             mass,
@@ -174,6 +203,7 @@ impl ParsedTables {
             nodes_path: tables.nodes.clone(),
             dofs,
             dofs_path,
+            given_rows,
             sets,
             elements,
             files: Vec::new(),
@@ -328,6 +358,52 @@ fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
         let message =
             format!("values of the stiffness matrix carry only {} significant digits", stiffness.digits);
         Diagnostic::new(Code::MatrixDigits, message).in_file(&stiffness.path)
+    })
+}
+
+/// K and M along the axes of the model, where rows stand along `axes` of nodes, and how others with these rows
+/// become the same.
+///
+/// # Errors
+/// FB404 for a rotated node that lacks directions which turn together.
+fn turned(
+    matrices: [RawMatrix; 2],
+    nodes: &Nodes,
+    dofs: Option<&[DofLabel]>,
+    axes: HashMap<i64, NodeAxes>,
+) -> Found<([RawMatrix; 2], GivenRows)> {
+    let in_order = || {
+        let of_node = |node: &i64| [1, 2, 3].map(|direction| DofLabel { node: *node, direction });
+        nodes.ids.iter().flat_map(of_node).collect::<Vec<DofLabel>>()
+    };
+    let labels = dofs.map_or_else(in_order, <[DofLabel]>::to_vec);
+    let [stiffness, mass] = matrices;
+    let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
+    // Numbers of rows that differ are found later.
+    if !labels.iter().any(|label| axes.contains_key(&label.node)) || !has_rows(&stiffness) || !has_rows(&mass)
+    {
+        return Ok(([stiffness, mass], GivenRows::default()));
+    }
+    let turn = Turn::new(&labels, &axes).map_err(|node| {
+        let message = format!(
+            "rows of node {node} stand along axes of its own, but not each of its directions is there once"
+        );
+        vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
+    })?;
+    let own = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+    let matrices = [own(stiffness)?, own(mass)?];
+    let rows = (0..labels.len() as u32).collect();
+    let map = RowMap::new(turn.axes(), turn.axes(), rows);
+    Ok((matrices, GivenRows::new(vec![map], axes)))
+}
+
+/// A matrix that is given beside K and M, by the rows of the model.
+fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
+    let path = raw.path.clone();
+    rows.matrix(raw).map_err(|LostRow| {
+        let message = "the matrix has entries in rows that K and M leave empty";
+        let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
+        vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")]
     })
 }
 

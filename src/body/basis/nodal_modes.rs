@@ -15,6 +15,20 @@ use std::path::PathBuf;
 /// Backward error of a factorisation beyond which rows are not completed by it: the digits that shapes have.
 const INACCURATE: f64 = 1e-7;
 
+/// Returns modes with their values along the axes of the model.
+///
+/// # Errors
+/// [`ShapesSize`](Code::ShapesSize) for a node that lacks directions which turn together.
+pub(super) fn along_the_model(model: &FeModel, raw: RawModes) -> Result<RawModes> {
+    let path = raw.path.clone();
+    model.given_rows().modes(raw).map_err(|node| {
+        let message = format!(
+            "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
+        );
+        Diagnostic::new(Code::ShapesSize, message).in_file(path).into()
+    })
+}
+
 /// Shapes by internal rows (N x k), and what was done to get them.
 ///
 /// # Errors

@@ -1,7 +1,7 @@
 //! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have, and those at
 //! chosen frequencies (theory section 8).
 
-use super::columns::columns;
+use super::columns::{Given, columns};
 use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::massless::on_mass;
@@ -115,7 +115,7 @@ impl UserLoads {
     /// As [`ImportedShapes::new`](super::ImportedShapes::new).
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let source = raw.source.clone();
-        Ok(Self { loads: columns(model, raw, "load")?, source })
+        Ok(Self { loads: columns(model, raw, Given::Loads)?, source })
     }
 }
 

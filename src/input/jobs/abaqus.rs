@@ -9,11 +9,11 @@ use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::labelled_lines::{has_labels, labelled};
-use super::{Found, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
+use super::{Found, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
-use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
+use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,8 @@ impl JobReader for Abaqus {
         is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
     }
 
-    fn read(&self, path: &Path) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Found<JobModel> {
+        let path = job.path.as_path();
         let matrices = Matrices::beside(path);
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::of(&deck)?;
@@ -52,6 +53,7 @@ impl JobReader for Abaqus {
             mass: rows.mass,
             nodes: Nodes { ids, positions },
             dofs: rows.labels,
+            given_rows: GivenRows::default(),
             // Condensed matrices leave no element all of its nodes.
             elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
             sets: mesh.sets,

@@ -6,13 +6,13 @@ use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::expanded::label_once;
 use super::rotation_nodes::rotation_nodes;
-use super::{Found, JobModel, JobReader, both, is_deck, missing};
+use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::excerpt;
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
-use crate::model::{DofLabel, Nodes};
+use crate::model::{DofLabel, GivenRows, Nodes};
 use std::path::Path;
 
 /// The reader of CalculiX jobs.
@@ -34,7 +34,8 @@ impl JobReader for Calculix {
         is_deck(path) && ["sti", "mas", "dof"].iter().any(|extension| path.with_extension(extension).exists())
     }
 
-    fn read(&self, path: &Path) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Found<JobModel> {
+        let path = job.path.as_path();
         let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| path.with_extension(extension));
         let absent =
             [(&sti, "stiffness matrix"), (&mas, "mass matrix"), (&dof, "list of degrees of freedom")];
@@ -71,6 +72,7 @@ impl JobReader for Calculix {
             mass,
             nodes: Nodes { ids, positions },
             dofs,
+            given_rows: GivenRows::default(),
             elements: mesh.drawn(),
             sets: mesh.sets,
             files,

@@ -1,6 +1,7 @@
 //! What the bulk data and the case control of a deck say: places, axes of rows, boundary, supports, sets.
 
 use super::assigned::Assigned;
+use super::constraints::Constraints;
 use super::elements;
 use super::sets::SetLines;
 use super::systems::{Definition, Grid, Kind, SystemCard};
@@ -42,6 +43,7 @@ pub(super) struct Bulk {
     pub dmigs: Dmigs,
     pub sets: SetLines,
     pub assigned: Assigned,
+    pub constraints: Constraints,
     /// PARAM,COUPMASS.
     pub coupled_mass: bool,
     pub has_elements: bool,
@@ -75,6 +77,7 @@ impl Bulk {
             Item::Control(line) => {
                 bulk.sets.line(line);
                 bulk.assigned.line(line);
+                bulk.constraints.control(line);
                 Ok(())
             }
             Item::Begin(place) => {
@@ -180,10 +183,11 @@ impl Bulk {
                 self.is_superelement = true;
                 Some(())
             }
-            _ => {
-                self.element(card);
-                Some(())
-            }
+            _ => self.constraints.card(card, path).map(|is_constraint| {
+                if !is_constraint {
+                    self.element(card);
+                }
+            }),
         };
         if read.is_none() {
             let fields: Vec<String> = (0..card.len().min(8)).map(|k| excerpt(card.field(k))).collect();
@@ -318,7 +322,7 @@ fn kind(card: &Card) -> Option<Kind> {
 }
 
 /// Components: digits from 0 to 6. Scalar points have 0 or none.
-fn components(field: &[u8]) -> Option<Vec<u8>> {
+pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
     field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
 }
 
