@@ -439,7 +439,7 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             arguments.dofs.clone(),
             arguments.job.units.as_deref(),
         )
-        .map(|files| ModelFiles { dimension: arguments.dimension.unwrap_or(files.dimension), ..files }),
+        .map(|files| ModelFiles { dimension: arguments.job.dimension.unwrap_or(files.dimension), ..files }),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
 }

@@ -43,6 +43,7 @@ pub(super) fn of_manifest_or_job(path: &Path, job: &JobArguments) -> Result<Mode
     if let ModelSource::Job(own) = &mut files.source {
         own.matrices = job.matrices.as_deref().map(matrix_names).transpose()?;
     }
+    files.dimension = job.dimension.unwrap_or(files.dimension);
     Ok(files)
 }
 
@@ -65,6 +66,7 @@ impl JobArguments {
             (self.format.is_some(), "--format"),
             (self.matrices.is_some(), "--matrices"),
             (self.units.is_some(), "--units"),
+            (self.dimension.is_some(), "--dimension"),
             (!self.interface.is_empty(), "--interface"),
         ];
         given.iter().find(|(given, _)| *given).map(|(_, option)| *option)
@@ -85,6 +87,9 @@ fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
         }
         JobArguments { units: Some(_), .. } => {
             "--units are for --stiffness, --from and jobs: a manifest states its own"
+        }
+        JobArguments { dimension: Some(_), .. } => {
+            "--dimension is for --stiffness and jobs: a manifest says `dimension` in [model]"
         }
         JobArguments { interface, .. } if !interface.is_empty() => {
             "--interface is for jobs: a manifest has [[interface]]"

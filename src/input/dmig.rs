@@ -312,7 +312,8 @@ impl Reader for DmigPunch {
         is_bulk_data(head)
     }
 
-    /// Rows are the points that any matrix of the file names, ascending.
+    /// Rows are the points that any matrix of the file names which may be one of K and M, ascending: not the
+    /// numbers of loads and other rectangular matrices.
     fn read(&self, source: &MatrixSource<'_>) -> Outcome<RawMatrix> {
         let path = source.file.path();
         if source.compression != Compression::None {
@@ -322,7 +323,8 @@ impl Reader for DmigPunch {
         }
         let mut all = Dmigs::of(&[path.to_path_buf()]).map_err(Error::new)?;
         let at = choose(&all.names(), source.role, source.group).map_err(|d| d.in_file(path))?;
-        let every: Vec<usize> = (0..all.matrices.len()).collect();
+        let mut every = all.candidates();
+        every.push(at);
         let points = all.points(&every);
         Ok(all.take_matrix(at, &points)?)
     }

@@ -8,6 +8,7 @@ mod calculix;
 mod coordinate_files;
 mod deck;
 mod deck_mesh;
+mod deck_sets;
 mod deck_surfaces;
 mod element_kinds;
 mod expanded;
@@ -17,11 +18,13 @@ mod rotation_nodes;
 
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
+use super::node_files::NodeFile;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
+pub(super) use deck::comparable;
 use deck_mesh::DeckMesh;
 use nastran::Nastran;
 pub(super) use nastran::nodes_of_bulk;
@@ -61,10 +64,12 @@ pub(super) struct JobModel {
     pub nodes: Nodes,
     /// Label of every matrix row.
     pub dofs: Vec<DofLabel>,
-    /// How what is given by rows of the files becomes what is given by the rows here.
+    /// Maps from the rows of the files to the rows here.
     pub given_rows: GivenRows,
     /// Names are compared without regard to case.
     pub sets: NodeSets,
+    /// Sets of which nobody knows the nodes.
+    pub unresolved: Unresolved,
     /// What the part is drawn by.
     pub elements: Elements,
     /// Role and path of every file that was read.
@@ -75,6 +80,9 @@ pub(super) struct JobModel {
 
 /// Named sets of nodes, in the order of their file.
 pub(super) type NodeSets = Vec<(String, Vec<i64>)>;
+
+/// Names of node sets that cannot be resolved, and why: it is told when one of them is asked for.
+pub(super) type Unresolved = Vec<(String, Diagnostic)>;
 
 /// All that is wrong with a job.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -154,11 +162,12 @@ fn unknown(job: &JobFile) -> Diagnostic {
 ///
 /// # Errors
 /// FB101, FB106, FB110, FB111.
-pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
     let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
     let elements = mesh.drawn();
     let (ids, positions) = mesh.nodes.into_iter().unzip();
-    Ok((Nodes { ids, positions }, mesh.sets, elements))
+    let DeckMesh { sets, unresolved, .. } = mesh;
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, unresolved, elements, ..NodeFile::default() })
 }
 
 /// Whether a path is that of a keyword deck, by its name.
@@ -166,19 +175,41 @@ fn is_deck(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"))
 }
 
-/// Files beside the main file of a job whose names begin with its stem, in any case: what follows the stem,
-/// in lower case, and the path.
+/// Files beside the main file of a job that are named like it, in any case: its stem, then a dot, an underscore
+/// or the like. What follows the stem, in lower case, and the path. Files of other decks, whose names go on, are
+/// not among them (`job_2.op4` beside `job_2.bdf`), nor are those that a number tells from it (`job2.op4`,
+/// `job_2.op4`, `job_v2.op4`).
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
     let stem = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
     let folder = match main.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    std::fs::read_dir(folder).into_iter().flatten().flatten().filter_map(move |file| {
-        let name = file.file_name().to_string_lossy().to_lowercase();
-        let rest = name.strip_prefix(stem.as_ref()?)?.to_owned();
-        Some((rest, main.with_file_name(file.file_name())))
+    let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let rest_of = |name: std::ffi::OsString| {
+        let lower = name.to_string_lossy().to_lowercase();
+        let rest = lower.strip_prefix(stem.as_ref()?)?.to_owned();
+        Some((rest, main.with_file_name(name)))
+    };
+    let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
+    let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
+    let goes_on = |rest: &str, deck: &String| {
+        rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
+    };
+    all.into_iter().filter(move |(rest, _)| {
+        let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
+        let version = name.strip_prefix('v').unwrap_or(name);
+        let is_named_apart =
+            rest.starts_with(char::is_alphanumeric) || version.starts_with(|c: char| c.is_ascii_digit());
+        !is_named_apart && !decks.iter().any(|deck| goes_on(rest, deck))
     })
+}
+
+/// Returns the part of the stem of another deck behind the stem of the job; `rest` is that part of its file name.
+fn stem_of_deck(rest: &str) -> Option<String> {
+    const DECKS: &[&str] = &[".inp", ".bdf", ".dat", ".nas"];
+    let stem = DECKS.iter().find_map(|extension| rest.strip_suffix(extension))?;
+    (!stem.is_empty()).then(|| stem.to_owned())
 }
 
 /// Both of two, or all that is wrong with them.

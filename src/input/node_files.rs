@@ -15,10 +15,10 @@ mod xml_elements;
 use super::bulk_cards::is_bulk_data;
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
-use super::jobs::{NodeSets, nodes_of_bulk, nodes_of_deck};
+use super::jobs::{NodeSets, Unresolved, nodes_of_bulk, nodes_of_deck};
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{Elements, NodeAxes, Nodes};
+use crate::model::{DofLabel, Elements, NodeAxes, Nodes};
 use std::collections::{HashMap, HashSet};
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -28,7 +28,11 @@ type Found<T> = Result<T, Vec<Diagnostic>>;
 pub(super) struct NodeFile {
     pub nodes: Nodes,
     pub sets: NodeSets,
+    /// Sets of which nobody knows the nodes.
+    pub unresolved: Unresolved,
     pub elements: Elements,
+    /// Rows that constraints of a deck make follow others, by the names of the constraints.
+    pub followers: Vec<(String, Vec<DofLabel>)>,
     /// Unit vectors along the rows of nodes, where these are not the axes of the model.
     pub axes: HashMap<i64, NodeAxes>,
 }
@@ -46,7 +50,7 @@ const FORMATS: &[Format] = &[
     Format { recognises: vtk_legacy::recognises, read: vtk_legacy::read },
     Format { recognises: exodus::recognises, read: exodus::read },
     Format { recognises: cdb::recognises, read: cdb::read },
-    Format { recognises: is_deck, read: deck },
+    Format { recognises: is_deck, read: nodes_of_deck },
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
     Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
 ];
@@ -100,22 +104,8 @@ fn is_deck(head: &str) -> bool {
         .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
-fn deck(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_deck(file).map(|(nodes, sets, elements)| NodeFile {
-        nodes,
-        sets,
-        elements,
-        ..NodeFile::default()
-    })
-}
-
 fn bulk(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_bulk(file.path()).map(|(nodes, sets, elements)| NodeFile {
-        nodes,
-        sets,
-        elements,
-        ..NodeFile::default()
-    })
+    nodes_of_bulk(file.path())
 }
 
 /// FB115 at a line.

@@ -2,7 +2,7 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use super::jobs::{JobModel, NodeSets, read_job};
+use super::jobs::{JobModel, NodeSets, Unresolved, comparable, read_job};
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
@@ -138,6 +138,8 @@ struct ModelMatrices {
     given_rows: GivenRows,
     /// Node sets of a job.
     sets: NodeSets,
+    /// Sets that cannot be resolved, and why.
+    unresolved: Unresolved,
     /// What the part is drawn by.
     elements: Elements,
     /// Files of a job.
@@ -147,7 +149,18 @@ struct ModelMatrices {
 
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
-        let JobModel { stiffness, mass, nodes, dofs, given_rows, sets, elements, files, diagnostics } = job;
+        let JobModel {
+            stiffness,
+            mass,
+            nodes,
+            dofs,
+            given_rows,
+            sets,
+            unresolved,
+            elements,
+            files,
+            diagnostics,
+        } = job;
         let path = |role: &str| {
             let file = files.iter().find(|(own, _)| *own == role).or(files.first());
             file.map(|(_, path)| path.clone()).unwrap_or_default()
@@ -163,6 +176,7 @@ impl From<JobModel> for ModelMatrices {
             dofs_path,
             given_rows,
             sets,
+            unresolved,
             elements,
             files,
             diagnostics,
@@ -188,13 +202,16 @@ impl ParsedTables {
             None => None,
         };
         let tables = files.tables().expect("tables were read");
-        let (stiffness, mass, NodeFile { nodes, sets, elements, axes }) = (stiffness?, mass?, nodes?);
+        let (stiffness, mass, nodes) = (stiffness?, mass?, nodes?);
+        let NodeFile { nodes, sets, unresolved, elements, followers, axes } = nodes;
         let dofs_path = tables.dofs.clone().unwrap_or_default();
         let dofs = match dofs {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
             None => None,
         };
-        let turned = turned([stiffness, mass], &nodes, dofs.as_deref(), axes);
+        let labels = dofs.clone().unwrap_or_else(|| in_order_of_nodes(&nodes, files.dimension));
+        take(diagnostics, refuse_followers(&followers, &labels, &tables.nodes))?;
+        let turned = turned([stiffness, mass], &labels, axes);
         let ([stiffness, mass], given_rows) = take(diagnostics, turned)?;
         Some(ModelMatrices {
             stiffness,
@@ -205,6 +222,7 @@ impl ParsedTables {
             dofs_path,
             given_rows,
             sets,
+            unresolved,
             elements,
             files: Vec::new(),
             diagnostics: Vec::new(),
@@ -294,7 +312,13 @@ impl<'m> Places<'m> {
 
     fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
+        let refused = matrices.unresolved.iter().find(|(own, _)| comparable(own) == comparable(name));
+        if let Some((_, refused)) = refused {
+            return Err(vec![refused.clone().about(format!("interface `{}`", interface.name))]);
+        }
         let known = matrices.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
+        let known =
+            known.or_else(|| matrices.sets.iter().find(|(own, _)| comparable(own) == comparable(name)));
         let Some((_, nodes)) = known else {
             let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
@@ -361,6 +385,30 @@ fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
     })
 }
 
+/// Labels of rows that follow the nodes of a table, each with its displacements.
+fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
+    let of_node = |&node: &i64| (1..=dimension).map(move |direction| DofLabel { node, direction });
+    nodes.ids.iter().flat_map(of_node).collect()
+}
+
+/// FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do not
+/// have these constraints.
+fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], deck: &Path) -> Found<()> {
+    if followers.is_empty() {
+        return Ok(());
+    }
+    let labels: HashSet<DofLabel> = labels.iter().copied().collect();
+    let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
+    let names: Vec<&str> = open.map(|(name, _)| name.as_str()).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let message =
+        format!("rows of the matrices follow others by constraints of the deck: {}", names.join(", "));
+    let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
+    Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
+}
+
 /// K and M along the axes of the model, where rows stand along `axes` of nodes, and how others with these rows
 /// become the same.
 ///
@@ -368,15 +416,9 @@ fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
 /// FB404 for a rotated node that lacks directions which turn together.
 fn turned(
     matrices: [RawMatrix; 2],
-    nodes: &Nodes,
-    dofs: Option<&[DofLabel]>,
+    labels: &[DofLabel],
     axes: HashMap<i64, NodeAxes>,
 ) -> Found<([RawMatrix; 2], GivenRows)> {
-    let in_order = || {
-        let of_node = |node: &i64| [1, 2, 3].map(|direction| DofLabel { node: *node, direction });
-        nodes.ids.iter().flat_map(of_node).collect::<Vec<DofLabel>>()
-    };
-    let labels = dofs.map_or_else(in_order, <[DofLabel]>::to_vec);
     let [stiffness, mass] = matrices;
     let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
     // Numbers of rows that differ are found later.
@@ -384,7 +426,7 @@ fn turned(
     {
         return Ok(([stiffness, mass], GivenRows::default()));
     }
-    let turn = Turn::new(&labels, &axes).map_err(|node| {
+    let turn = Turn::new(labels, &axes).map_err(|node| {
         let message = format!(
             "rows of node {node} stand along axes of its own, but not each of its directions is there once"
         );

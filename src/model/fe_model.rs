@@ -288,8 +288,7 @@ impl FeModel {
         ordered
     }
 
-    /// How shapes and loads that are given by rows of the files become those of the rows of K and M as they were
-    /// read.
+    /// Maps for shapes and loads from the rows of the files to the rows of K and M as they were read.
     pub fn given_rows(&self) -> &GivenRows {
         &self.given_rows
     }

@@ -191,7 +191,7 @@ impl GivenRows {
         Ok(raw)
     }
 
-    /// The same for a part of the model, whose rows files do not have by themselves: only axes of nodes are left.
+    /// Keeps the axes of nodes alone, for a part of the model: no file has the rows of a part.
     pub(super) fn of_part(&self) -> Self {
         Self { maps: Vec::new(), axes: self.axes.clone() }
     }

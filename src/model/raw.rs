@@ -77,7 +77,7 @@ pub struct RawModel {
     pub dofs: Option<Vec<DofLabel>>,
     /// Where the labels came from; empty when handed over in memory.
     pub dofs_path: PathBuf,
-    /// How shapes and loads that are given by rows of the files become those of the rows of K and M here.
+    /// Maps for shapes and loads from the rows of the files to the rows of K and M here.
     pub given_rows: GivenRows,
     /// Named node sets.
     pub interfaces: Vec<NodeSet>,

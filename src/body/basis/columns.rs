@@ -5,7 +5,7 @@ use crate::base::error::{Error, Result};
 use crate::model::{FeModel, LostRow, RawShapes};
 use faer::Mat;
 
-/// What columns by rows are.
+/// Kind of columns that are given by rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Given {
     /// Displacements.

@@ -4,7 +4,7 @@
 use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
-use super::expanded::label_once;
+use super::expanded::{Once, label_once};
 use super::rotation_nodes::rotation_nodes;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -13,6 +13,7 @@ use crate::input::coordinates::excerpt;
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
 use crate::model::{DofLabel, GivenRows, Nodes};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The reader of CalculiX jobs.
@@ -53,7 +54,7 @@ impl JobReader for Calculix {
         // One after the other: each is read by all threads, and the entries of only one are held.
         let stiffness = read(&sti, MatrixRole::Stiffness);
         let (stiffness, mass) = both(stiffness, read(&mas, MatrixRole::Mass))?;
-        let (labels, added) = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
+        let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
             None => *own,
@@ -61,9 +62,9 @@ impl JobReader for Calculix {
         let dofs = labels.iter().map(label).collect();
         // The nodes that only name rotations stand at no place of their own.
         let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
-        let (mut ids, mut positions): (Vec<_>, Vec<_>) = placed.map(|(id, x)| (*id, *x)).unzip();
-        ids.extend(added.ids);
-        positions.extend(added.positions);
+        let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(|(id, x)| (*id, *x)).collect();
+        nodes.extend(places);
+        let (ids, positions) = nodes.into_iter().unzip();
         let mut files: Vec<(&'static str, _)> =
             deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
         files.extend([("stiffness", sti), ("mass", mas), ("dofs", dof)]);
@@ -75,6 +76,7 @@ impl JobReader for Calculix {
             given_rows: GivenRows::default(),
             elements: mesh.drawn(),
             sets: mesh.sets,
+            unresolved: mesh.unresolved,
             files,
             diagnostics: mesh.notes,
         })

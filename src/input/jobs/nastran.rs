@@ -12,10 +12,11 @@ mod rows;
 mod sets;
 mod systems;
 
-use super::{Found, JobFile, JobModel, JobReader, NodeSets, condensed};
+use super::{Found, JobFile, JobModel, JobReader, Unresolved, condensed};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::is_bulk_data;
 use crate::input::bytes::InputFile;
+use crate::input::node_files::NodeFile;
 use crate::model::{Elements, NodeAxes as Axes, Nodes};
 use bulk::Bulk;
 use elimination::Places;
@@ -56,7 +57,7 @@ impl JobReader for Nastran {
         let places = Places::new(&nodes, &axes);
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
         let mut diagnostics = told(&bulk, path);
-        let matrices = matrices.without_followers(&mut diagnostics)?.turned(&axes)?;
+        let matrices = matrices.without_followers(&mut diagnostics).turned(&axes)?;
         let matrices = matrices.without_empty_rows(&mut diagnostics);
         matrices.refuse_modal(&bulk)?;
         if bulk.is_condensed() {
@@ -67,10 +68,22 @@ impl JobReader for Nastran {
             bulk.files.iter().map(|path| ("deck", path.clone())).collect();
         files.extend(matrices.files.iter().map(|path| ("matrices", path.clone())));
         let given_rows = matrices.given_rows(axes);
+        let unresolved = Unresolved::new();
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
         // Condensed matrices leave no element all of its nodes.
         let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
-        Ok(JobModel { stiffness, mass, nodes, dofs, given_rows, sets, elements, files, diagnostics })
+        Ok(JobModel {
+            stiffness,
+            mass,
+            nodes,
+            dofs,
+            given_rows,
+            sets,
+            unresolved,
+            elements,
+            files,
+            diagnostics,
+        })
     }
 }
 
@@ -108,7 +121,7 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
 /// # Errors
 /// Those of [`Bulk::read`], and FB111 where rows of grids stand along other axes than those of the basic
 /// system.
-pub(in crate::input) fn nodes_of_bulk(path: &Path) -> Found<(Nodes, NodeSets, Elements)> {
+pub(in crate::input) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
     let bulk = Bulk::read(path)?;
     let (nodes, axes) = places(&bulk)?;
     if let Some(grid) = axes.keys().min() {
@@ -120,7 +133,8 @@ pub(in crate::input) fn nodes_of_bulk(path: &Path) -> Found<(Nodes, NodeSets, El
         return Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")]);
     }
     let sets = bulk.sets.of(&bulk.grids);
-    Ok((nodes, sets, bulk.elements))
+    let followers = bulk.constraints.followers();
+    Ok(NodeFile { nodes, sets, elements: bulk.elements, followers, ..NodeFile::default() })
 }
 
 /// What the deck says that a user should know.

@@ -131,7 +131,7 @@ impl<'f> Records<'f> {
     fn letters(&self, record: &[u8]) -> String {
         let letters: Vec<u8> =
             record.chunks(self.width()).flat_map(|word| &word[..word.len().min(4)]).copied().collect();
-        String::from_utf8_lossy(&letters).trim().to_owned()
+        String::from_utf8_lossy(&letters).trim_matches([' ', '\0']).to_owned()
     }
 
     fn broken<T>(&self) -> Found<T> {

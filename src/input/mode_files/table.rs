@@ -37,7 +37,7 @@ impl ModeTable {
         Self { digits, eigenvalue_digits, ..Self::default() }
     }
 
-    /// The same of values that stand along the axes of the rows of their nodes.
+    /// Marks the values as standing along the axes of the rows of their nodes.
     pub fn along_nodes(self) -> Self {
         Self { along_nodes: true, ..self }
     }

@@ -207,15 +207,18 @@ impl Bulk {
             x: [card.real(2)?, card.real(3)?, card.real(4)?],
             axes: system(5)?,
             has_support_field: !card.field(6).is_empty(),
+            held: components(card.field(6))?,
             file,
             line: card.line(),
         };
-        let held = components(card.field(6))?;
+        let held = grid.held.clone();
         if !held.is_empty() && held != [0] {
             self.is_supported(card, path);
             self.supported.push(Members { first: id, last: id, components: held });
         }
-        if self.grids.insert(id, grid).is_some() {
+        let same = grid.clone();
+        // The same card may stand in several included files.
+        if self.grids.insert(id, grid).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("grid {id} is given twice");
             self.complain(Diagnostic::new(Code::NodeDuplicate, message).in_file(path).at_line(card.line()));
         }
@@ -289,7 +292,8 @@ impl Bulk {
 
     fn add_system(&mut self, card: &Card, field: usize, path: &Path, system: SystemCard) -> Option<()> {
         let id = card.integer(field).filter(|id| *id > 0)?;
-        if self.systems.insert(id, system).is_some() {
+        let same = system.clone();
+        if self.systems.insert(id, system).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("coordinate system {id} is given twice");
             self.complain(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(card.line()));
         }

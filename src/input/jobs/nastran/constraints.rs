@@ -2,10 +2,12 @@
 //! not have them: rows that follow are eliminated.
 
 use super::bulk::components;
+use super::rows;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::{Card, whole};
 use crate::input::coordinates::real;
 use crate::input::dmig::Point;
+use crate::model::DofLabel;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +38,7 @@ pub(super) struct Constraint {
     pub line: usize,
 }
 
-/// How components follow others.
+/// Relation by which components follow others.
 pub(super) enum Relation {
     /// A rigid body that six independent components move.
     Rigid { independent: Vec<Point>, dependent: Vec<Point> },
@@ -142,6 +144,14 @@ impl Constraints {
         (followers, self.holding().flat_map(Constraint::independent).collect())
     }
 
+    /// Returns the rows that follow others, by the names of the constraints.
+    pub(super) fn followers(&self) -> Vec<(String, Vec<DofLabel>)> {
+        let of = |own: &Constraint| {
+            (own.name.clone(), own.dependent().into_iter().map(rows::label).collect::<Vec<_>>())
+        };
+        self.holding().map(of).collect()
+    }
+
     /// Returns the constraints that matrices do not contain: `has` tells whether the matrices have rows of a point,
     /// and rows that follow are not in matrices after the constraints were applied.
     ///
@@ -181,7 +191,7 @@ fn filled(card: &Card, from: usize) -> impl Iterator<Item = usize> {
     (from..card.len()).filter(|k| !card.field(*k).is_empty())
 }
 
-/// Whether a field is a real number and no whole one: a weight, or a coefficient of expansion.
+/// True if a field is a real number and no whole one: a weight, or a coefficient of expansion.
 fn is_real(field: &[u8]) -> bool {
     whole(field).is_none() && real(field).is_some()
 }

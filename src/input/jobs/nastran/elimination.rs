@@ -13,6 +13,9 @@ use std::collections::{BTreeMap, HashMap};
 /// Singular values of a rigid body or an average below this part of the largest are zero.
 const SINGULAR: f64 = 1e-10;
 
+/// Constraints that a message names.
+const NAMED: usize = 8;
+
 /// A point as a sum of others.
 type Sum = Vec<(Point, f64)>;
 
@@ -21,7 +24,7 @@ type Sum = Vec<(Point, f64)>;
 pub(super) struct Followers {
     sums: BTreeMap<Point, Sum>,
     /// Names of the constraints that make them.
-    pub names: Vec<String>,
+    names: Vec<String>,
 }
 
 /// Places of grids and the axes of their rows.
@@ -113,6 +116,15 @@ impl Followers {
         Ok(all)
     }
 
+    /// The first names of constraints, and how many more there are.
+    pub(super) fn some_names(&self) -> String {
+        let some = self.names[..self.names.len().min(NAMED)].join(", ");
+        match self.names.len().saturating_sub(NAMED) {
+            0 => some,
+            more => format!("{some} and {more} more"),
+        }
+    }
+
     /// A sum by points that follow none.
     fn free(&self, sum: &Sum) -> Sum {
         let mut free: BTreeMap<Point, f64> = BTreeMap::new();
@@ -183,7 +195,7 @@ fn named((grid, component): Point) -> String {
     }
 }
 
-/// What follows by one constraint.
+/// Returns the points that follow by one constraint, each with its sum.
 fn sums(of: &Constraint, places: &Places<'_>) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     match &of.relation {
         Relation::Rigid { independent, dependent } => rigid(of, independent, dependent, places),

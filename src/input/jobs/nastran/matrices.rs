@@ -97,7 +97,7 @@ impl Matrices {
         let Read { stiffness, mass, points, files } = read;
         let followers = followers(bulk, |point| points.binary_search(point).is_ok(), places)?;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&stiffness.path)];
-        let eliminated = followers.map(|own| Ok((own.eliminate(&points)?, own.names.join(", "))));
+        let eliminated = followers.map(|own| Ok((own.eliminate(&points)?, own.some_names())));
         let followers = eliminated.transpose().map_err(in_file)?;
         let n_given = points.len();
         let labels = points.into_iter().map(rows::label).collect();
@@ -105,8 +105,8 @@ impl Matrices {
     }
 
     /// Returns the matrices without rows that follow others by constraints of the deck.
-    pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Found<Self> {
-        let Some((own, names)) = &self.followers else { return Ok(self) };
+    pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
+        let Some((own, names)) = &self.followers else { return self };
         let followers = self.n_given - own.points.len();
         let message = format!("{followers} rows follow others and are eliminated: {names}");
         found.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
@@ -116,7 +116,7 @@ impl Matrices {
         let labels = own.points.iter().copied().map(rows::label).collect();
         let [stiffness, mass] =
             [&self.stiffness, &self.mass].map(|raw| rows.matrix(raw.clone()).expect("all rows are kept"));
-        Ok(Self { stiffness, mass, labels, ..self })
+        Self { stiffness, mass, labels, ..self }
     }
 
     /// Returns the matrices with all rows along the axes of the basic system.
@@ -255,7 +255,8 @@ fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>
     Ok((punches, outputs))
 }
 
-/// What follows by constraints that matrices do not contain; `has` tells of which points they have rows.
+/// Returns the points that follow by constraints which matrices do not contain; `has` tells of which points they
+/// have rows.
 fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &Places<'_>) -> Found<Option<Followers>> {
     let one = |diagnostic| vec![diagnostic];
     let open = bulk.constraints.open(has).map_err(one)?;

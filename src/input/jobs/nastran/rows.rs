@@ -13,7 +13,7 @@ pub(super) fn label((node, component): Point) -> DofLabel {
     DofLabel { node, direction: component.max(1) }
 }
 
-/// Whether matrices of `n` rows are those of a set of the deck.
+/// True if matrices of `n` rows may be those of a set of the deck.
 pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
     bulk.resequenced || points(bulk, n, "", Path::new("")).is_ok()
 }
