@@ -128,6 +128,11 @@ pub(super) fn whole(field: &[u8]) -> Option<i64> {
     Some(if field[0] == b'-' { -number } else { number })
 }
 
+/// Components of a grid: digits from 0 to 6. Scalar points have 0 or none.
+pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
+    field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
+}
+
 /// Whether a file is a deck of Nastran or bulk data, by its first lines that say so.
 pub(super) fn is_bulk_data(bytes: &[u8]) -> bool {
     const LOOKED_AT: usize = 1 << 20;

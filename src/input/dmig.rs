@@ -9,7 +9,7 @@ use super::nastran_names::choose;
 use super::reader::{MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result as Outcome};
-use crate::model::RawMatrix;
+use crate::model::{DofLabel, RawMatrix};
 use columns::{Columns, Heads};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -287,6 +287,11 @@ impl Dmigs {
         });
         Ok(())
     }
+}
+
+/// Label of a row. Scalar points have one direction.
+pub(super) fn label((node, component): Point) -> DofLabel {
+    DofLabel { node, direction: component.max(1) }
 }
 
 fn named((id, component): Point) -> String {

@@ -18,7 +18,7 @@ mod rotation_nodes;
 
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
-use super::node_files::NodeFile;
+use super::node_file::{NodeFile, NodeSets, Unresolved};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use abaqus::Abaqus;
@@ -77,12 +77,6 @@ pub(super) struct JobModel {
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
-
-/// Named sets of nodes, in the order of their file.
-pub(super) type NodeSets = Vec<(String, Vec<i64>)>;
-
-/// Names of node sets that cannot be resolved, and why: it is told when one of them is asked for.
-pub(super) type Unresolved = Vec<(String, Diagnostic)>;
 
 /// All that is wrong with a job.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;

@@ -28,6 +28,7 @@ mod mode_files;
 mod model_files;
 mod named_matrices;
 mod nastran_names;
+mod node_file;
 mod node_files;
 mod npy;
 mod output4;

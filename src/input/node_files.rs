@@ -15,27 +15,13 @@ mod xml_elements;
 use super::bulk_cards::is_bulk_data;
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
-use super::jobs::{NodeSets, Unresolved, nodes_of_bulk, nodes_of_deck};
+use super::jobs::{nodes_of_bulk, nodes_of_deck};
+pub(super) use super::node_file::NodeFile;
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{DofLabel, Elements, NodeAxes, Nodes};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
-
-/// Nodes, and what is known of sets and elements of them.
-#[derive(Debug, Default)]
-pub(super) struct NodeFile {
-    pub nodes: Nodes,
-    pub sets: NodeSets,
-    /// Sets of which nobody knows the nodes.
-    pub unresolved: Unresolved,
-    pub elements: Elements,
-    /// Rows that constraints of a deck make follow others, by the names of the constraints.
-    pub followers: Vec<(String, Vec<DofLabel>)>,
-    /// Unit vectors along the rows of nodes, where these are not the axes of the model.
-    pub axes: HashMap<i64, NodeAxes>,
-}
 
 /// A format of node files besides our table.
 struct Format {

@@ -2,11 +2,12 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use super::jobs::{JobModel, NodeSets, Unresolved, comparable, read_job};
+use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
-use super::node_files::{NodeFile, read_node_file};
+use super::node_file::{NodeFile, NodeSets, Unresolved};
+use super::node_files::read_node_file;
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
 use super::row_axes::Turn;
@@ -441,12 +442,15 @@ fn turned(
 
 /// A matrix that is given beside K and M, by the rows of the model.
 fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
-    let path = raw.path.clone();
-    rows.matrix(raw).map_err(|LostRow| {
-        let message = "the matrix has entries in rows that K and M leave empty";
-        let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
-        vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")]
-    })
+    let RawMatrix { matrix, digits, path } = raw;
+    match rows.matrix(matrix) {
+        Ok(matrix) => Ok(RawMatrix { matrix, digits, path }),
+        Err(LostRow) => {
+            let message = "the matrix has entries in rows that K and M leave empty";
+            let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
+            Err(vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")])
+        }
+    }
 }
 
 fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {

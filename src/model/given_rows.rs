@@ -1,10 +1,10 @@
 //! Rows of files beside K and M where the rows of the model are others: turned from the axes of nodes into those
 //! of the model, without rows that follow others, without empty rows.
 
-use super::{RawMatrix, RawModes};
+use super::DofLabel;
 use crate::numerics::linalg::CscMatrix;
 use faer::Mat;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Unit vectors along the rows of a node, in the axes of the model.
 pub type NodeAxes = [[f64; 3]; 3];
@@ -52,11 +52,11 @@ impl RowMap {
     ///
     /// # Errors
     /// [`LostRow`] if A has entries in rows that the model does not have.
-    fn matrix(&self, raw: RawMatrix) -> Result<RawMatrix, LostRow> {
-        let mut entries = Vec::with_capacity(raw.matrix.nnz());
+    fn matrix(&self, matrix: &CscMatrix) -> Result<CscMatrix, LostRow> {
+        let mut entries = Vec::with_capacity(matrix.nnz());
         let mut largest = 0.0f64;
-        for column in 0..raw.matrix.n_cols() {
-            let (rows, values) = raw.matrix.column(column);
+        for column in 0..matrix.n_cols() {
+            let (rows, values) = matrix.column(column);
             for (&row, &value) in rows.iter().zip(values) {
                 largest = largest.max(value.abs());
                 for (p, a) in self.followed(row as usize) {
@@ -84,7 +84,7 @@ impl RowMap {
                 rows.iter().zip(values).filter_map(move |(row, value)| kept((*row, column), *value))
             })
             .collect();
-        Ok(RawMatrix { matrix: CscMatrix::from_triplets(self.kept.len(), self.kept.len(), &entries), ..raw })
+        Ok(CscMatrix::from_triplets(self.kept.len(), self.kept.len(), &entries))
     }
 
     fn followed(&self, given: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
@@ -139,10 +139,10 @@ impl GivenRows {
     ///
     /// # Errors
     /// [`LostRow`] if entries belong to rows that the model does not have.
-    pub fn matrix(&self, raw: RawMatrix) -> Result<RawMatrix, LostRow> {
-        match self.map(raw.matrix.n_cols()) {
-            Some(map) if raw.matrix.n_rows() == raw.matrix.n_cols() => map.matrix(raw),
-            _ => Ok(raw),
+    pub fn matrix(&self, matrix: CscMatrix) -> Result<CscMatrix, LostRow> {
+        match self.map(matrix.n_cols()) {
+            Some(map) if matrix.n_rows() == matrix.n_cols() => map.matrix(&matrix),
+            _ => Ok(matrix),
         }
     }
 
@@ -164,31 +164,28 @@ impl GivenRows {
         if lost > ROUNDING * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
     }
 
-    /// Turns modes that are given along the axes of the nodes into the axes of the model.
+    /// Turns displacements that are given along the axes of the nodes into the axes of the model: rows by `labels`,
+    /// one column for each.
     ///
     /// # Errors
     /// A node that has some of its displacements, or of its rotations, but not all three.
-    pub fn modes(&self, mut raw: RawModes) -> Result<RawModes, i64> {
-        if !std::mem::take(&mut raw.along_nodes) || self.axes.is_empty() {
-            return Ok(raw);
-        }
-        let mut vectors: HashMap<(i64, bool), [Option<usize>; 3]> = HashMap::new();
-        for (row, label) in raw.labels.iter().enumerate().filter(|(_, own)| self.axes.contains_key(&own.node))
-        {
+    pub fn turn(&self, labels: &[DofLabel], columns: &mut Mat<f64>) -> Result<(), i64> {
+        let mut vectors: BTreeMap<(i64, bool), [Option<usize>; 3]> = BTreeMap::new();
+        for (row, label) in labels.iter().enumerate().filter(|(_, own)| self.axes.contains_key(&own.node)) {
             let vector = vectors.entry((label.node, label.direction > 3)).or_default();
             vector[usize::from(label.direction - 1) % 3] = Some(row);
         }
         for ((node, _), rows) in vectors {
             let [Some(x), Some(y), Some(z)] = rows else { return Err(node) };
             let (axes, rows) = (self.axes[&node], [x, y, z]);
-            for j in 0..raw.matrix.ncols() {
-                let own = rows.map(|row| raw.matrix[(row, j)]);
+            for j in 0..columns.ncols() {
+                let own = rows.map(|row| columns[(row, j)]);
                 for (k, row) in rows.into_iter().enumerate() {
-                    raw.matrix[(row, j)] = (0..3).map(|axis| axes[axis][k] * own[axis]).sum();
+                    columns[(row, j)] = (0..3).map(|axis| axes[axis][k] * own[axis]).sum();
                 }
             }
         }
-        Ok(raw)
+        Ok(())
     }
 
     /// Keeps the axes of nodes alone, for a part of the model: no file has the rows of a part.

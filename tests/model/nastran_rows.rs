@@ -315,7 +315,9 @@ fn what_is_given_by_rows_is_turned_with_k() {
     let ImportedColumns::Modes(modes) = read_imported(&location, &[36], "shapes").expect("modes") else {
         panic!("modes by nodes")
     };
-    let modes = model.given_rows().modes(modes).expect("whole nodes");
+    let mut modes = modes;
+    assert!(modes.along_nodes);
+    model.given_rows().turn(&modes.labels, &mut modes.matrix).expect("whole nodes");
     for (row, label) in modes.labels.iter().enumerate().filter(|(_, label)| label.direction <= 3) {
         let at = (0..36).find(|at| model.label(*at) == *label).expect("a row");
         for mode in 0..2 {

@@ -19,14 +19,16 @@ const INACCURATE: f64 = 1e-7;
 ///
 /// # Errors
 /// [`ShapesSize`](Code::ShapesSize) for a node that lacks directions which turn together.
-pub(super) fn along_the_model(model: &FeModel, raw: RawModes) -> Result<RawModes> {
-    let path = raw.path.clone();
-    model.given_rows().modes(raw).map_err(|node| {
-        let message = format!(
-            "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
-        );
-        Diagnostic::new(Code::ShapesSize, message).in_file(path).into()
-    })
+pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawModes> {
+    if std::mem::take(&mut raw.along_nodes) {
+        model.given_rows().turn(&raw.labels, &mut raw.matrix).map_err(|node| {
+            let message = format!(
+                "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
+            );
+            Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path)
+        })?;
+    }
+    Ok(raw)
 }
 
 /// Shapes by internal rows (N x k), and what was done to get them.

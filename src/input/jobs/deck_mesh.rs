@@ -1,7 +1,7 @@
 //! Nodes, elements and sets of a keyword deck, parts and instances of Abaqus included.
 
 use super::deck::{Card, Deck, comparable, fields};
-use super::deck_sets::{Found as Resolved, Instances, Member, Sets};
+use super::deck_sets::{Elements, Found as Resolved, Instances, Member, Scope};
 use super::element_kinds::{Drawing, drawing};
 use super::{Found, NodeSets, Unresolved};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -19,15 +19,6 @@ const MOST_GENERATED: i64 = 100_000_000;
 
 /// Numbers of nodes that are renumbered are below this.
 const LARGEST: i64 = 1_000_000_000_000;
-
-/// Elements of one type.
-#[derive(Debug, Clone)]
-pub(super) struct Elements {
-    /// Type in upper case.
-    pub kind: String,
-    /// Number and nodes of each.
-    pub members: Vec<(i64, Vec<i64>)>,
-}
 
 /// Nodes, elements and node sets in the numbering of the whole model.
 #[derive(Debug, Default)]
@@ -73,31 +64,6 @@ impl DeckMesh {
             }
         }
         drawn
-    }
-}
-
-/// Nodes, elements and sets of a part, of the assembly, or of a deck that has neither.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Scope {
-    pub nodes: BTreeMap<i64, [f64; 3]>,
-    pub elements: Vec<Elements>,
-    pub sets: Sets,
-    pub element_sets: HashMap<String, Vec<i64>>,
-}
-
-impl Scope {
-    /// Nodes of the elements of a set, ascending.
-    pub(super) fn nodes_of_elements(&self, set: &str) -> Option<Vec<i64>> {
-        let wanted = self.element_sets.get(&comparable(set))?;
-        let wanted: std::collections::HashSet<i64> = wanted.iter().copied().collect();
-        let members = self.elements.iter().flat_map(|own| &own.members);
-        let mut nodes: Vec<i64> = members
-            .filter(|(id, _)| wanted.contains(id))
-            .flat_map(|(_, nodes)| nodes.iter().copied())
-            .collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        Some(nodes)
     }
 }
 

@@ -1,17 +1,51 @@
-//! Node sets of a keyword deck: by the scope that defines them, and those of instances as the assembly names them
+//! Nodes, elements and node sets of a keyword deck: by the scope that defines them, and those of instances as the assembly names them
 //! (`INSTANCE.SET`, `INSTANCE.12`).
 
 use super::deck::comparable;
-use super::deck_mesh::Scope;
 use super::{NodeSets, Unresolved};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::table::integer;
+use std::collections::{BTreeMap, HashMap};
 
 /// Instances that a message names.
 const NAMED: usize = 5;
 
 /// Members of a set, or why it cannot be resolved.
 pub(super) type Found<T> = Result<Vec<T>, Diagnostic>;
+
+/// Elements of one type.
+#[derive(Debug, Clone)]
+pub(super) struct Elements {
+    /// Type in upper case.
+    pub kind: String,
+    /// Number and nodes of each.
+    pub members: Vec<(i64, Vec<i64>)>,
+}
+
+/// Nodes, elements and sets of a part, of the assembly, or of a deck that has neither.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Scope {
+    pub nodes: BTreeMap<i64, [f64; 3]>,
+    pub elements: Vec<Elements>,
+    pub sets: Sets,
+    pub element_sets: HashMap<String, Vec<i64>>,
+}
+
+impl Scope {
+    /// Nodes of the elements of a set, ascending.
+    pub(super) fn nodes_of_elements(&self, set: &str) -> Option<Vec<i64>> {
+        let wanted = self.element_sets.get(&comparable(set))?;
+        let wanted: std::collections::HashSet<i64> = wanted.iter().copied().collect();
+        let members = self.elements.iter().flat_map(|own| &own.members);
+        let mut nodes: Vec<i64> = members
+            .filter(|(id, _)| wanted.contains(id))
+            .flat_map(|(_, nodes)| nodes.iter().copied())
+            .collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        Some(nodes)
+    }
+}
 
 /// A node of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -12,11 +12,11 @@ mod rows;
 mod sets;
 mod systems;
 
-use super::{Found, JobFile, JobModel, JobReader, Unresolved, condensed};
+use super::{Found, JobFile, JobModel, JobReader, condensed};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::is_bulk_data;
 use crate::input::bytes::InputFile;
-use crate::input::node_files::NodeFile;
+use crate::input::node_file::{NodeFile, Unresolved};
 use crate::model::{Elements, NodeAxes as Axes, Nodes};
 use bulk::Bulk;
 use elimination::Places;

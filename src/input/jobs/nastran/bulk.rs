@@ -6,7 +6,7 @@ use super::elements;
 use super::sets::SetLines;
 use super::systems::{Definition, Grid, Kind, SystemCard};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::bulk_cards::{Card, Item, read_deck, whole};
+use crate::input::bulk_cards::{Card, Item, components, read_deck, whole};
 use crate::input::coordinates::excerpt;
 use crate::input::dmig::Dmigs;
 use crate::input::jobs::Found;
@@ -323,11 +323,6 @@ fn kind(card: &Card) -> Option<Kind> {
         b'S' => Some(Kind::Spherical),
         _ => None,
     }
-}
-
-/// Components: digits from 0 to 6. Scalar points have 0 or none.
-pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
-    field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
 }
 
 /// Points with components in turn.

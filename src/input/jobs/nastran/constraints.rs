@@ -1,12 +1,10 @@
 //! Rigid elements and multipoint constraints of a deck: which components of grids follow others. KGG and MGG do
 //! not have them: rows that follow are eliminated.
 
-use super::bulk::components;
-use super::rows;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::bulk_cards::{Card, whole};
+use crate::input::bulk_cards::{Card, components, whole};
 use crate::input::coordinates::real;
-use crate::input::dmig::Point;
+use crate::input::dmig::{Point, label};
 use crate::model::DofLabel;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -146,9 +144,8 @@ impl Constraints {
 
     /// Returns the rows that follow others, by the names of the constraints.
     pub(super) fn followers(&self) -> Vec<(String, Vec<DofLabel>)> {
-        let of = |own: &Constraint| {
-            (own.name.clone(), own.dependent().into_iter().map(rows::label).collect::<Vec<_>>())
-        };
+        let of =
+            |own: &Constraint| (own.name.clone(), own.dependent().into_iter().map(label).collect::<Vec<_>>());
         self.holding().map(of).collect()
     }
 

@@ -1,27 +1,17 @@
 //! K and M of a deck, and their way from the rows of the files to those of the model.
 
+use super::Axes;
 use super::bulk::Bulk;
 use super::elimination::{Elimination, Followers, Places};
-use super::outputs::{Outputs, choose_pair, no_files, no_pair};
-use super::{Axes, rows};
+use super::outputs::{Outputs, Read, choose_pair, no_files, no_pair};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::dmig::{Dmigs, Point};
+use crate::input::dmig::{Dmigs, Point, label};
 use crate::input::jobs::{Found, JobFile, both, siblings};
 use crate::input::row_axes::Turn;
 use crate::model::{DofLabel, GivenRows, RawMatrix, RowMap};
 use crate::numerics::linalg::CscMatrix;
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::PathBuf;
-
-/// K and M as their files have them.
-pub(super) struct Read {
-    pub stiffness: RawMatrix,
-    pub mass: RawMatrix,
-    /// Points of the rows, ascending.
-    pub points: Vec<Point>,
-    /// Files beside the deck that they were read from.
-    pub files: Vec<PathBuf>,
-}
 
 /// K and M with the labels of their rows.
 pub(super) struct Matrices {
@@ -100,7 +90,7 @@ impl Matrices {
         let eliminated = followers.map(|own| Ok((own.eliminate(&points)?, own.some_names())));
         let followers = eliminated.transpose().map_err(in_file)?;
         let n_given = points.len();
-        let labels = points.into_iter().map(rows::label).collect();
+        let labels = points.into_iter().map(label).collect();
         Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, kept: None })
     }
 
@@ -113,9 +103,11 @@ impl Matrices {
         let all: Vec<u32> = (0..own.points.len() as u32).collect();
         let map = RowMap::new(own.follows.clone(), own.picks.clone(), all);
         let rows = GivenRows::new(vec![map], HashMap::new());
-        let labels = own.points.iter().copied().map(rows::label).collect();
-        let [stiffness, mass] =
-            [&self.stiffness, &self.mass].map(|raw| rows.matrix(raw.clone()).expect("all rows are kept"));
+        let labels = own.points.iter().copied().map(label).collect();
+        let [stiffness, mass] = [&self.stiffness, &self.mass].map(|raw| {
+            let matrix = rows.matrix(raw.matrix.clone()).expect("all rows are kept");
+            RawMatrix { matrix, digits: raw.digits, path: raw.path.clone() }
+        });
         Self { stiffness, mass, labels, ..self }
     }
 

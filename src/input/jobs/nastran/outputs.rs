@@ -1,16 +1,27 @@
 //! Matrices of OUTPUT4 beside a deck, and which of several matrices are K and M.
 
 use super::bulk::Bulk;
-use super::matrices::Read;
 use super::rows;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
+use crate::input::dmig::Point;
 use crate::input::jobs::{Found, both, missing};
 use crate::input::nastran_names::{named_pair, pair};
 use crate::input::output4;
+use crate::model::RawMatrix;
 use std::path::{Path, PathBuf};
 
 const HELP: &str = "write them with PARAM,EXTOUT,DMIGPCH, EXTSEOUT(DMIGPCH), or OUTPUT4 KGG,MGG";
+
+/// K and M as their files have them.
+pub(super) struct Read {
+    pub stiffness: RawMatrix,
+    pub mass: RawMatrix,
+    /// Points of the rows, ascending.
+    pub points: Vec<Point>,
+    /// Files beside the deck that they were read from.
+    pub files: Vec<PathBuf>,
+}
 
 /// The OUTPUT4 files beside a deck.
 pub(super) struct Outputs {

@@ -4,14 +4,8 @@
 use super::bulk::Bulk;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::dmig::Point;
-use crate::model::DofLabel;
 use std::collections::BTreeSet;
 use std::path::Path;
-
-/// The label of a row. Scalar points have one direction.
-pub(super) fn label((node, component): Point) -> DofLabel {
-    DofLabel { node, direction: component.max(1) }
-}
 
 /// True if matrices of `n` rows may be those of a set of the deck.
 pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
