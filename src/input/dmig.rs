@@ -178,7 +178,9 @@ impl Dmigs {
 
     /// The matrices that may be K or M: square ones with entries; all if there are none.
     pub(super) fn candidates(&self) -> Vec<usize> {
-        let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && self.matrices[*k].count() > 0;
+        // Entries of complex matrices are not kept.
+        let has_entries = |own: &Dmig| own.count() > 0 || !own.is_real();
+        let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && has_entries(&self.matrices[*k]);
         let some: Vec<usize> = (0..self.matrices.len()).filter(is_one).collect();
         if some.is_empty() { (0..self.matrices.len()).collect() } else { some }
     }

@@ -170,11 +170,27 @@ fn is_deck(path: &Path) -> bool {
 }
 
 /// Files beside the main file of a job that are named like it, in any case: its stem, then a dot, an underscore
-/// or the like. What follows the stem, in lower case, and the path. Files of other decks, whose names go on, are
-/// not among them (`job_2.op4` beside `job_2.bdf`), nor are those that a number tells from it (`job2.op4`,
-/// `job_2.op4`, `job_v2.op4`).
+/// or the like, or what Abaqus calls matrices. What follows the stem, in lower case, and the path.
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
-    let stem = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
+    let own = beginning_alike(main).into_iter().filter(|file| file.is_own);
+    own.map(|Beside { rest, path, .. }| (rest, path))
+}
+
+/// A file beside the main file of a job whose name begins with the stem of the job.
+struct Beside {
+    /// The rest of its name, in lower case.
+    rest: String,
+    path: PathBuf,
+    /// False for files of other decks, whose names go on (`job_2.op4` beside `job_2.bdf`), and those that a letter
+    /// or a number tells from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
+    is_own: bool,
+}
+
+/// Files beside the main file of a job whose names begin with its stem, in any case.
+fn beginning_alike(main: &Path) -> Vec<Beside> {
+    let Some(stem) = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()) else {
+        return Vec::new();
+    };
     let folder = match main.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -182,21 +198,23 @@ fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
     let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let rest_of = |name: std::ffi::OsString| {
         let lower = name.to_string_lossy().to_lowercase();
-        let rest = lower.strip_prefix(stem.as_ref()?)?.to_owned();
-        Some((rest, main.with_file_name(name)))
+        Some((lower.strip_prefix(&stem)?.to_owned(), main.with_file_name(name)))
     };
     let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
     let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
     let goes_on = |rest: &str, deck: &String| {
         rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
     };
-    all.into_iter().filter(move |(rest, _)| {
+    let is_own = |rest: &str| {
         let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
         let version = name.strip_prefix('v').unwrap_or(name);
-        let is_named_apart =
-            rest.starts_with(char::is_alphanumeric) || version.starts_with(|c: char| c.is_ascii_digit());
-        !is_named_apart && !decks.iter().any(|deck| goes_on(rest, deck))
-    })
+        let is_of_abaqus = ["stif", "mass"].iter().any(|kind| rest.starts_with(kind));
+        (is_of_abaqus || !rest.starts_with(char::is_alphanumeric))
+            && !version.starts_with(|c: char| c.is_ascii_digit())
+            && !decks.iter().any(|deck| goes_on(rest, deck))
+    };
+    let beside = |(rest, path): (String, PathBuf)| Beside { is_own: is_own(&rest), rest, path };
+    all.into_iter().map(beside).collect()
 }
 
 /// Returns the part of the stem of another deck behind the stem of the job; `rest` is that part of its file name.

@@ -234,7 +234,8 @@ fn constraints_are_applied_once() {
         if line.starts_with("DMIG*") {
             left_out = word(2) == Some("35");
         }
-        if !left_out && !(line.starts_with("*  ") && word(1) == Some("35")) || line.starts_with("DMIG  ") {
+        let of_35 = left_out || line.starts_with("*  ") && word(1) == Some("35");
+        if !of_35 || line.starts_with("DMIG  ") {
             kept += line;
             kept += "\n";
         }

@@ -166,14 +166,11 @@ impl Constraints {
                         return Err(own.refused("the constraint is not read").with_help(help));
                     }
                 }
-                Relation::Sum { set, .. } if !sets.contains(set) => {
-                    if own.dependent().iter().any(&has) {
-                        let why = "the case control does not select the set, so that it may hold or not";
-                        let help = format!(
-                            "write MPC = {set} into the case control, or take the cards of the set out"
-                        );
-                        return Err(own.refused(why).with_help(help));
-                    }
+                Relation::Sum { set, .. } if !sets.contains(set) && own.dependent().iter().any(&has) => {
+                    let why = "the case control does not select the set, so that it may hold or not";
+                    let help =
+                        format!("write MPC = {set} into the case control, or take the cards of the set out");
+                    return Err(own.refused(why).with_help(help));
                 }
                 _ if own.dependent().iter().any(&has) => open.push(own),
                 _ => {}

@@ -20,7 +20,6 @@ const NAMED: usize = 8;
 type Sum = Vec<(Point, f64)>;
 
 /// Points that follow others, each as a sum of points that follow none.
-#[derive(Default)]
 pub(super) struct Followers {
     sums: BTreeMap<Point, Sum>,
     /// Names of the constraints that make them.
@@ -94,9 +93,9 @@ impl Followers {
                 }
             }
         }
-        let mut all = Self::default();
-        all.names = constraints.iter().map(|own| own.name.clone()).collect();
-        all.names.dedup();
+        let mut names: Vec<String> = constraints.iter().map(|own| own.name.clone()).collect();
+        names.dedup();
+        let mut all = Self { sums: BTreeMap::new(), names };
         // Every round takes those whose sums have no followers that are not solved.
         while !direct.is_empty() {
             let ready = |sum: &Sum| sum.iter().all(|(other, _)| !direct.contains_key(other));

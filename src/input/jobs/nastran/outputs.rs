@@ -5,7 +5,7 @@ use super::rows;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
 use crate::input::dmig::Point;
-use crate::input::jobs::{Found, both, missing};
+use crate::input::jobs::{Beside, Found, beginning_alike, both, missing};
 use crate::input::nastran_names::{named_pair, pair};
 use crate::input::output4;
 use crate::model::RawMatrix;
@@ -126,5 +126,21 @@ pub(super) fn no_files(path: &Path, absent: &[PathBuf]) -> Vec<Diagnostic> {
         Some(file) => format!("{}, which the deck assigns to OUTPUT4,", file.display()),
         None => "beside the deck a file of matrices (job.pch, job.op4)".to_owned(),
     };
-    vec![missing(path, &what, HELP)]
+    // A file of another job may be the one that is meant.
+    let is_like = |file: &Beside| !file.is_own && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));
+    let mut others: Vec<String> = beginning_alike(path)
+        .iter()
+        .filter(|file| is_like(file))
+        .filter_map(|file| Some(file.path.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    others.sort();
+    match others.first() {
+        Some(other) => {
+            let help = format!(
+                "{HELP}; {other} is named like that of another job: rename it if it belongs to this one"
+            );
+            vec![missing(path, &what, &help)]
+        }
+        None => vec![missing(path, &what, HELP)],
+    }
 }
