@@ -210,10 +210,12 @@ impl ParsedTables {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
             None => None,
         };
-        let labels = dofs.clone().unwrap_or_else(|| in_order_of_nodes(&nodes, files.dimension));
-        take(diagnostics, refuse_followers(&followers, &labels, &tables.nodes))?;
-        let turned = turned([stiffness, mass], &labels, axes);
-        let ([stiffness, mass], given_rows) = take(diagnostics, turned)?;
+        let (mut stiffness, mut mass, mut given_rows) = (stiffness, mass, GivenRows::default());
+        if !followers.is_empty() || !axes.is_empty() {
+            let labels = dofs.clone().unwrap_or_else(|| in_order_of_nodes(&nodes, files.dimension));
+            take(diagnostics, refuse_followers(&followers, &labels, &tables.nodes))?;
+            ([stiffness, mass], given_rows) = take(diagnostics, turned([stiffness, mass], &labels, axes))?;
+        }
         Some(ModelMatrices {
             stiffness,
             mass,
@@ -395,9 +397,6 @@ fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
 /// FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do not
 /// have these constraints.
 fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], deck: &Path) -> Found<()> {
-    if followers.is_empty() {
-        return Ok(());
-    }
     let labels: HashSet<DofLabel> = labels.iter().copied().collect();
     let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
     let names: Vec<&str> = open.map(|(name, _)| name.as_str()).collect();
