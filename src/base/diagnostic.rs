@@ -95,6 +95,7 @@ codes! {
     ModesDiffer = "FB127", Warning, Done, "modes of the file are not those of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";
     ModeFileSyntax = "FB128", Error, BadInput, "file of modes cannot be read", "write it again as docs/fe_programs.md says, or give the shapes as an array";
     ModesCompleted = "FB129", Note, Done, "rows that the file of modes lacks follow from the others by K and M", "nothing to do: the modes that the file states fulfil the equations of motion there too";
+    DeckConstrained = "FB131", Note, Done, "rows that follow others by constraints of the deck are eliminated", "nothing to do: matrices before the constraints (KGG, MGG) are those of parts that are not joined";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";

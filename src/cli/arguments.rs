@@ -215,9 +215,15 @@ pub struct JobArguments {
     /// FE program that has written the job [default: by its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]
     pub format: Option<String>,
+    /// Names of the stiffness and the mass matrix of the job, where it has several pairs (Nastran)
+    #[arg(long, value_name = "K,M")]
+    pub matrices: Option<String>,
     /// Units of length, mass and time where no manifest states them [default: m,kg,s, not checked]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
+    /// 2 for a plane model, with x and y only, where no manifest states it [default: 3]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
+    pub dimension: Option<u8>,
     /// Node set of the job as an interface: NAME=SET, SET for both, then a coupling and a reference point in model axes,
     /// each after a comma, as in bore=SET_BORE,rigid,0/0/12.5 (repeatable) [default point: the centre of its faces]
     #[arg(long, value_name = "NAME=SET[,COUPLING][,X/Y/Z]")]
@@ -351,17 +357,17 @@ pub struct SimulateArguments {
 pub struct ConvertArguments {
     /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md); with
     /// --from the body of another program
-    #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs", "dimension"])]
+    #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split", "format", "interface"])]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split", "format", "matrices", "dimension", "interface"])]
     pub from: Option<String>,
     /// The job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
     /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group), SciPy (.npz), MATLAB (FILE.mat:/K), PETSc
     /// or Nastran (FILE.op4:/KGG)
-    #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"], conflicts_with_all = ["format", "interface"])]
+    #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"], conflicts_with_all = ["format", "matrices", "interface"])]
     pub stiffness: Option<PathBuf>,
     /// Mass matrix, consistent
     #[arg(long, value_name = "FILE", requires = "stiffness")]
@@ -372,9 +378,6 @@ pub struct ConvertArguments {
     /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub dofs: Option<PathBuf>,
-    /// 2 for a plane model, with x and y only [default: 3]
-    #[arg(long, value_name = "N", requires = "stiffness", value_parser = clap::value_parser!(u8).range(2..=3))]
-    pub dimension: Option<u8>,
     /// Warn only of densities that no matter has, and of mass between nodes that no stiffness joins
     #[arg(long, conflicts_with = "from")]
     pub allow_implausible: bool,

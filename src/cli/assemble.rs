@@ -28,6 +28,8 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         model: Some(model),
         from: None,
         job: JobArguments {
+            matrices: prepared.model.matrices.clone(),
+            dimension: prepared.model.dimension,
             format: prepared.model.format.clone(),
             units: prepared.model.units.clone(),
             interface: prepared.model.interfaces.clone(),
@@ -36,7 +38,6 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         mass: None,
         nodes: None,
         dofs: None,
-        dimension: None,
         allow_implausible: prepared.model.allow_implausible,
         output: arguments.output.clone(),
         modes: arguments.modes.or(modes),

@@ -374,7 +374,7 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
     match (arguments.basis, &arguments.shapes) {
         (BasisName::Imported, Some(shapes)) => {
             let location = MatrixLocation::parse(shapes);
-            let imported = match read_imported(&location, model.matrix_rows(), "shapes")? {
+            let imported = match read_imported(&location, &model.row_counts(), "shapes")? {
                 ImportedColumns::Rows(raw) => ImportedShapes::new(model, raw),
                 ImportedColumns::Modes(raw) => ImportedShapes::of_modes(model, raw),
             };
@@ -447,7 +447,7 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
             arguments.dofs.clone(),
             arguments.job.units.as_deref(),
         )
-        .map(|files| ModelFiles { dimension: arguments.dimension.unwrap_or(files.dimension), ..files }),
+        .map(|files| ModelFiles { dimension: arguments.job.dimension.unwrap_or(files.dimension), ..files }),
         _ => Err(Diagnostic::new(Code::Usage, "give a manifest, or --stiffness, --mass and --nodes").into()),
     }
 }

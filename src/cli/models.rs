@@ -4,7 +4,9 @@ use super::arguments::JobArguments;
 use super::places::{refuse_replacing, refuse_replacing_read};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::input::{InterfaceNodes, InterfaceSource, ModelFiles, is_job, read_manifest, read_model};
+use crate::input::{
+    InterfaceNodes, InterfaceSource, ModelFiles, ModelSource, is_job, read_manifest, read_model,
+};
 use crate::model::{CheckedModel, Coupling, FeModel, Reference};
 use std::path::{Path, PathBuf};
 
@@ -37,7 +39,12 @@ pub(super) fn of_manifest_or_job(path: &Path, job: &JobArguments) -> Result<Mode
         return read_manifest(path);
     }
     let interfaces = job.interface.iter().map(|text| interface_source(text)).collect::<Result<Vec<_>>>()?;
-    ModelFiles::from_job(path, job.format.clone(), interfaces, job.units.as_deref())
+    let mut files = ModelFiles::from_job(path, job.format.clone(), interfaces, job.units.as_deref())?;
+    if let ModelSource::Job(own) = &mut files.source {
+        own.matrices = job.matrices.as_deref().map(matrix_names).transpose()?;
+    }
+    files.dimension = job.dimension.unwrap_or(files.dimension);
+    Ok(files)
 }
 
 /// The files of a model and the model that they are, checked; none of `outputs` replaces one of them.
@@ -58,7 +65,9 @@ impl JobArguments {
     pub(super) fn first(&self) -> Option<&'static str> {
         let given = [
             (self.format.is_some(), "--format"),
+            (self.matrices.is_some(), "--matrices"),
             (self.units.is_some(), "--units"),
+            (self.dimension.is_some(), "--dimension"),
             (!self.interface.is_empty(), "--interface"),
         ];
         given.iter().find(|(given, _)| *given).map(|(_, option)| *option)
@@ -74,8 +83,14 @@ fn is_manifest(path: &Path) -> bool {
 fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
     let message = match job {
         JobArguments { format: Some(_), .. } => "--format is for jobs: a manifest says `program` in [files]",
+        JobArguments { matrices: Some(_), .. } => {
+            "--matrices is for jobs: a manifest says `matrices` in [files]"
+        }
         JobArguments { units: Some(_), .. } => {
             "--units are for --stiffness, --from and jobs: a manifest states its own"
+        }
+        JobArguments { dimension: Some(_), .. } => {
+            "--dimension is for --stiffness and jobs: a manifest says `dimension` in [model]"
         }
         JobArguments { interface, .. } if !interface.is_empty() => {
             "--interface is for jobs: a manifest has [[interface]]"
@@ -83,6 +98,18 @@ fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
         _ => return Ok(()),
     };
     Err(Diagnostic::new(Code::Usage, message).into())
+}
+
+/// The names of stiffness and mass matrix: `KGG,MGG`.
+fn matrix_names(text: &str) -> Result<[String; 2]> {
+    let names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
+    match names.as_slice() {
+        [k, m] => Ok([(*k).to_owned(), (*m).to_owned()]),
+        _ => {
+            let message = format!("--matrices {text}: expected two names, as in KGG,MGG");
+            Err(Diagnostic::new(Code::Usage, message).into())
+        }
+    }
 }
 
 /// Returns the interface that `--interface` names: `NAME=SET` or `SET`, then a coupling, a reference point or both, each

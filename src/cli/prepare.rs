@@ -42,6 +42,8 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
             path: Some(path),
             format: arguments.job.format.clone(),
             units: arguments.job.units.clone(),
+            matrices: arguments.job.matrices.clone(),
+            dimension: arguments.job.dimension,
             interfaces: arguments.job.interface.clone(),
             allow_implausible: arguments.allow_implausible,
         },

@@ -31,6 +31,12 @@ pub struct ModelReference {
     pub format: Option<String>,
     /// Units of the job.
     pub units: Option<String>,
+    /// Names of the matrices of the job.
+    #[serde(default)]
+    pub matrices: Option<String>,
+    /// Dimension of the job.
+    #[serde(default)]
+    pub dimension: Option<u8>,
     /// Interfaces of the job.
     pub interfaces: Vec<String>,
     /// Whether implausible findings were taken as warnings.

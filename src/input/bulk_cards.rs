@@ -1,12 +1,16 @@
 //! Decks of Nastran: lines of case control, then bulk data cards in free, small and large fields, with
 //! continuations, comments and included files.
 
+mod apart;
 mod matrix_lines;
+mod replication;
 
 use super::bytes::InputFile;
 use super::coordinates::{excerpt, real};
 use crate::base::diagnostic::{Code, Diagnostic};
+use apart::Apart;
 pub(super) use matrix_lines::MatrixLines;
+use replication::{Asked, Replication};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +37,7 @@ pub(super) struct Place<'a> {
 }
 
 /// A bulk data card: its name and its fields, eight to a line of small fields, four to one of large fields.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Card {
     /// In upper case, without asterisk.
     pub name: String,
@@ -42,7 +46,7 @@ pub(super) struct Card {
     ends: Vec<usize>,
     /// The first field of each line, and the number of the line.
     lines: Vec<(usize, usize)>,
-    /// Name that the continuation has to have, where one is given.
+    /// Name that the continuation has to have, in upper case, where one is given.
     continuation: Vec<u8>,
 }
 
@@ -97,7 +101,7 @@ impl Card {
     /// Its continuation has to have the name in this field.
     fn continue_as(&mut self, field: &[u8]) {
         self.continuation.clear();
-        self.continuation.extend_from_slice(bare(field.trim_ascii()));
+        self.continuation.extend(bare(field.trim_ascii()).iter().map(u8::to_ascii_uppercase));
     }
 
     fn push(&mut self, field: &[u8]) {
@@ -122,6 +126,11 @@ pub(super) fn whole(field: &[u8]) -> Option<i64> {
         number = 10 * number + i64::from(digit.is_ascii_digit().then(|| digit - b'0')?);
     }
     Some(if field[0] == b'-' { -number } else { number })
+}
+
+/// Components of a grid: digits from 0 to 6. Scalar points have 0 or none.
+pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
+    field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
 }
 
 /// Whether a file is a deck of Nastran or bulk data, by its first lines that say so.
@@ -246,13 +255,18 @@ struct Reading<'t> {
     card_path: PathBuf,
     /// Continuations may go on with that card: it was not given yet.
     is_open: bool,
+    /// Continuations of the file that stand apart from their cards.
+    apart: Apart,
+    /// Changes from card to card by the last line of replication.
+    replication: Replication,
     take: &'t mut dyn FnMut(Item<'_>) -> Taken,
 }
 
 impl<'t> Reading<'t> {
     fn new(in_bulk: bool, take: &'t mut dyn FnMut(Item<'_>) -> Taken) -> Self {
         let (files, card, card_path) = (Vec::new(), Card::default(), PathBuf::new());
-        Self { files, in_bulk, ended: false, card, card_path, is_open: false, take }
+        let (apart, replication) = (Apart::default(), Replication::default());
+        Self { files, in_bulk, ended: false, card, card_path, is_open: false, apart, replication, take }
     }
 
     fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
@@ -264,6 +278,19 @@ impl<'t> Reading<'t> {
                 .with_help("a file includes itself: take the INCLUDE out"));
         }
         self.files.push(path.to_path_buf());
+        let before = std::mem::replace(&mut self.apart, Apart::of(file));
+        self.lines_of(path, file, depth)?;
+        if !self.apart.is_empty() {
+            self.flush()?;
+            for (card, path) in self.apart.joined(path)? {
+                (self.take)(Item::Card(&card, &path))?;
+            }
+        }
+        self.apart = before;
+        Ok(())
+    }
+
+    fn lines_of(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
         let mut lines = Lines::of(file.bytes(), 0);
         while let Some((number, range)) = lines.next() {
             if self.ended {
@@ -337,49 +364,70 @@ impl<'t> Reading<'t> {
     fn bulk_line(&mut self, line: &[u8], at: &Place<'_>) -> Taken {
         let line = Line::of(line);
         let head = line.head();
-        let (is_large, goes_on) = match head.first() {
-            None => (false, true),
-            Some(b'+') => (false, true),
-            Some(b'*') => (true, true),
-            Some(_) => (head.ends_with(b"*"), false),
-        };
-        if goes_on {
+        let here = |diagnostic: Diagnostic| diagnostic.in_file(at.path).at_line(at.line);
+        match Replication::asked(&line).map_err(here)? {
+            None => {}
+            Some(Asked::One(replication)) => {
+                self.replication = replication;
+                return self.replicate(1, at);
+            }
+            Some(Asked::Repeat(count)) => return self.replicate(count, at),
+        }
+        if matches!(head.first(), None | Some(b'+' | b'*')) {
             let refused = |what: &str| {
                 let message = format!("`{}` continues {what}", excerpt(&line.text));
                 Diagnostic::new(Code::DeckSyntax, message).in_file(at.path).at_line(at.line)
             };
+            let (name, card) = (bare(head).to_ascii_uppercase(), &self.card);
+            let is_below = self.is_open && !name.is_empty() && name == card.continuation;
+            if !is_below && self.apart.keep(&name, &line.text, at.line) {
+                return Ok(());
+            }
             if !self.is_open {
                 return Err(refused("no card"));
             }
-            let (name, card) = (bare(head), &self.card);
             if !name.is_empty() && !card.continuation.is_empty() && name != card.continuation {
                 let help = "write the lines of a card one after the other";
                 return Err(refused(&format!("another card than the {} above it", card.name)).with_help(help));
             }
         } else {
-            self.flush()?;
             let name = String::from_utf8_lossy(head).trim_end_matches('*').trim().to_uppercase();
+            self.open(at)?;
             self.card.begin(name);
-            if self.card_path != at.path {
-                self.card_path = at.path.to_path_buf();
-            }
-            self.is_open = true;
         }
-        let card = &mut self.card;
-        card.lines.push((card.ends.len(), at.line));
-        let fields = if is_large { 4 } else { 8 };
-        match line.is_free {
-            true => free_fields(card, &line.text, fields).map_err(|d| d.in_file(at.path).at_line(at.line)),
-            false => {
-                fixed_fields(card, &line.text, fields);
-                Ok(())
-            }
+        card_fields(&mut self.card, &line, at.line).map_err(here)
+    }
+
+    /// Another card begins.
+    fn open(&mut self, at: &Place<'_>) -> Taken {
+        self.flush()?;
+        self.apart.close();
+        if self.card_path != at.path {
+            self.card_path = at.path.to_path_buf();
         }
+        self.is_open = true;
+        Ok(())
+    }
+
+    /// Cards that follow from the last one by replication.
+    fn replicate(&mut self, count: i64, at: &Place<'_>) -> Taken {
+        for _ in 0..count {
+            let next = self.replication.next(&self.card);
+            let mut next = next.map_err(|diagnostic| diagnostic.in_file(at.path).at_line(at.line))?;
+            next.lines.push((0, at.line));
+            self.open(at)?;
+            self.card = next;
+        }
+        Ok(())
     }
 
     /// Gives the card that has been read.
     fn flush(&mut self) -> Taken {
         if !std::mem::take(&mut self.is_open) {
+            return Ok(());
+        }
+        if self.apart.contains(&self.card.continuation) {
+            self.apart.wait(self.card.clone(), self.card_path.clone());
             return Ok(());
         }
         (self.take)(Item::Card(&self.card, &self.card_path))
@@ -460,6 +508,19 @@ fn without_tabs(line: &[u8]) -> Cow<'_, [u8]> {
         }
     }
     Cow::Owned(wide)
+}
+
+/// Adds the fields of a line to a card.
+fn card_fields(card: &mut Card, line: &Line<'_>, number: usize) -> Taken {
+    card.lines.push((card.ends.len(), number));
+    let head = line.head();
+    let is_large = head.starts_with(b"*") || head.ends_with(b"*") && !head.starts_with(b"+");
+    let fields = if is_large { 4 } else { 8 };
+    if line.is_free {
+        return free_fields(card, &line.text, fields);
+    }
+    fixed_fields(card, &line.text, fields);
+    Ok(())
 }
 
 fn fixed_fields(card: &mut Card, line: &[u8], fields: usize) {

@@ -9,7 +9,7 @@ use super::nastran_names::choose;
 use super::reader::{MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result as Outcome};
-use crate::model::RawMatrix;
+use crate::model::{DofLabel, RawMatrix};
 use columns::{Columns, Heads};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -19,6 +19,9 @@ pub(super) use columns::Point;
 
 /// Bad cards that are told one by one.
 const SHOWN: usize = 5;
+
+/// Form of rectangular matrices, such as loads.
+const RECTANGULAR: i64 = 9;
 
 /// All matrices of a deck.
 #[derive(Default)]
@@ -173,6 +176,15 @@ impl Dmigs {
         self.matrices.iter().map(|matrix| matrix.name.clone()).collect()
     }
 
+    /// The matrices that may be K or M: square ones with entries; all if there are none.
+    pub(super) fn candidates(&self) -> Vec<usize> {
+        // Entries of complex matrices are not kept.
+        let has_entries = |own: &Dmig| own.count() > 0 || !own.is_real();
+        let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && has_entries(&self.matrices[*k]);
+        let some: Vec<usize> = (0..self.matrices.len()).filter(is_one).collect();
+        if some.is_empty() { (0..self.matrices.len()).collect() } else { some }
+    }
+
     /// The points that entries of some matrices which are not zero name, ascending.
     pub(super) fn points(&self, of: &[usize]) -> Vec<Point> {
         let mut named = vec![false; self.points.len()];
@@ -279,6 +291,11 @@ impl Dmigs {
     }
 }
 
+/// Label of a row. Scalar points have one direction.
+pub(super) fn label((node, component): Point) -> DofLabel {
+    DofLabel { node, direction: component.max(1) }
+}
+
 fn named((id, component): Point) -> String {
     match component {
         0 => format!("scalar point {id}"),
@@ -302,7 +319,8 @@ impl Reader for DmigPunch {
         is_bulk_data(head)
     }
 
-    /// Rows are the points that any matrix of the file names, ascending.
+    /// Rows are the points that any matrix of the file names which may be one of K and M, ascending: not the
+    /// numbers of loads and other rectangular matrices.
     fn read(&self, source: &MatrixSource<'_>) -> Outcome<RawMatrix> {
         let path = source.file.path();
         if source.compression != Compression::None {
@@ -312,7 +330,8 @@ impl Reader for DmigPunch {
         }
         let mut all = Dmigs::of(&[path.to_path_buf()]).map_err(Error::new)?;
         let at = choose(&all.names(), source.role, source.group).map_err(|d| d.in_file(path))?;
-        let every: Vec<usize> = (0..all.matrices.len()).collect();
+        let mut every = all.candidates();
+        every.push(at);
         let points = all.points(&every);
         Ok(all.take_matrix(at, &points)?)
     }

@@ -8,6 +8,7 @@ mod calculix;
 mod coordinate_files;
 mod deck;
 mod deck_mesh;
+mod deck_sets;
 mod deck_surfaces;
 mod distributing_couplings;
 mod element_kinds;
@@ -18,11 +19,13 @@ mod rotation_nodes;
 
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
+use super::node_file::{NodeFile, NodeSets, Unresolved};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
+use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use abaqus::Abaqus;
 use calculix::Calculix;
 use deck::Deck;
+pub(super) use deck::comparable;
 use deck_mesh::DeckMesh;
 use nastran::Nastran;
 pub(super) use nastran::nodes_of_bulk;
@@ -35,6 +38,8 @@ pub struct JobFile {
     pub path: PathBuf,
     /// Name of the program; `None`: by the content of the file and what stands beside it.
     pub program: Option<String>,
+    /// Names of the stiffness and the mass matrix, where the job has several pairs and the user said which.
+    pub matrices: Option<[String; 2]>,
 }
 
 impl JobFile {
@@ -60,8 +65,12 @@ pub(super) struct JobModel {
     pub nodes: Nodes,
     /// Label of every matrix row.
     pub dofs: Vec<DofLabel>,
+    /// Maps from the rows of the files to the rows here.
+    pub given_rows: GivenRows,
     /// Names are compared without regard to case.
     pub sets: NodeSets,
+    /// Sets of which nobody knows the nodes.
+    pub unresolved: Unresolved,
     /// What the part is drawn by.
     pub elements: Elements,
     /// Role and path of every file that was read.
@@ -69,9 +78,6 @@ pub(super) struct JobModel {
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
-
-/// Named sets of nodes, in the order of their file.
-pub(super) type NodeSets = Vec<(String, Vec<i64>)>;
 
 /// All that is wrong with a job.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -91,7 +97,12 @@ pub(super) trait JobReader: Sync {
     ///
     /// # Errors
     /// FB101 to FB112, FB2xx and FB3xx, as many as are found.
-    fn read(&self, path: &Path) -> Found<JobModel>;
+    fn read(&self, job: &JobFile) -> Found<JobModel>;
+
+    /// True if the matrices of a job have names by which a user may choose.
+    fn names_matrices(&self) -> bool {
+        false
+    }
 }
 
 /// Every FE program whose jobs are read; the first that recognises a file takes it.
@@ -121,7 +132,13 @@ pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
         }
     };
     match reader {
-        Some(reader) => reader.read(&job.path),
+        Some(reader) if job.matrices.is_some() && !reader.names_matrices() => {
+            let message = format!("the matrices of a job of {} have no names to choose by", reader.name());
+            Err(vec![
+                Diagnostic::new(Code::Usage, message).in_file(&job.path).with_help("leave the names out"),
+            ])
+        }
+        Some(reader) => reader.read(job),
         None => Err(vec![unknown(job)]),
     }
 }
@@ -140,11 +157,12 @@ fn unknown(job: &JobFile) -> Diagnostic {
 ///
 /// # Errors
 /// FB101, FB106, FB110, FB111.
-pub(super) fn nodes_of_deck(file: &InputFile) -> Found<(Nodes, NodeSets, Elements)> {
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
     let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
     let elements = mesh.drawn();
     let (ids, positions) = mesh.nodes.into_iter().unzip();
-    Ok((Nodes { ids, positions }, mesh.sets, elements))
+    let DeckMesh { sets, unresolved, .. } = mesh;
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, unresolved, elements, ..NodeFile::default() })
 }
 
 /// Whether a path is that of a keyword deck, by its name.
@@ -152,19 +170,59 @@ fn is_deck(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"))
 }
 
-/// Files beside the main file of a job whose names begin with its stem, in any case: what follows the stem,
-/// in lower case, and the path.
+/// Files beside the main file of a job that are named like it, in any case: its stem, then a dot, an underscore
+/// or the like, or what Abaqus calls matrices. What follows the stem, in lower case, and the path.
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
-    let stem = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase());
+    let own = beginning_alike(main).into_iter().filter(|file| file.is_own);
+    own.map(|Beside { rest, path, .. }| (rest, path))
+}
+
+/// A file beside the main file of a job whose name begins with the stem of the job.
+struct Beside {
+    /// The rest of its name, in lower case.
+    rest: String,
+    path: PathBuf,
+    /// False for files of other decks, whose names go on (`job_2.op4` beside `job_2.bdf`), and those that a letter
+    /// or a number tells from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
+    is_own: bool,
+}
+
+/// Files beside the main file of a job whose names begin with its stem, in any case.
+fn beginning_alike(main: &Path) -> Vec<Beside> {
+    let Some(stem) = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()) else {
+        return Vec::new();
+    };
     let folder = match main.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    std::fs::read_dir(folder).into_iter().flatten().flatten().filter_map(move |file| {
-        let name = file.file_name().to_string_lossy().to_lowercase();
-        let rest = name.strip_prefix(stem.as_ref()?)?.to_owned();
-        Some((rest, main.with_file_name(file.file_name())))
-    })
+    let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let rest_of = |name: std::ffi::OsString| {
+        let lower = name.to_string_lossy().to_lowercase();
+        Some((lower.strip_prefix(&stem)?.to_owned(), main.with_file_name(name)))
+    };
+    let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
+    let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
+    let goes_on = |rest: &str, deck: &String| {
+        rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
+    };
+    let is_own = |rest: &str| {
+        let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
+        let version = name.strip_prefix('v').unwrap_or(name);
+        let is_of_abaqus = ["stif", "mass"].iter().any(|kind| rest.starts_with(kind));
+        (is_of_abaqus || !rest.starts_with(char::is_alphanumeric))
+            && !version.starts_with(|c: char| c.is_ascii_digit())
+            && !decks.iter().any(|deck| goes_on(rest, deck))
+    };
+    let beside = |(rest, path): (String, PathBuf)| Beside { is_own: is_own(&rest), rest, path };
+    all.into_iter().map(beside).collect()
+}
+
+/// Returns the part of the stem of another deck behind the stem of the job; `rest` is that part of its file name.
+fn stem_of_deck(rest: &str) -> Option<String> {
+    const DECKS: &[&str] = &[".inp", ".bdf", ".dat", ".nas"];
+    let stem = DECKS.iter().find_map(|extension| rest.strip_suffix(extension))?;
+    (!stem.is_empty()).then(|| stem.to_owned())
 }
 
 /// Both of two, or all that is wrong with them.

@@ -19,7 +19,7 @@ mod region;
 const TOP: &[&str] = &["model", "files", "interface", "damping", "geometric_stiffness", "basis"];
 const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
-const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "mesh"];
+const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];
 
 /// Reads a manifest. Relative paths in it are taken from its folder. The files themselves are not touched.
 ///
@@ -88,7 +88,8 @@ impl Walk<'_> {
                 return None;
             }
             let (job, program) = (self.string(files, "job"), self.string(files, "program"));
-            return Some(ModelSource::Job(JobFile { path: folder.join(job?), program }));
+            let matrices = self.matrix_names(files);
+            return Some(ModelSource::Job(JobFile { path: folder.join(job?), program, matrices }));
         }
         let mut required = |key: &str| {
             if !files.contains_key(key) {
@@ -99,8 +100,8 @@ impl Walk<'_> {
         };
         let (stiffness, mass, nodes) = (required("stiffness"), required("mass"), required("nodes"));
         let dofs = self.string(files, "dofs");
-        if files.contains_key("program") {
-            self.complain(Code::ManifestSyntax, span, "`program` in [files] belongs to a `job`".to_owned());
+        if let Some(key) = ["program", "matrices"].iter().find(|key| files.contains_key(**key)) {
+            self.complain(Code::ManifestSyntax, span, format!("`{key}` in [files] belongs to a `job`"));
         }
         Some(ModelSource::Tables(TableFiles {
             stiffness: MatrixLocation::parse(stiffness?).relative_to(&folder),
@@ -108,6 +109,20 @@ impl Walk<'_> {
             nodes: folder.join(nodes?),
             dofs: dofs.map(|dofs| folder.join(dofs)),
         }))
+    }
+
+    /// The names of stiffness and mass matrix among those of a job.
+    fn matrix_names(&mut self, files: &Table) -> Option<[String; 2]> {
+        let value = files.get("matrices")?;
+        let names = value.get_ref().as_array().map(|all| {
+            all.iter().filter_map(|name| name.get_ref().as_str().map(str::to_owned)).collect::<Vec<_>>()
+        });
+        let names = names.and_then(|names| <[String; 2]>::try_from(names).ok());
+        if names.is_none() {
+            let message = "`matrices` has to be two names, as in [\"KGG\", \"MGG\"]".to_owned();
+            self.complain(Code::ManifestSyntax, value.span(), message);
+        }
+        names
     }
 
     fn dimension(&mut self, table: &Table) -> Option<u8> {

@@ -222,7 +222,7 @@ impl ModelFiles {
         units: Option<&str>,
     ) -> Result<Self> {
         let path = path.into();
-        let (name, job) = (stem(&path), JobFile { path, program });
+        let (name, job) = (stem(&path), JobFile { path, program, matrices: None });
         let own = Self::of(name, ModelSource::Job(job), units)?;
         Ok(Self { interfaces, ..own })
     }

@@ -71,6 +71,22 @@ fn listing(names: &[String]) -> String {
     format!("name the matrix as FILE:/NAME; the file has {}{more}", shown.join(", "))
 }
 
+/// The matrices that a user has named, stiffness and mass; their names may begin with a `/`.
+///
+/// # Errors
+/// No pair, if there is not one matrix of each name.
+pub(super) fn named_pair(
+    names: &[String],
+    stated: &[String; 2],
+) -> Result<(usize, usize), Vec<(usize, usize)>> {
+    let [k, m] = stated.each_ref().map(|wanted| {
+        let is_wanted = |k: &usize| names[*k].eq_ignore_ascii_case(wanted.trim_matches('/'));
+        let mut found = (0..names.len()).filter(is_wanted);
+        found.next().filter(|_| found.next().is_none())
+    });
+    k.zip(m).ok_or_else(Vec::new)
+}
+
 /// The pair of stiffness and mass matrix among the matrices of a job: names that differ in their first letter
 /// only, or the only two.
 ///

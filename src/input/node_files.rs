@@ -1,6 +1,7 @@
 //! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its
 //! content.
 
+mod ansys_axes;
 mod ansys_list;
 mod cdb;
 mod exodus;
@@ -14,21 +15,13 @@ mod xml_elements;
 use super::bulk_cards::is_bulk_data;
 use super::bytes::InputFile;
 use super::compression::refuse_packed;
-use super::jobs::{NodeSets, nodes_of_bulk, nodes_of_deck};
+use super::jobs::{nodes_of_bulk, nodes_of_deck};
+pub(super) use super::node_file::NodeFile;
 use super::tables::read_nodes;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::model::{Elements, Nodes};
 use std::collections::HashSet;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
-
-/// Nodes, and what is known of sets and elements of them.
-#[derive(Debug, Default)]
-pub(super) struct NodeFile {
-    pub nodes: Nodes,
-    pub sets: NodeSets,
-    pub elements: Elements,
-}
 
 /// A format of node files besides our table.
 struct Format {
@@ -43,7 +36,7 @@ const FORMATS: &[Format] = &[
     Format { recognises: vtk_legacy::recognises, read: vtk_legacy::read },
     Format { recognises: exodus::recognises, read: exodus::read },
     Format { recognises: cdb::recognises, read: cdb::read },
-    Format { recognises: is_deck, read: deck },
+    Format { recognises: is_deck, read: nodes_of_deck },
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
     Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
 ];
@@ -77,6 +70,11 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile>
             format!("node {} has no finite coordinates", read.nodes.ids[at]),
         );
     }
+    let mut turned: Vec<_> = read.axes.iter().collect();
+    turned.sort_unstable_by_key(|(node, _)| **node);
+    if let Some((node, _)) = turned.iter().find(|(_, axes)| axes.iter().flatten().any(|x| !x.is_finite())) {
+        return wrong(Code::CoordinateNotFinite, format!("node {node} has no finite angles"));
+    }
     if let Some(at) = read.nodes.positions.iter().position(|x| dimension == 2 && x[2] != 0.0) {
         let message =
             format!("node {} has z = {} in a plane model", read.nodes.ids[at], read.nodes.positions[at][2]);
@@ -92,12 +90,8 @@ fn is_deck(head: &str) -> bool {
         .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
 }
 
-fn deck(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_deck(file).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
-}
-
 fn bulk(file: &InputFile) -> Found<NodeFile> {
-    nodes_of_bulk(file.path()).map(|(nodes, sets, elements)| NodeFile { nodes, sets, elements })
+    nodes_of_bulk(file.path())
 }
 
 /// FB115 at a line.

@@ -90,6 +90,13 @@ impl Contents {
         self.matrices.iter().map(|(stored, _)| stored.header.name.clone()).collect()
     }
 
+    /// Number of rows of a square matrix with entries; `None` of another.
+    pub(super) fn square(&self, at: usize) -> Option<usize> {
+        let (stored, _) = self.matrices.get(at)?;
+        let is_square = stored.header.rows == stored.header.columns && stored.values > 0;
+        usize::try_from(stored.header.rows).ok().filter(|_| is_square)
+    }
+
     /// The matrix with this index of the file that these are the contents of.
     ///
     /// # Errors

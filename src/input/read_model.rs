@@ -2,21 +2,24 @@
 
 use super::bytes::InputFile;
 use super::compression::Compression;
-use super::jobs::{JobModel, NodeSets, read_job};
+use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
 use super::mesh::MeshReading;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
-use super::node_files::{NodeFile, read_node_file};
+use super::node_file::{NodeFile, NodeSets, Unresolved};
+use super::node_files::read_node_file;
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
+use super::row_axes::Turn;
 use super::tables::{read_masses, read_node_list};
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, Sources};
 use crate::model::{
-    Damping, DofLabel, Elements, GeometricStiffness, NodeSet, Nodes, RawMatrix, RawModel, filled_rows,
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, NodeAxes, NodeSet, Nodes, RawMatrix,
+    RawModel, RowMap, filled_rows,
 };
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// Below this many significant digits a matrix is warned about.
@@ -47,9 +50,18 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
         Matrices::Job(job) => take(&mut diagnostics, *job),
     };
-    let damping = parsed.damping.and_then(|damping| take(&mut diagnostics, damping));
-    let geometric_stiffness =
-        parsed.geometric_stiffness.into_iter().filter_map(|one| take(&mut diagnostics, one)).collect();
+    let no_rows = GivenRows::default();
+    let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);
+    let damping = parsed.damping.and_then(|damping| {
+        let damping = take(&mut diagnostics, damping)?;
+        take(&mut diagnostics, damping.try_map(|raw| by_rows_of_model(raw, rows)))
+    });
+    let geometric = parsed.geometric_stiffness.into_iter().filter_map(|one| {
+        let GeometricStiffness { load, matrix } = take(&mut diagnostics, one)?;
+        let matrix = take(&mut diagnostics, by_rows_of_model(matrix, rows))?;
+        Some(GeometricStiffness { load, matrix })
+    });
+    let geometric_stiffness = geometric.collect();
     let places = Places::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
         .interfaces
@@ -83,6 +95,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         mesh,
         dofs: matrices.dofs,
         dofs_path: matrices.dofs_path,
+        given_rows: matrices.given_rows,
         interfaces,
         damping,
         geometric_stiffness,
@@ -123,8 +136,11 @@ struct ModelMatrices {
     nodes_path: PathBuf,
     dofs: Option<Vec<DofLabel>>,
     dofs_path: PathBuf,
+    given_rows: GivenRows,
     /// Node sets of a job.
     sets: NodeSets,
+    /// Sets that cannot be resolved, and why.
+    unresolved: Unresolved,
     /// What the part is drawn by.
     elements: Elements,
     /// Files of a job.
@@ -149,14 +165,38 @@ impl ModelMatrices {
 
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
-        let JobModel { stiffness, mass, nodes, dofs, sets, elements, files, diagnostics } = job;
+        let JobModel {
+            stiffness,
+            mass,
+            nodes,
+            dofs,
+            given_rows,
+            sets,
+            unresolved,
+            elements,
+            files,
+            diagnostics,
+        } = job;
         let path = |role: &str| {
             let file = files.iter().find(|(own, _)| *own == role).or(files.first());
             file.map(|(_, path)| path.clone()).unwrap_or_default()
         };
         let (nodes_path, dofs_path) = (path("deck"), path("dofs"));
         let dofs = Some(dofs);
-        Self { stiffness, mass, nodes, nodes_path, dofs, dofs_path, sets, elements, files, diagnostics }
+        Self {
+            stiffness,
+            mass,
+            nodes,
+            nodes_path,
+            dofs,
+            dofs_path,
+            given_rows,
+            sets,
+            unresolved,
+            elements,
+            files,
+            diagnostics,
+        }
     }
 }
 
@@ -178,12 +218,19 @@ impl ParsedTables {
             None => None,
         };
         let tables = files.tables().expect("tables were read");
-        let (stiffness, mass, NodeFile { nodes, sets, elements }) = (stiffness?, mass?, nodes?);
+        let (stiffness, mass, nodes) = (stiffness?, mass?, nodes?);
+        let NodeFile { nodes, sets, unresolved, elements, followers, axes } = nodes;
         let dofs_path = tables.dofs.clone().unwrap_or_default();
         let dofs = match dofs {
             Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
             None => None,
         };
+        let (mut stiffness, mut mass, mut given_rows) = (stiffness, mass, GivenRows::default());
+        if !followers.is_empty() || !axes.is_empty() {
+            let labels = dofs.clone().unwrap_or_else(|| in_order_of_nodes(&nodes, files.dimension));
+            take(diagnostics, refuse_followers(&followers, &labels, &tables.nodes))?;
+            ([stiffness, mass], given_rows) = take(diagnostics, turned([stiffness, mass], &labels, axes))?;
+        }
         Some(ModelMatrices {
             stiffness,
             mass,
@@ -191,7 +238,9 @@ impl ParsedTables {
             nodes_path: tables.nodes.clone(),
             dofs,
             dofs_path,
+            given_rows,
             sets,
+            unresolved,
             elements,
             files: Vec::new(),
             diagnostics: Vec::new(),
@@ -284,12 +333,18 @@ impl<'m> Places<'m> {
 
     /// Returns the members of a node set, with those that have no rows.
     fn members(&self, name: &str) -> Option<&[i64]> {
-        let mut sets = self.matrices?.sets.iter();
-        sets.find(|(own, _)| own.eq_ignore_ascii_case(name)).map(|(_, nodes)| nodes.as_slice())
+        let sets = &self.matrices?.sets;
+        let known = sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
+        let known = known.or_else(|| sets.iter().find(|(own, _)| comparable(own) == comparable(name)));
+        known.map(|(_, nodes)| nodes.as_slice())
     }
 
     fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
         let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
+        let refused = matrices.unresolved.iter().find(|(own, _)| comparable(own) == comparable(name));
+        if let Some((_, refused)) = refused {
+            return Err(vec![refused.clone().about(format!("interface `{}`", interface.name))]);
+        }
         let Some(nodes) = self.members(name) else {
             let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
             let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
@@ -354,6 +409,70 @@ fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
             format!("values of the stiffness matrix carry only {} significant digits", stiffness.digits);
         Diagnostic::new(Code::MatrixDigits, message).in_file(&stiffness.path)
     })
+}
+
+/// Labels of rows that follow the nodes of a table, each with its displacements.
+fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
+    let of_node = |&node: &i64| (1..=dimension).map(move |direction| DofLabel { node, direction });
+    nodes.ids.iter().flat_map(of_node).collect()
+}
+
+/// FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do not
+/// have these constraints.
+fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], deck: &Path) -> Found<()> {
+    let labels: HashSet<DofLabel> = labels.iter().copied().collect();
+    let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
+    let names: Vec<&str> = open.map(|(name, _)| name.as_str()).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let message =
+        format!("rows of the matrices follow others by constraints of the deck: {}", names.join(", "));
+    let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
+    Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
+}
+
+/// K and M along the axes of the model, where rows stand along `axes` of nodes, and how others with these rows
+/// become the same.
+///
+/// # Errors
+/// FB404 for a rotated node that lacks directions which turn together.
+fn turned(
+    matrices: [RawMatrix; 2],
+    labels: &[DofLabel],
+    axes: HashMap<i64, NodeAxes>,
+) -> Found<([RawMatrix; 2], GivenRows)> {
+    let [stiffness, mass] = matrices;
+    let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
+    // Numbers of rows that differ are found later.
+    if !labels.iter().any(|label| axes.contains_key(&label.node)) || !has_rows(&stiffness) || !has_rows(&mass)
+    {
+        return Ok(([stiffness, mass], GivenRows::default()));
+    }
+    let turn = Turn::new(labels, &axes).map_err(|node| {
+        let message = format!(
+            "rows of node {node} stand along axes of its own, but not each of its directions is there once"
+        );
+        vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
+    })?;
+    let own = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+    let matrices = [own(stiffness)?, own(mass)?];
+    let rows = (0..labels.len() as u32).collect();
+    let map = RowMap::new(turn.axes(), turn.axes(), rows);
+    Ok((matrices, GivenRows::new(vec![map], axes)))
+}
+
+/// A matrix that is given beside K and M, by the rows of the model.
+fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
+    let RawMatrix { matrix, digits, path } = raw;
+    match rows.matrix(matrix) {
+        Ok(matrix) => Ok(RawMatrix { matrix, digits, path }),
+        Err(LostRow) => {
+            let message = "the matrix has entries in rows that K and M leave empty";
+            let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
+            Err(vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")])
+        }
+    }
 }
 
 fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {

@@ -82,5 +82,5 @@ const NASTRAN: Recipe = Recipe {
         Step { place: "Run, which writes the matrices to job.pch", lines: "nastran job.bdf" },
         Step { place: "Convert", lines: "flexbody convert job.bdf --units mm,t,s -o body.flex.h5" },
     ],
-    mind: "no SPC, no MPC and no rigid elements; the matrices have ten digits",
+    mind: "no SPC; the matrices have ten digits",
 };

@@ -25,28 +25,29 @@ pub enum ImportedColumns {
     Modes(RawModes),
 }
 
-/// Reads shapes for matrices with `n` rows, by rows or by nodes. `role` names the file in the provenance.
+/// Reads shapes by rows, of which there may be as many as one of `counts`, or by nodes. `role` names the file in
+/// the provenance.
 ///
 /// # Errors
 /// Those of [`read_shapes`]; FB128 and FB306 for files of modes.
-pub fn read_imported(location: &MatrixLocation, n: usize, role: &str) -> Result<ImportedColumns> {
+pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<ImportedColumns> {
     let file = InputFile::open(&location.path)?;
     match read_modes(&file, role).filter(|_| location.group.is_none()) {
         Some(modes) => modes.map(ImportedColumns::Modes).map_err(Error::new),
-        None => read_shapes(location, n, role).map(ImportedColumns::Rows),
+        None => read_shapes(location, counts, role).map(ImportedColumns::Rows),
     }
 }
 
-/// Reads shapes or loads for matrices with `n` rows: an array n x k, or k x n where k is not n too. `role`
-/// names the file in the provenance.
+/// Reads shapes or loads: an array n x k, or k x n, where n is one of `counts` (the numbers of rows that the files
+/// of a model have) and k is none. `role` names the file in the provenance.
 ///
 /// # Errors
 /// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.
-pub fn read_shapes(location: &MatrixLocation, n: usize, role: &str) -> Result<RawShapes> {
+pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<RawShapes> {
     let file = InputFile::open(&location.path)?;
     let path = file.path();
     let array = read(&file, location.group.as_deref())
-        .and_then(|array| oriented(array, n).map_err(|diagnostic| vec![diagnostic]));
+        .and_then(|array| oriented(array, counts).map_err(|diagnostic| vec![diagnostic]));
     let (matrix, digits) =
         array.map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))?;
     let source = Some(SourceFile::new(role, path, file.sha256()));
@@ -82,9 +83,9 @@ fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, V
 }
 
 /// The array with one shape in each column, and its digits.
-fn oriented(array: Array, n: usize) -> std::result::Result<(Mat<f64>, u8), Diagnostic> {
+fn oriented(array: Array, counts: &[usize]) -> std::result::Result<(Mat<f64>, u8), Diagnostic> {
     let Array { rows, cols, row_major, values, digits } = array;
-    let upright = match (rows == n, cols == n) {
+    let upright = match (counts.contains(&rows), counts.contains(&cols)) {
         (true, false) => true,
         (false, true) => false,
         (true, true) => {
@@ -92,11 +93,13 @@ fn oriented(array: Array, n: usize) -> std::result::Result<(Mat<f64>, u8), Diagn
             return Err(Diagnostic::new(Code::ShapesSize, message).with_help("give fewer shapes"));
         }
         (false, false) => {
-            let message = format!("array is {rows} x {cols}, the matrices have {n} rows");
+            let mut counts: Vec<String> = counts.iter().map(usize::to_string).collect();
+            counts.dedup();
+            let message = format!("array is {rows} x {cols}, the matrices have {} rows", counts.join(" or "));
             return Err(Diagnostic::new(Code::ShapesSize, message));
         }
     };
-    let k = if upright { cols } else { rows };
+    let (n, k) = if upright { (rows, cols) } else { (cols, rows) };
     // Shapes follow each other: row by row in an array of rows, column by column in one of columns.
     let one_by_one = row_major != upright;
     let at = |i: usize, j: usize| if one_by_one { j * n + i } else { i * k + j };
@@ -121,7 +124,7 @@ mod tests {
                         })
                         .collect();
                 let array = Array { rows, cols, row_major, values, digits: 17 };
-                assert_eq!(oriented(array, 7), Ok((expected.clone(), 17)));
+                assert_eq!(oriented(array, &[7]), Ok((expected.clone(), 17)));
             }
         }
     }

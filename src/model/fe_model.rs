@@ -4,7 +4,8 @@
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
 use super::{
-    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, NodeSet, Nodes, Rows, SurfaceMesh,
+    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, NodeSet, Nodes, Rows,
+    SurfaceMesh,
 };
 use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
@@ -42,6 +43,7 @@ pub struct FeModel {
     diagonal_mass: bool,
     /// Internal row of each matrix row, `u32::MAX` of those that are left out; none when they are the same.
     row_to_internal: Option<Vec<u32>>,
+    given_rows: Arc<GivenRows>,
     number: Option<BodyNumber>,
     elimination: Option<Arc<Analysis>>,
     /// M on points and directors, once somebody needs it.
@@ -79,6 +81,7 @@ impl FeModel {
             fixed_mass_share: 0.0,
             diagonal_mass,
             row_to_internal: body.row_to_internal,
+            given_rows: Arc::new(raw.given_rows),
             number,
             elimination: None,
             director_mass: OnceLock::new(),
@@ -293,6 +296,16 @@ impl FeModel {
             }
         }
         ordered
+    }
+
+    /// Maps for shapes and loads from the rows of the files to the rows of K and M as they were read.
+    pub fn given_rows(&self) -> &GivenRows {
+        &self.given_rows
+    }
+
+    /// Numbers of rows that shapes and loads may have: that of K, and others that files have.
+    pub fn row_counts(&self) -> Vec<usize> {
+        std::iter::once(self.matrix_rows()).chain(self.given_rows.counts()).collect()
     }
 
     /// Which body of several in the same matrices it is; `None` for a model that was not split.

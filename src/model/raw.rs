@@ -1,6 +1,6 @@
 //! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
 
-use super::{Damping, DofLabel, GeometricStiffness, NodeSet, Nodes, SurfaceMesh};
+use super::{Damping, DofLabel, GeometricStiffness, GivenRows, NodeSet, Nodes, SurfaceMesh};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
@@ -40,6 +40,8 @@ pub struct RawModes {
     pub labels: Vec<DofLabel>,
     /// One column for every mode.
     pub matrix: Mat<f64>,
+    /// True if the values stand along the axes of the rows of their nodes, false if along those of the model.
+    pub along_nodes: bool,
     /// Eigenvalue of every mode in radians^2/time^2; `None` where the file states none.
     pub eigenvalues: Vec<Option<f64>>,
     /// Significant decimal digits of the eigenvalues.
@@ -75,6 +77,8 @@ pub struct RawModel {
     pub dofs: Option<Vec<DofLabel>>,
     /// Where the labels came from; empty when handed over in memory.
     pub dofs_path: PathBuf,
+    /// Maps for shapes and loads from the rows of the files to the rows of K and M here.
+    pub given_rows: GivenRows,
     /// Named node sets.
     pub interfaces: Vec<NodeSet>,
     /// Damping, where it is given; a matrix has the rows of K and M.
@@ -114,6 +118,7 @@ impl RawModel {
             mesh: None,
             dofs: None,
             dofs_path: PathBuf::new(),
+            given_rows: GivenRows::default(),
             interfaces: Vec::new(),
             damping: None,
             geometric_stiffness: Vec::new(),

@@ -35,6 +35,9 @@ pub(super) fn check_rigid_motion(
         );
         let help = match mislabelled(body, limit) {
             Some(help) => help,
+            None if is_stressed(body, &fields, &strained, limit) => {
+                "at these nodes K turns forces with rotations and lets translations free: it holds the stress of a preload (pretension of a member, contact, pressure); write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]"
+            }
             None if strained.len() * 2 < residuals.len() => {
                 "these degrees of freedom are supported or tied to ground: export the free body"
             }
@@ -51,6 +54,32 @@ pub(super) fn check_rigid_motion(
         found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&raw.nodes_path));
     }
     worst
+}
+
+/// True if K leaves translations free, and rotations (angle theta about each axis) make forces theta x F at the
+/// strained rows: K of a body under a load F that is in equilibrium with stress in it. `fields` are the rigid
+/// motions, with rotations divided by a length.
+fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f64) -> bool {
+    /// Part of the forces that may not be theta x F.
+    const OTHER: f64 = 1e-3;
+    let d = body.rows.dimension;
+    let force = |row: usize, field: usize| {
+        let (columns, values) = body.stiffness.row(row);
+        columns.iter().zip(values).map(|(&j, k)| k * fields[(j as usize, field)]).sum::<f64>()
+    };
+    let size = |row: usize| body.stiffness.row(row).1.iter().map(|k| k.abs()).sum::<f64>();
+    let mut vertices: Vec<usize> = strained.iter().map(|row| row / 3).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    d == 3
+        && strained.iter().all(|row| *row < 3 * body.nodes.len())
+        && strained.iter().all(|&row| (0..3).all(|k| force(row, k).abs() <= limit * size(row)))
+        && vertices.iter().all(|vertex| {
+            let block = [0, 1, 2].map(|k| [3, 4, 5].map(|field| force(3 * vertex + k, field)));
+            let pairs = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+            let largest = pairs().map(|(k, l)| block[k][l].abs()).fold(0.0, f64::max);
+            pairs().all(|(k, l)| (block[k][l] + block[l][k]).abs() <= OTHER * largest)
+        })
 }
 
 /// What to do when K leaves the rigid motions free that its rows have by another reading of the labels.

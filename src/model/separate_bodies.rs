@@ -167,7 +167,7 @@ fn part(
         .collect();
     let name = format!("{}-{number}", whole.raw.name);
     Assembled {
-        raw: RawModel { name, interfaces, ..whole.raw.clone() },
+        raw: RawModel { name, interfaces, given_rows: whole.raw.given_rows.of_part(), ..whole.raw.clone() },
         mesh: whole.mesh.as_ref().and_then(|mesh| mesh.among(&whole.nodes.ids, &nodes.ids)),
         nodes,
         rows,

@@ -207,7 +207,7 @@ fn read_set(set: &LoadSource, model: &FeModel) -> Result<Loads> {
         LoadSource::Centrifugal => Ok(Loads::Centrifugal),
         LoadSource::Interfaces => Ok(Loads::Interfaces),
         LoadSource::File(location) => {
-            let raw = read_shapes(location, model.matrix_rows(), "loads")?;
+            let raw = read_shapes(location, &model.row_counts(), "loads")?;
             UserLoads::new(model, raw).map(Loads::User)
         }
         LoadSource::At { loads, hertz } => {

@@ -239,8 +239,8 @@ fn bar() -> (FeModel, PathBuf) {
 #[test]
 fn eigenvectors_of_scipy_give_the_same_invariants() {
     let (model, path) = bar();
-    let raw =
-        read_shapes(&MatrixLocation { path, group: None }, model.stiffness().n(), "shapes").expect("shapes");
+    let raw = read_shapes(&MatrixLocation { path, group: None }, &[model.stiffness().n()], "shapes")
+        .expect("shapes");
     let shapes = ImportedShapes::new(&model, raw).expect("fits");
     let done = converted(&model, BasisChoice::Imported(shapes), Accuracy::Standard);
     let free_body = converted(&model, BasisChoice::default(), Accuracy::Standard).body;
@@ -297,7 +297,7 @@ fn every_kind_of_file_gives_the_same_shapes() {
         std::fs::write(place(&format!("{order}.npy")), bytes).expect("file");
     }
     let expected = Mat::from_fn(n, k, value);
-    let read = |name: &str| read_shapes(&MatrixLocation::parse(place(name)), n, "shapes");
+    let read = |name: &str| read_shapes(&MatrixLocation::parse(place(name)), &[n], "shapes");
     for name in
         ["s.h5", "s.h5:/results/modes", "two.h5:/double", "s.mtx", "s.mtx.zst", "False.npy", "True.npy"]
     {
@@ -318,7 +318,7 @@ fn every_kind_of_file_gives_the_same_shapes() {
         assert!(read(name).expect_err(name).has(code), "{name}");
     }
     assert!(
-        read_shapes(&MatrixLocation::parse(place("s.mtx")), 31, "shapes")
+        read_shapes(&MatrixLocation::parse(place("s.mtx")), &[31], "shapes")
             .expect_err("size")
             .has(Code::ShapesSize)
     );

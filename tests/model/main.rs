@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod deck_names;
 mod empty_rows;
 mod general_models;
 mod input_fuzz;
@@ -17,9 +18,13 @@ mod mesh;
 mod mesh_files;
 mod mode_files;
 mod nastran;
+mod nastran_files;
+mod nastran_rows;
 mod node_files;
 mod open_matrices;
 mod plane;
 mod plausibility;
+mod rotated_nodes;
+mod shared_doors;
 mod split;
 mod substructures;

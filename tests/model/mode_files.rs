@@ -27,7 +27,7 @@ fn model(job: &str) -> FeModel {
 
 fn read(model: &FeModel, path: &Path) -> Result<RawModes> {
     let location = MatrixLocation { path: path.to_path_buf(), group: None };
-    match read_imported(&location, model.stiffness().n(), "shapes")? {
+    match read_imported(&location, &[model.stiffness().n()], "shapes")? {
         ImportedColumns::Modes(modes) => Ok(modes),
         ImportedColumns::Rows(_) => panic!("{} is a file of modes", path.display()),
     }
@@ -159,7 +159,7 @@ proptest! {
         let place = tempfile::tempdir().expect("a folder");
         let path = place.path().join(name);
         fs::write(&path, bytes).expect("written");
-        if let Ok(ImportedColumns::Modes(modes)) = read_imported(&MatrixLocation { path, group: None }, 54, "shapes") {
+        if let Ok(ImportedColumns::Modes(modes)) = read_imported(&MatrixLocation { path, group: None }, &[54], "shapes") {
             prop_assert_eq!(modes.matrix.nrows(), modes.labels.len());
             prop_assert_eq!(modes.matrix.ncols(), modes.eigenvalues.len());
         }

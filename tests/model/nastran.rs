@@ -185,7 +185,7 @@ fn decks_that_cannot_be_read_are_refused_where_they_cannot() {
         (
             "job.pch",
             "$TITLE",
-            "DMIG    KGG            0       6       2\nDMIG    MGG            0       6       2\n$TITLE",
+            "DMIG    KGG            0       6       2\nDMIG,KGG,11,1,,11,1,1.0\nDMIG    MGG            0       6       2\nDMIG,MGG,11,1,,11,1,1.0\n$TITLE",
             Code::DeckUnsupported,
             "2 pairs",
         ),

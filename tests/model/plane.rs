@@ -285,6 +285,54 @@ fn plane_stress_plate_agrees_with_its_reference() {
     assert_eq!(Some(row_sum.negative_masses as u64), reference["rowsum_negative_rows"].as_u64());
 }
 
+/// A job whose elements lie in the plane: `--dimension 2` and `dimension = 2` say so, and the refusal without them
+/// names them.
+#[test]
+fn plane_jobs_are_read_with_their_dimension() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let raw = rectangle(2, 1, 0.0, [0.0, 0.0]);
+    let labels = raw.dofs.clone().unwrap_or_else(|| {
+        let of = |&node: &i64| [1, 2].map(|direction| flexbody::model::DofLabel { node, direction });
+        raw.nodes.ids.iter().flat_map(of).collect()
+    });
+    for (name, own) in [("job_STIF1.mtx", &raw.stiffness), ("job_MASS1.mtx", &raw.mass)] {
+        let mut text = String::new();
+        for column in 0..labels.len() {
+            let (rows, values) = own.matrix.column(column);
+            for (row, value) in rows.iter().zip(values) {
+                let (a, b) = (labels[*row as usize], labels[column]);
+                text += &format!("{},{}, {},{}, {value:?}\n", a.node, a.direction, b.node, b.direction);
+            }
+        }
+        std::fs::write(folder.path().join(name), text).expect("written");
+    }
+    let nodes: String = raw
+        .nodes
+        .ids
+        .iter()
+        .zip(&raw.nodes.positions)
+        .map(|(id, x)| format!("{id}, {:?}, {:?}\n", x[0], x[1]))
+        .collect();
+    std::fs::write(folder.path().join("job.inp"), format!("*NODE\n{nodes}")).expect("written");
+    std::fs::write(folder.path().join("model.toml"), "[model]\ndimension = 2\n[files]\njob = \"job.inp\"\n")
+        .expect("written");
+    let convert = |words: &[&str]| {
+        let words: Vec<&str> =
+            ["convert"].iter().chain(words).chain(&["--modes", "2", "-o", "b.h5"]).copied().collect();
+        crate::support::program::flexbody(folder.path(), &words)
+    };
+    let told = convert(&["job.inp"]);
+    assert_eq!(told.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&told.stderr).contains("--dimension 2"));
+    for words in [&["job.inp", "--dimension", "2"][..], &["model.toml"]] {
+        let done = convert(words);
+        assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+        assert!(String::from_utf8_lossy(&done.stdout).contains("3 rigid modes"));
+    }
+    let told = convert(&["model.toml", "--dimension", "2"]);
+    assert!(told.status.code() == Some(2) && String::from_utf8_lossy(&told.stderr).contains("[model]"));
+}
+
 /// Shapes stay in the plane and are M-orthonormal there.
 #[test]
 fn shapes_are_orthonormal_in_the_plane() {

@@ -2,10 +2,10 @@
 //! model, freed from rigid motion, M-orthonormalised. Nothing is factored unless eigenvectors are to be
 //! proved complete.
 
-use super::columns::columns;
+use super::columns::{Given, columns};
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
-use super::nodal_modes::{StatedModes, by_rows};
+use super::nodal_modes::{StatedModes, along_the_model, by_rows};
 use super::pseudo_free_surface::independent;
 use super::rigid_modes::rigid_modes;
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -49,7 +49,7 @@ impl ImportedShapes {
     /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let (digits, source) = (raw.digits, raw.source.clone());
-        let shapes = columns(model, raw, "shape")?;
+        let shapes = columns(model, raw, Given::Shapes)?;
         Ok(Self { shapes, digits, source, origin: Origin::User, stated: None, notes: Vec::new() })
     }
 
@@ -60,6 +60,7 @@ impl ImportedShapes {
     /// [`ShapesSize`](Code::ShapesSize) when the nodes are not those of the model, or too few of them;
     /// [`ShapesZero`](Code::ShapesZero).
     pub fn of_modes(model: &FeModel, raw: RawModes) -> Result<Self> {
+        let raw = along_the_model(model, raw)?;
         let (shapes, notes) = by_rows(model, &raw)?;
         let (digits, source, stated) = (raw.digits, Some(raw.source.clone()), Some(StatedModes::of(raw)));
         Ok(Self { shapes, digits, source, origin: Origin::User, stated, notes })

@@ -15,6 +15,22 @@ use std::path::PathBuf;
 /// Backward error of a factorisation beyond which rows are not completed by it: the digits that shapes have.
 const INACCURATE: f64 = 1e-7;
 
+/// Returns modes with their values along the axes of the model.
+///
+/// # Errors
+/// [`ShapesSize`](Code::ShapesSize) for a node that lacks directions which turn together.
+pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawModes> {
+    if std::mem::take(&mut raw.along_nodes) {
+        model.given_rows().turn(&raw.labels, &mut raw.matrix).map_err(|node| {
+            let message = format!(
+                "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
+            );
+            Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path)
+        })?;
+    }
+    Ok(raw)
+}
+
 /// Shapes by internal rows (N x k), and what was done to get them.
 ///
 /// # Errors

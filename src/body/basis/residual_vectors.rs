@@ -1,7 +1,7 @@
 //! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have, and those at
 //! chosen frequencies (theory section 8).
 
-use super::columns::columns;
+use super::columns::{Given, columns};
 use super::coupled_model::CoupledModel;
 use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
@@ -120,15 +120,7 @@ impl UserLoads {
     /// has neither stiffness nor mass.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let source = raw.source.clone();
-        let (n, k) = (raw.matrix.nrows().min(model.matrix_rows()), raw.matrix.ncols());
-        let mut acting = (0..k).flat_map(|j| (0..n).map(move |row| (row, j)));
-        let lost = acting.find(|&(row, j)| model.is_left_out(row) && raw.matrix[(row, j)] != 0.0);
-        if let Some((row, j)) = lost {
-            let message =
-                format!("load {} acts on row {}, which has neither stiffness nor mass", j + 1, row + 1);
-            return Err(Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).into());
-        }
-        Ok(Self { loads: columns(model, raw, "load")?, source })
+        Ok(Self { loads: columns(model, raw, Given::Loads)?, source })
     }
 }
 

@@ -9,12 +9,12 @@ use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::labelled_lines::{has_labels, labelled};
-use super::{Found, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
+use super::{Found, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
-use crate::model::{DofLabel, Elements, Nodes, RawMatrix};
-use std::collections::BTreeSet;
+use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// The reader of Abaqus jobs.
@@ -36,7 +36,8 @@ impl JobReader for Abaqus {
         is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
     }
 
-    fn read(&self, path: &Path) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Found<JobModel> {
+        let path = job.path.as_path();
         let matrices = Matrices::beside(path);
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::of(&deck)?;
@@ -52,9 +53,11 @@ impl JobReader for Abaqus {
             mass: rows.mass,
             nodes: Nodes { ids, positions },
             dofs: rows.labels,
+            given_rows: GivenRows::default(),
             // Condensed matrices leave no element all of its nodes.
             elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
             sets: mesh.sets,
+            unresolved: mesh.unresolved,
             files: deck_files.chain(rows.files).collect(),
             diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
         })
@@ -119,8 +122,7 @@ impl Rows {
 /// FB111 for retained nodes whose rows stand along axes of their own.
 fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diagnostic> {
     let members = |name: &str| -> Vec<i64> {
-        let set = mesh.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
-        set.map_or_else(|| integer(name.as_bytes()).into_iter().collect(), |(_, nodes)| nodes.clone())
+        mesh.set(name).map_or_else(|| integer(name.as_bytes()).into_iter().collect(), <[i64]>::to_vec)
     };
     let transforms = deck.cards().iter().filter(|card| card.keyword == "TRANSFORM");
     transforms.filter_map(|card| Some((card, card.parameter("NSET")?))).find_map(|(card, set)| {
@@ -140,10 +142,10 @@ struct Matrices {
 }
 
 impl Matrices {
-    /// Files whose names are that of the deck with STIF and MASS and the same number; those with the highest
-    /// number.
+    /// Files whose names are that of the deck with STIF and MASS and the number of a step: those of the last step
+    /// that has both; else the last of each.
     fn beside(deck: &Path) -> Found<Self> {
-        let mut found: [Vec<(u32, PathBuf)>; 2] = [Vec::new(), Vec::new()];
+        let mut found: [BTreeMap<u32, PathBuf>; 2] = Default::default();
         for (rest, path) in siblings(deck) {
             let rest = rest.trim_start_matches('_');
             let number = |kind: &str| rest.strip_prefix(kind)?.strip_suffix(".mtx")?.parse::<u32>().ok();
@@ -151,10 +153,10 @@ impl Matrices {
                 found[k].extend(number(kind).map(|number| (number, path.clone())));
             }
         }
-        found.iter_mut().for_each(|files| files.sort());
         let [stiffness, mass] = &found;
-        let shared = stiffness.iter().rev().find(|(number, _)| mass.iter().any(|(own, _)| own == number));
-        let Some((number, stiffness_path)) = shared else {
+        let shared = stiffness.keys().rev().find(|number| mass.contains_key(number));
+        let last = || stiffness.keys().next_back().zip(mass.keys().next_back());
+        let Some((k, m)) = shared.map(|number| (number, number)).or_else(last) else {
             let what = match (stiffness.is_empty(), mass.is_empty()) {
                 (false, true) => "the mass matrix (job_MASS1.mtx)",
                 (true, false) => "the stiffness matrix (job_STIF1.mtx)",
@@ -162,13 +164,15 @@ impl Matrices {
             };
             return Err(vec![missing(deck, &format!("beside the deck {what}"), HELP)]);
         };
-        let mass_path = mass.iter().find(|(own, _)| own == number).map(|(_, path)| path.clone());
-        let note = (stiffness.len() > 1).then(|| {
-            let message =
-                format!("of {} steps with matrices the last one, {number}, is taken", stiffness.len());
-            Diagnostic::new(Code::JobStep, message).in_file(stiffness_path)
-        });
-        Ok(Self { stiffness: stiffness_path.clone(), mass: mass_path.expect("found above"), note })
+        let message = match (k == m, stiffness.len()) {
+            (true, 1) => None,
+            (true, steps) => Some(format!("of {steps} steps with matrices the last one, {k}, is taken")),
+            (false, _) => Some(format!(
+                "no step has both matrices: the stiffness of step {k} and the mass of step {m} are taken"
+            )),
+        };
+        let note = message.map(|message| Diagnostic::new(Code::JobStep, message).in_file(&stiffness[k]));
+        Ok(Self { stiffness: stiffness[k].clone(), mass: mass[m].clone(), note })
     }
 }
 
@@ -184,7 +188,7 @@ fn numbered(
         let file = CoordinateFile::read(path, role, u32::MAX)?;
         // Rows without mass at the end of the matrix are not written.
         let fits = if role == MatrixRole::Mass { file.rows() <= n } else { file.rows() == n };
-        if fits { file.into_matrix(n) } else { Err(vec![other_rows(n, file.rows(), path)]) }
+        if fits { file.into_matrix(n) } else { Err(vec![other_rows(mesh, n, file.rows(), path)]) }
     };
     // One after the other: each is read by all threads, and the entries of only one are held.
     let k = read(stiffness, MatrixRole::Stiffness);

@@ -3,7 +3,7 @@
 
 use super::Found;
 use super::deck_mesh::DeckMesh;
-use super::element_kinds::family;
+use super::element_kinds::{family, has_internal_nodes};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::model::DofLabel;
 use std::collections::BTreeMap;
@@ -47,9 +47,18 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
 }
 
 /// FB112: the matrix has other rows than the deck.
-pub(super) fn other_rows(labels: usize, rows: usize, matrix: &Path) -> Diagnostic {
-    let message = format!(
+pub(super) fn other_rows(mesh: &DeckMesh, labels: usize, rows: usize, matrix: &Path) -> Diagnostic {
+    let mut internal: Vec<&str> =
+        mesh.elements.iter().map(|own| own.kind.as_str()).filter(|kind| has_internal_nodes(kind)).collect();
+    internal.sort_unstable();
+    internal.dedup();
+    let mut message = format!(
         "matrix has {rows} rows, the elements of the deck give their nodes {labels} degrees of freedom"
     );
+    if !internal.is_empty() {
+        let kinds = internal.join(", ");
+        message +=
+            &format!("; elements {kinds} have internal nodes as well, whose rows only labels tell apart");
+    }
     Diagnostic::new(Code::DeckRows, message).in_file(matrix).with_help(HELP)
 }

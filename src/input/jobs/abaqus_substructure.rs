@@ -28,7 +28,7 @@ pub(super) fn file_of(deck: &Deck, path: &Path) -> Option<(PathBuf, Option<Diagn
     let requests = || {
         deck.cards()
             .iter()
-            .filter(|card| card.keyword == "SUBSTRUCTURE MATRIX OUTPUT")
+            .filter(|card| card.keyword == "SUBSTRUCTUREMATRIXOUTPUT")
             .filter_map(|card| card.parameter("FILENAME"))
     };
     let name = requests().next_back()?;
@@ -48,7 +48,7 @@ impl Substructure {
     /// degrees of freedom other than displacements and rotations; FB301, FB303, FB312.
     pub(super) fn read(path: &Path) -> Found<Self> {
         let deck = Deck::read(path)?;
-        let mut elements = deck.cards().iter().filter(|card| card.keyword == "USER ELEMENT");
+        let mut elements = deck.cards().iter().filter(|card| card.keyword == "USERELEMENT");
         let (Some(element), None) = (elements.next(), elements.next()) else {
             let message = "expected one *USER ELEMENT, as a substructure is written";
             return Err(vec![Diagnostic::new(Code::DeckSyntax, message).in_file(path).with_help(HELP)]);

@@ -5,15 +5,16 @@ use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::distributing_couplings::{placed_note, reference_places};
-use super::expanded::label_once;
+use super::expanded::{Once, label_once};
 use super::rotation_nodes::rotation_nodes;
-use super::{Found, JobModel, JobReader, both, is_deck, missing};
+use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::excerpt;
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
-use crate::model::{DofLabel, Nodes};
+use crate::model::{DofLabel, GivenRows, Nodes};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// The reader of CalculiX jobs.
@@ -35,7 +36,8 @@ impl JobReader for Calculix {
         is_deck(path) && ["sti", "mas", "dof"].iter().any(|extension| path.with_extension(extension).exists())
     }
 
-    fn read(&self, path: &Path) -> Found<JobModel> {
+    fn read(&self, job: &JobFile) -> Found<JobModel> {
+        let path = job.path.as_path();
         let [sti, mas, dof] = ["sti", "mas", "dof"].map(|extension| path.with_extension(extension));
         let absent =
             [(&sti, "stiffness matrix"), (&mas, "mass matrix"), (&dof, "list of degrees of freedom")];
@@ -54,7 +56,7 @@ impl JobReader for Calculix {
         // One after the other: each is read by all threads, and the entries of only one are held.
         let stiffness = read(&sti, MatrixRole::Stiffness);
         let (stiffness, mass) = both(stiffness, read(&mas, MatrixRole::Mass))?;
-        let (labels, added) = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
+        let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
             None => *own,
@@ -63,9 +65,9 @@ impl JobReader for Calculix {
         // The nodes that only name rotations stand at no place of their own.
         let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
         let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
-        let (mut ids, mut positions): (Vec<_>, Vec<_>) = placed.map(place).unzip();
-        ids.extend(added.ids);
-        positions.extend(added.positions);
+        let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
+        nodes.extend(places);
+        let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
         let mut files: Vec<(&'static str, _)> =
@@ -76,8 +78,10 @@ impl JobReader for Calculix {
             mass,
             nodes: Nodes { ids, positions },
             dofs,
+            given_rows: GivenRows::default(),
             elements: mesh.drawn(),
             sets: mesh.sets,
+            unresolved: mesh.unresolved,
             files,
             diagnostics,
         })

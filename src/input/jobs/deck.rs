@@ -19,8 +19,10 @@ pub(super) struct Deck {
 /// A keyword line and the lines of data below it.
 #[derive(Debug, Clone)]
 pub(super) struct Card {
-    /// In upper case, without the asterisk, words one blank apart.
+    /// In upper case, without the asterisk and without blanks, which do not count.
     pub keyword: String,
+    /// Keyword as it is written, in upper case, words one blank apart.
+    pub title: String,
     /// Names in upper case, and values; a parameter without a value has an empty one.
     parameters: Vec<(String, String)>,
     file: usize,
@@ -37,9 +39,9 @@ impl Card {
         self.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
     }
 
-    /// The same as names are compared: in upper case.
+    /// Returns the value of a parameter in the form that names are compared in.
     pub(super) fn name(&self, parameter: &str) -> Option<String> {
-        self.parameter(parameter).map(str::to_uppercase)
+        self.parameter(parameter).map(comparable)
     }
 }
 
@@ -107,35 +109,53 @@ impl Deck {
             let (card, end, after) = self.next_card(at, position, line)?;
             (position, line) = (end, after);
             let Some(card) = card else { continue };
-            let included = (card.keyword == "INCLUDE").then(|| self.included(&card, &folder));
-            match included {
-                Some(path) => {
-                    let path = path?;
-                    self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
-                        // A missing file is looked for where it is included.
-                        Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
-                            &card,
-                            Code::FileUnreadable,
-                            format!("{} is included: {}", path.display(), diagnostic.message()),
-                        ),
-                        _ => diagnostic,
-                    })?;
+            let more = self.more(&card, &folder);
+            if card.keyword != "INCLUDE" {
+                let mut card = card.clone();
+                // Data of the file that it names go on with it, and name no file.
+                card.parameters.retain(|(name, _)| more.is_none() || name != "INPUT");
+                self.cards.push(card);
+            }
+            if let Some(path) = more {
+                let path = path?;
+                self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
+                    // A missing file is looked for where it is included.
+                    Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
+                        &card,
+                        Code::FileUnreadable,
+                        format!("{} is included: {}", path.display(), diagnostic.message()),
+                    ),
+                    _ => diagnostic,
+                })?;
+                if card.keyword == "INCLUDE" {
                     let rest = self.continued(&card);
                     self.cards.extend(rest);
                 }
-                None => self.cards.push(card),
             }
         }
         Ok(())
     }
 
-    fn included(&self, card: &Card, folder: &Path) -> Result<PathBuf, Diagnostic> {
-        match card.parameter("INPUT") {
-            Some(path) if !path.is_empty() => Ok(folder.join(path)),
-            _ => Err(self
+    /// The file that a card names for more of the deck (*INCLUDE) or of its own data; `None` of one that has all.
+    fn more(&self, card: &Card, folder: &Path) -> Option<Result<PathBuf, Diagnostic>> {
+        match (card.keyword.as_str(), card.parameter("INPUT")) {
+            ("INCLUDE" | "NODE" | "ELEMENT" | "NSET" | "ELSET", Some(name)) if !name.is_empty() => {
+                Some(Ok(self.place_of(name, folder)))
+            }
+            ("INCLUDE", _) => Some(Err(self
                 .about(card, Code::DeckSyntax, "*INCLUDE names no file")
-                .with_help("write *INCLUDE, INPUT=FILE")),
+                .with_help("write *INCLUDE, INPUT=FILE"))),
+            _ => None,
         }
+    }
+
+    /// A file that a card names: from the folder of the job, in which programs run, else from that of the file
+    /// that names it.
+    fn place_of(&self, name: &str, folder: &Path) -> PathBuf {
+        let main = self.files.first().and_then(|file| file.path().parent()).unwrap_or(folder);
+        let upright = name.replace('\\', "/");
+        let places = [main.join(name), folder.join(name), main.join(&upright), folder.join(&upright)];
+        places.iter().find(|path| path.is_file()).unwrap_or(&places[0]).clone()
     }
 
     /// The data below an *INCLUDE, if there is any: it goes on with the last card of the included file.
@@ -172,10 +192,13 @@ impl Deck {
             end = line_end(bytes, end);
             number += 1;
         }
-        let card = |keyword, parameters| Card { keyword, parameters, file: at, line, data: data..end, first };
+        let card = |title: String, parameters| {
+            let keyword = comparable(&title);
+            Card { keyword, title, parameters, file: at, line, data: data..end, first }
+        };
         if !head.is_empty() {
-            let (keyword, parameters) = keyword(&head);
-            return Ok((Some(card(keyword, parameters)), end, number));
+            let (title, parameters) = keyword(&head);
+            return Ok((Some(card(title, parameters)), end, number));
         }
         let loose = card(String::new(), Vec::new());
         let stray = self.data(&loose).next();
@@ -196,9 +219,15 @@ impl Deck {
     }
 }
 
-/// Whether a line is a keyword line: an asterisk that is not doubled.
+/// A name as names are compared: in upper case, without blanks.
+pub(in crate::input) fn comparable(name: &str) -> String {
+    name.split_whitespace().collect::<String>().to_uppercase()
+}
+
+/// True if a line is a keyword line: an asterisk that is not doubled; blanks before it do not count.
 fn is_keyword(line: &[u8]) -> bool {
-    line.first() == Some(&b'*') && line.get(1) != Some(&b'*')
+    let start = line.iter().position(|b| !matches!(b, b' ' | b'\t')).unwrap_or(line.len());
+    line.get(start) == Some(&b'*') && line.get(start + 1) != Some(&b'*')
 }
 
 /// Where the next line begins.
@@ -210,12 +239,12 @@ fn line_end(bytes: &[u8], at: usize) -> usize {
 fn keyword(line: &str) -> (String, Vec<(String, String)>) {
     let mut fields = line.trim_start_matches('*').split(',').map(str::trim);
     let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase();
-    let keyword = words(fields.next().unwrap_or_default());
+    let title = words(fields.next().unwrap_or_default());
     let parameters = fields.filter(|field| !field.is_empty()).map(|field| {
         let (name, value) = field.split_once('=').unwrap_or((field, ""));
-        (words(name).replace(' ', ""), value.trim().trim_matches('"').to_owned())
+        (comparable(name), value.trim().trim_matches('"').to_owned())
     });
-    (keyword, parameters.collect())
+    (title, parameters.collect())
 }
 
 /// Fields of a line of data, trimmed; a comma at its end begins no field.
@@ -245,7 +274,7 @@ mod tests {
         let keywords: Vec<&str> = deck.cards().iter().map(|card| card.keyword.as_str()).collect();
         assert_eq!(
             keywords,
-            ["HEADING", "SOLID SECTION", "NODE", "NODE", "ELSET", "ELSET", "END STEP"],
+            ["HEADING", "SOLIDSECTION", "NODE", "NODE", "ELSET", "ELSET", "ENDSTEP"],
             "data of the included file, and after it"
         );
         let [_, section, node, more, elset, rest, _] = deck.cards() else { panic!("seven cards") };

@@ -1,8 +1,9 @@
 //! Nodes, elements and sets of a keyword deck, parts and instances of Abaqus included.
 
-use super::deck::{Card, Deck, fields};
+use super::deck::{Card, Deck, comparable, fields};
+use super::deck_sets::{Elements, Found as Resolved, Instances, Member, Scope};
 use super::element_kinds::{Drawing, drawing};
-use super::{Found, NodeSets};
+use super::{Found, NodeSets, Unresolved};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::coordinates::excerpt;
 use crate::input::table::integer;
@@ -19,15 +20,6 @@ const MOST_GENERATED: i64 = 100_000_000;
 /// Numbers of nodes that are renumbered are below this.
 const LARGEST: i64 = 1_000_000_000_000;
 
-/// Elements of one type.
-#[derive(Debug, Clone)]
-pub(super) struct Elements {
-    /// Type in upper case.
-    pub kind: String,
-    /// Number and nodes of each.
-    pub members: Vec<(i64, Vec<i64>)>,
-}
-
 /// Nodes, elements and node sets in the numbering of the whole model.
 #[derive(Debug, Default)]
 pub(super) struct DeckMesh {
@@ -36,7 +28,9 @@ pub(super) struct DeckMesh {
     pub elements: Vec<Elements>,
     /// Node sets by name as the deck has it, in the order of the deck.
     pub sets: NodeSets,
-    /// Element sets by name in upper case. Those of parts and instances are not among them.
+    /// Node sets that cannot be resolved, and why.
+    pub unresolved: Unresolved,
+    /// Element sets by name as names are compared. Those of parts and instances are not among them.
     pub element_sets: HashMap<String, Vec<i64>>,
     /// Notes about the numbering.
     pub notes: Vec<Diagnostic>,
@@ -73,44 +67,11 @@ impl DeckMesh {
     }
 }
 
-/// Nodes, elements and sets of a part, of the assembly, or of a deck that has neither.
-#[derive(Debug, Clone, Default)]
-struct Scope {
-    nodes: BTreeMap<i64, [f64; 3]>,
-    elements: Vec<Elements>,
-    /// Node sets in their order, by name in upper case.
-    sets: NodeSets,
-    element_sets: HashMap<String, Vec<i64>>,
-    /// Sets of the assembly: members with the instance that they belong to.
-    of_instances: Vec<(String, String, Vec<i64>)>,
-}
-
-impl Scope {
-    fn set(&self, name: &str) -> Option<&Vec<i64>> {
-        self.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name)).map(|(_, nodes)| nodes)
-    }
-
-    /// Nodes of the elements of a set, ascending.
-    fn nodes_of_elements(&self, set: &str) -> Option<Vec<i64>> {
-        let wanted = self.element_sets.get(&set.to_uppercase())?;
-        let wanted: std::collections::HashSet<i64> = wanted.iter().copied().collect();
-        let members = self.elements.iter().flat_map(|own| &own.members);
-        let mut nodes: Vec<i64> = members
-            .filter(|(id, _)| wanted.contains(id))
-            .flat_map(|(_, nodes)| nodes.iter().copied())
-            .collect();
-        nodes.sort_unstable();
-        nodes.dedup();
-        Some(nodes)
-    }
-}
-
 /// A part at a place of the assembly.
 #[derive(Debug, Clone)]
 struct Instance {
     name: String,
-    part: String,
-    /// Nodes, elements and sets that are defined within the instance.
+    /// Nodes, elements and sets of the part, and those that are defined within the instance.
     own: Scope,
     moved: Placement,
 }
@@ -147,6 +108,22 @@ struct Scopes {
 }
 
 impl Scopes {
+    /// Instances with their sets, for sets of the assembly; none within a part or an instance.
+    fn instances(&self) -> Instances<'_> {
+        let is_assembly = self.part.is_none() && !self.in_instance;
+        let some = if is_assembly { self.instances.as_slice() } else { &[] };
+        Instances::new(some.iter().map(|own| (own.name.as_str(), &own.own)).collect())
+    }
+
+    /// The scope that cards belong to; `None` of a part that has nothing yet.
+    fn open(&self) -> Option<&Scope> {
+        match (&self.part, self.in_instance) {
+            (Some(part), _) => self.parts.get(part),
+            (None, true) => self.instances.last().map(|instance| &instance.own),
+            _ => Some(&self.top),
+        }
+    }
+
     fn current(&mut self) -> &mut Scope {
         match (&self.part, self.in_instance) {
             (Some(part), _) => self.parts.entry(part.clone()).or_default(),
@@ -158,25 +135,10 @@ impl Scopes {
     /// The model of all instances. Numbers stay as they are where no two instances have the same; else every
     /// instance has numbers of its own.
     fn assembled(self) -> Found<DeckMesh> {
-        let mut mesh = DeckMesh {
-            nodes: self.top.nodes,
-            elements: self.top.elements,
-            sets: self.top.sets,
-            element_sets: self.top.element_sets,
-            notes: Vec::new(),
-        };
-        let placed: Vec<(Instance, Scope)> = self
-            .instances
-            .into_iter()
-            .map(|instance| {
-                let part = self.parts.get(&instance.part).cloned().unwrap_or_default();
-                let scope = if instance.own.nodes.is_empty() { part } else { instance.own.clone() };
-                (instance, scope)
-            })
-            .collect();
-        let mut taken: std::collections::HashSet<i64> = mesh.nodes.keys().copied().collect();
+        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.own)).collect();
+        let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
         let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
-        let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&mesh.nodes]);
+        let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);
         let highest = keys.filter_map(|nodes| nodes.keys().next_back().copied()).max().unwrap_or(0);
         if !unique && highest > LARGEST / placed.len() as i64 {
             let message =
@@ -185,7 +147,14 @@ impl Scopes {
         }
         let stride = if unique { 0 } else { power_of_ten_above(highest) };
         // Nodes of the assembly keep their numbers.
-        let first = i64::from(!mesh.nodes.is_empty());
+        let first = i64::from(!self.top.nodes.is_empty());
+        let mut mesh = DeckMesh {
+            nodes: self.top.nodes.clone(),
+            elements: self.top.elements.clone(),
+            element_sets: self.top.element_sets.clone(),
+            ..DeckMesh::default()
+        };
+        let mut shifts = Vec::new();
         for (k, (instance, scope)) in placed.iter().enumerate() {
             let shift = stride * (k as i64 + first);
             if shift > 0 {
@@ -197,13 +166,9 @@ impl Scopes {
                 mesh.notes.push(Diagnostic::new(Code::DeckRenumbered, message));
             }
             mesh.add(scope, shift, instance);
-            for (set, of, members) in &self.top.of_instances {
-                if of.eq_ignore_ascii_case(&instance.name) {
-                    let shifted = members.iter().map(|id| id + shift);
-                    set_mut(&mut mesh.sets, set).extend(shifted);
-                }
-            }
+            shifts.push((instance.name.as_str(), *scope, shift));
         }
+        (mesh.sets, mesh.unresolved) = self.top.sets.of_model(&shifts);
         Ok(mesh)
     }
 }
@@ -217,19 +182,13 @@ impl DeckMesh {
             let members = elements.members.iter().map(member).collect();
             self.elements.push(Elements { kind: elements.kind.clone(), members });
         }
-        for (name, nodes) in &scope.sets {
-            set_mut(&mut self.sets, name).extend(nodes.iter().map(|id| id + shift));
-        }
     }
-}
 
-/// The members of the set of this name, in any case; of a new one where there is none.
-fn set_mut<'s>(sets: &'s mut NodeSets, name: &str) -> &'s mut Vec<i64> {
-    let at = sets.iter().position(|(own, _)| own.eq_ignore_ascii_case(name)).unwrap_or_else(|| {
-        sets.push((name.to_owned(), Vec::new()));
-        sets.len() - 1
-    });
-    &mut sets[at].1
+    /// The nodes of a set.
+    pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
+        let name = comparable(name);
+        self.sets.iter().find(|(own, _)| comparable(own) == name).map(|(_, nodes)| nodes.as_slice())
+    }
 }
 
 /// The least power of ten that no number reaches.
@@ -252,21 +211,22 @@ impl Reading<'_> {
     fn card(&mut self, card: &Card, scopes: &mut Scopes) {
         match card.keyword.as_str() {
             "PART" => scopes.part = Some(card.name("NAME").unwrap_or_default()),
-            "END PART" => scopes.part = None,
+            "ENDPART" => scopes.part = None,
             "INSTANCE" => {
                 let moved = self.placement(card);
-                let (name, part) =
-                    (card.name("NAME").unwrap_or_default(), card.name("PART").unwrap_or_default());
-                scopes.instances.push(Instance { name, part, own: Scope::default(), moved });
+                let name = card.parameter("NAME").unwrap_or_default().to_owned();
+                let part = card.name("PART").unwrap_or_default();
+                let own = scopes.parts.get(&part).cloned().unwrap_or_default();
+                scopes.instances.push(Instance { name, own, moved });
                 scopes.in_instance = true;
             }
-            "END INSTANCE" => scopes.in_instance = false,
+            "ENDINSTANCE" => scopes.in_instance = false,
             "NODE" => self.nodes(card, scopes.current()),
             "ELEMENT" => self.elements(card, scopes.current()),
-            "NSET" => self.set(card, scopes.current()),
+            "NSET" => self.set(card, scopes),
             "ELSET" => self.element_set(card, scopes.current()),
             "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" => {
-                let message = format!("*{} is not read", card.keyword);
+                let message = format!("*{} is not read", card.title);
                 let help = "write the nodes and elements one by one, as preprocessors do";
                 self.complain(self.deck.about(card, Code::DeckUnsupported, message).with_help(help));
             }
@@ -292,7 +252,7 @@ impl Reading<'_> {
     }
 
     fn syntax(&mut self, card: &Card, line: usize, expected: &str, text: &[u8]) {
-        let message = format!("*{}: expected {expected}, found `{}`", card.keyword, excerpt(text));
+        let message = format!("*{}: expected {expected}, found `{}`", card.title, excerpt(text));
         self.complain(self.deck.at(card, line, Code::DeckSyntax, message).with_help("correct the line"));
     }
 
@@ -354,7 +314,7 @@ impl Reading<'_> {
             }
         }
         if let Some(name) = card.parameter("NSET") {
-            set_mut(&mut scope.sets, name).extend(ids);
+            scope.sets.extend(name, Ok(ids.into_iter().map(Member::own).collect()));
         }
     }
 
@@ -386,74 +346,118 @@ impl Reading<'_> {
         scope.elements.push(Elements { kind, members });
     }
 
-    /// Members of a set: numbers, ranges with GENERATE, and names of sets that `known` holds.
-    fn members(&mut self, card: &Card, known: impl Fn(&str) -> Option<Vec<i64>>) -> Vec<i64> {
+    /// Members of a set: numbers, ranges with GENERATE, and what `known` makes of names. The first name that is
+    /// not known leaves the set without members.
+    fn members<T>(
+        &mut self,
+        card: &Card,
+        number: impl Fn(i64) -> T,
+        known: impl Fn(&str) -> Option<Vec<T>>,
+    ) -> Resolved<T> {
         let generate = card.parameter("GENERATE").is_some();
-        let mut members = Vec::new();
+        let (mut members, mut unknown) = (Vec::new(), None);
         for (line, text) in self.deck.data(card) {
             if generate {
                 let bounds: Option<Vec<i64>> =
                     fields(text).filter(|field| !field.is_empty()).map(integer).collect();
-                let range = match bounds.as_deref() {
-                    Some(&[first, last]) => Some((first, last, 1)),
-                    Some(&[first, last, step]) if step > 0 => Some((first, last, step)),
-                    _ => None,
-                };
-                let few = |&(first, last, step): &(i64, i64, i64)| {
-                    first <= last
-                        && last.checked_sub(first).is_some_and(|length| length / step < MOST_GENERATED)
-                };
-                match range.filter(few) {
-                    Some((first, last, step)) => members.extend((first..=last).step_by(step as usize)),
-                    _ => self.syntax(card, line, "first, last and increment", text),
+                match bounds.as_deref().and_then(range) {
+                    Some((first, last, step)) => {
+                        members.extend((first..=last).step_by(step as usize).map(&number));
+                    }
+                    None => self.syntax(card, line, "first, last and increment", text),
                 }
                 continue;
             }
             for field in fields(text).filter(|field| !field.is_empty()) {
                 let name = String::from_utf8_lossy(field);
                 let name = name.trim_matches('"');
-                // `instance.12` and `instance.SET` name members of an instance.
-                let bare = name.rsplit_once('.').map_or(name, |(_, bare)| bare);
-                let number = integer(bare.as_bytes()).map(|id| vec![id]);
-                match number.or_else(|| known(name)).or_else(|| known(bare)) {
+                match integer(name.as_bytes()).map(|id| vec![number(id)]).or_else(|| known(name)) {
                     Some(more) => members.extend(more),
-                    None => self.syntax(card, line, "numbers or names of sets above", text),
+                    None => {
+                        let message = format!("*{}: `{name}` is no number and no set above", card.title);
+                        let help = "define the set above, or correct the name";
+                        let refused = self.deck.at(card, line, Code::DeckSyntax, message).with_help(help);
+                        unknown.get_or_insert(refused);
+                    }
                 }
             }
         }
-        members
+        match unknown {
+            None => Ok(members),
+            Some(refused) => Err(refused),
+        }
     }
 
-    fn set(&mut self, card: &Card, scope: &mut Scope) {
+    fn set(&mut self, card: &Card, scopes: &mut Scopes) {
         let Some(name) = card.parameter("NSET").map(str::to_owned) else {
             let diagnostic = self.deck.about(card, Code::DeckSyntax, "*NSET has no name");
             return self.complain(diagnostic.with_help("write *NSET, NSET=NAME"));
         };
-        if let Some(elements) = card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
-            match scope.nodes_of_elements(elements) {
-                Some(nodes) => set_mut(&mut scope.sets, &name).extend(nodes),
-                None => {
-                    let message = format!("element set `{elements}` is not known here");
-                    let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
-                    self.complain(diagnostic.with_help("define the element set before"));
-                }
+        let members = match card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
+            Some(elements) => self.nodes_of_elements(card, elements, scopes),
+            None => self.nodes_of_set(card, scopes),
+        };
+        scopes.current().sets.extend(&name, members);
+    }
+
+    /// The nodes of *NSET, ELSET=NAME, of an instance or of the scope of the card.
+    fn nodes_of_elements(&self, card: &Card, elements: &str, scopes: &Scopes) -> Resolved<Member> {
+        let nodes = match card.parameter("INSTANCE") {
+            Some(instance) => scopes.instances().nodes_of_elements(instance, elements),
+            None => {
+                let nodes = scopes.open().and_then(|scope| scope.nodes_of_elements(elements));
+                nodes.map(|own| own.into_iter().map(Member::own).collect())
             }
-            return;
-        }
-        let members = self.members(card, |set| scope.set(set).cloned());
-        match card.name("INSTANCE") {
-            Some(instance) => scope.of_instances.push((name, instance, members)),
-            None => set_mut(&mut scope.sets, &name).extend(members),
+        };
+        nodes.ok_or_else(|| {
+            let message = format!("element set `{elements}` is not known here");
+            let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
+            diagnostic.with_help("define the element set above")
+        })
+    }
+
+    /// The nodes of *NSET by numbers and names, of an instance or of the scope of the card.
+    fn nodes_of_set(&mut self, card: &Card, scopes: &Scopes) -> Resolved<Member> {
+        let instances = scopes.instances();
+        let Some(instance) = card.parameter("INSTANCE") else {
+            let known = |set: &str| {
+                let own = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
+                own.cloned().or_else(|| instances.named(set))
+            };
+            return self.members(card, Member::own, known);
+        };
+        match instances.find(instance) {
+            Some(one) => self.members(card, |id| one.member(id), |set| one.set(set)),
+            None => {
+                let message = format!("the instance `{instance}` is not in the deck");
+                let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
+                Err(diagnostic.with_help("name an instance of the assembly"))
+            }
         }
     }
 
     fn element_set(&mut self, card: &Card, scope: &mut Scope) {
         // Element sets of the assembly pick elements of instances; nothing here needs them.
         let (Some(name), None) = (card.name("ELSET"), card.parameter("INSTANCE")) else { return };
-        let known = |set: &str| scope.element_sets.get(&set.to_uppercase()).cloned();
-        let members = self.members(card, known);
-        scope.element_sets.entry(name).or_default().extend(members);
+        let known = |set: &str| scope.element_sets.get(&comparable(set)).cloned();
+        // One with a name that is not known is not known either.
+        if let Ok(members) = self.members(card, |id| id, known) {
+            scope.element_sets.entry(name).or_default().extend(members);
+        } else {
+            scope.element_sets.remove(&name);
+        }
     }
+}
+
+/// First, last and increment of a generated set.
+fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
+    let (first, last, step) = match *bounds {
+        [first, last] => (first, last, 1),
+        [first, last, step] if step > 0 => (first, last, step),
+        _ => return None,
+    };
+    let few = last.checked_sub(first).is_some_and(|length| length / step < MOST_GENERATED);
+    (first <= last && few).then_some((first, last, step))
 }
 
 /// A number; an empty field is zero.

@@ -1,6 +1,6 @@
 //! Nodes of a `*SURFACE` of a CalculiX deck.
 
-use super::deck::{Card, Deck, fields};
+use super::deck::{Card, Deck, comparable, fields};
 use super::deck_mesh::DeckMesh;
 use crate::input::table::integer;
 use std::collections::{BTreeSet, HashMap};
@@ -56,8 +56,7 @@ pub(super) fn nodes_of_surface(deck: &Deck, mesh: &DeckMesh, name: &str) -> Opti
 fn nodes_of_line(line: &[u8], mesh: &DeckMesh) -> Option<Vec<i64>> {
     let field = fields(line).next()?;
     let set = String::from_utf8_lossy(field);
-    let members =
-        || mesh.sets.iter().find(|(name, _)| name.eq_ignore_ascii_case(&set)).map(|(_, own)| own.clone());
+    let members = || mesh.set(&set).map(<[i64]>::to_vec);
     integer(field).map(|node| vec![node]).or_else(members)
 }
 
@@ -66,7 +65,7 @@ fn nodes_of_faces(line: &[u8], mesh: &DeckMesh, elements: &HashMap<i64, Solid<'_
     let mut given = fields(line);
     let (field, face) = (given.next()?, given.next()?.to_ascii_uppercase());
     let face = usize::try_from(integer(face.strip_prefix(b"S")?)?).ok()?.checked_sub(1)?;
-    let set = || mesh.element_sets.get(&String::from_utf8_lossy(field).to_uppercase()).cloned();
+    let set = || mesh.element_sets.get(&comparable(&String::from_utf8_lossy(field))).cloned();
     let members = integer(field).map(|element| vec![element]).or_else(set)?;
     let mut nodes = Vec::new();
     for element in members {

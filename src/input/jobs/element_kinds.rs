@@ -11,6 +11,8 @@ pub(super) enum Family {
     Plane,
     /// Displacements and rotations in space: shells and beams.
     Turning,
+    /// Displacements and the rotation in a plane: beams.
+    PlaneTurning,
     /// Displacements along a line or in a membrane.
     Pulling,
     /// A mass at a node.
@@ -26,6 +28,7 @@ impl Family {
             Self::Solid | Self::Pulling | Self::Mass => &[1, 2, 3],
             Self::Plane => &[1, 2],
             Self::Turning => &[1, 2, 3, 4, 5, 6],
+            Self::PlaneTurning => &[1, 2, 6],
             Self::Turner => &[4, 5, 6],
         }
     }
@@ -36,7 +39,7 @@ pub(super) fn family(kind: &str) -> Option<Family> {
     let begins = |heads: &[&str]| heads.iter().any(|head| kind.starts_with(head));
     if begins(&["C3D", "SC6", "SC8", "CSS8"]) {
         Some(Family::Solid)
-    } else if begins(&["CPS", "CPE"]) {
+    } else if begins(&["CPS", "CPE", "T2D"]) {
         Some(Family::Plane)
     } else if begins(&["MASS"]) {
         Some(Family::Mass)
@@ -46,6 +49,8 @@ pub(super) fn family(kind: &str) -> Option<Family> {
         Some(Family::Pulling)
     } else if begins(&["S3", "S4", "S6", "S8", "STRI", "B31", "B32", "B33"]) {
         Some(Family::Turning)
+    } else if begins(&["B21", "B22", "B23"]) {
+        Some(Family::PlaneTurning)
     } else {
         None
     }
@@ -67,11 +72,16 @@ pub(super) fn n_nodes(kind: &str) -> Option<usize> {
     }
     match kind.as_bytes() {
         [b'S', b'3' | b'4' | b'6' | b'8' | b'9', ..] => Some(usize::from(kind.as_bytes()[1] - b'0')),
-        [b'B', b'3', b'1', ..] => Some(2),
-        [b'B', b'3', b'2', ..] => Some(3),
-        [b'T', b'3', b'D', n @ (b'2' | b'3'), ..] => Some(usize::from(n - b'0')),
+        [b'B', b'2' | b'3', b'1' | b'3', ..] => Some(2),
+        [b'B', b'2' | b'3', b'2', ..] => Some(3),
+        [b'T', b'2' | b'3', b'D', n @ (b'2' | b'3'), ..] => Some(usize::from(n - b'0')),
         _ => None,
     }
+}
+
+/// True if elements of the type have nodes of their own besides those of the deck, with rows in the matrices.
+pub(super) fn has_internal_nodes(kind: &str) -> bool {
+    kind.starts_with("B33") || kind.starts_with("B23") || kind.starts_with('B') && kind.ends_with('H')
 }
 
 /// What there is to draw of an element.
@@ -87,7 +97,8 @@ pub(super) enum Drawing {
 
 /// How an element of a type is drawn that has these nodes.
 pub(super) fn drawing(kind: &str, nodes: &[i64]) -> Drawing {
-    let is_line = ["T3D", "B31", "B32", "B33"].iter().any(|head| kind.starts_with(head));
+    let is_line =
+        ["T2D", "T3D", "B21", "B22", "B23", "B31", "B32", "B33"].iter().any(|head| kind.starts_with(head));
     // Beams may have a node more, which says how they are turned.
     let count = if is_line { n_nodes(kind).unwrap_or(nodes.len()).min(nodes.len()) } else { nodes.len() };
     let shape = match (family(kind), count) {
@@ -154,6 +165,9 @@ mod tests {
             ("STRI65", 6, Family::Turning),
             ("B31", 2, Family::Turning),
             ("B32R", 3, Family::Turning),
+            ("B33", 2, Family::Turning),
+            ("B23H", 2, Family::PlaneTurning),
+            ("T2D2", 2, Family::Plane),
             ("T3D2", 2, Family::Pulling),
         ] {
             assert_eq!((n_nodes(kind), family(kind)), (Some(nodes), Some(of)), "{kind}");

@@ -41,7 +41,7 @@ pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) 
         if with_rows.contains(&node) && turned.insert(reference, node).is_some_and(|other| other != node) {
             let message = format!(
                 "REF NODE {reference} of *{} is also the REF NODE of another coupling: it has two sets of rotations",
-                card.keyword
+                card.title
             );
             let diagnostic = deck.about(card, Code::DeckUnsupported, message);
             return Err(vec![diagnostic.with_help("give each coupling a REF NODE of its own")]);
@@ -63,7 +63,7 @@ struct Rotation<'d> {
 /// FB111 for *RIGID BODY without REF NODE or ROT NODE.
 fn named_rotation_nodes(deck: &Deck) -> Found<Vec<Rotation<'_>>> {
     let mut rotations = Vec::new();
-    for card in deck.cards().iter().filter(|card| card.keyword == "RIGID BODY") {
+    for card in deck.cards().iter().filter(|card| card.keyword == "RIGIDBODY") {
         let node = |name: &str| {
             card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer))
         };
@@ -120,7 +120,7 @@ impl Coupling<'_> {
     /// FB111 if REF NODE is neither.
     fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Found<i64> {
         let text = self.card.parameter("REFNODE").unwrap_or_default();
-        let set = || match mesh.sets.iter().find(|(name, _)| name.eq_ignore_ascii_case(text))?.1.as_slice() {
+        let set = || match mesh.set(text)? {
             [node] => Some(*node),
             _ => None,
         };

@@ -45,7 +45,7 @@ const TABLES: &[&str] = &["OUGV1", "OUG1", "OUGV1PAT", "OPHIG"];
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut records = Records::new(file);
     let digits = DIGITS[usize::from(records.wide)];
-    let mut table = ModeTable::new(digits, digits);
+    let mut table = ModeTable::new(digits, digits).along_nodes();
     records.skip_label()?;
     while let Some(name) = records.table_name()? {
         let parts = records.parts(TABLES.contains(&name.as_str()))?;
@@ -131,7 +131,7 @@ impl<'f> Records<'f> {
     fn letters(&self, record: &[u8]) -> String {
         let letters: Vec<u8> =
             record.chunks(self.width()).flat_map(|word| &word[..word.len().min(4)]).copied().collect();
-        String::from_utf8_lossy(&letters).trim().to_owned()
+        String::from_utf8_lossy(&letters).trim_matches([' ', '\0']).to_owned()
     }
 
     fn broken<T>(&self) -> Found<T> {

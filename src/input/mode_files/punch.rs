@@ -34,7 +34,7 @@ enum Kind {
 
 /// Reads the eigenvectors of all modes.
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
-    let mut table = ModeTable::new(DIGITS, DIGITS);
+    let mut table = ModeTable::new(DIGITS, DIGITS).along_nodes();
     let mut kind = Kind::Other;
     let mut is_mode = false;
     // The node whose rotations are on the next line.

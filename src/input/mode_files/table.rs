@@ -20,6 +20,8 @@ pub(super) struct ModeTable {
     /// Significant digits of the eigenvalues and of the values.
     pub eigenvalue_digits: u8,
     pub digits: u8,
+    /// True if values stand along the axes of the rows of their nodes.
+    along_nodes: bool,
 }
 
 #[derive(Debug)]
@@ -33,6 +35,11 @@ impl ModeTable {
     /// No modes yet, of values and eigenvalues with so many digits.
     pub fn new(digits: u8, eigenvalue_digits: u8) -> Self {
         Self { digits, eigenvalue_digits, ..Self::default() }
+    }
+
+    /// Marks the values as standing along the axes of the rows of their nodes.
+    pub fn along_nodes(self) -> Self {
+        Self { along_nodes: true, ..self }
     }
 
     /// Begins the next mode.
@@ -114,6 +121,7 @@ impl ModeTable {
         let matrix = Mat::from_fn(n, self.modes.len(), |i, j| self.modes[j].values[i]);
         Ok(RawModes {
             labels: self.labels,
+            along_nodes: self.along_nodes,
             matrix,
             eigenvalues: self.modes.iter().map(|mode| mode.eigenvalue).collect(),
             eigenvalue_digits: self.eigenvalue_digits,

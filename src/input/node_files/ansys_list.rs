@@ -1,6 +1,7 @@
 //! Node lists of Ansys: a table between tabs, whose header names the columns in the user's language, and the
 //! listing of NLIST. Decimal commas are read.
 
+use super::ansys_axes::axes;
 use super::{Found, NodeFile, syntax};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::{excerpt, real};
@@ -25,15 +26,24 @@ fn is_listing_head(line: &str) -> bool {
     !line.contains([',', '\t', ';']) && words.len() >= 4 && words[..4] == ["NODE", "X", "Y", "Z"]
 }
 
-/// Reads every line that is a node number and three coordinates; others are heads of pages.
+/// Reads every line that is a node number and three coordinates, with three angles of rotated nodes where the
+/// head of the page has them (`THXY`); others are heads of pages.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let mut read = NodeFile::default();
+    let mut with_angles = false;
     for (k, line) in file.bytes().split(|&b| b == b'\n').enumerate() {
         let line = line.trim_ascii();
         let mut fields = line.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
-        let Some(id) = fields.next().and_then(integer) else { continue };
-        let coordinates: Option<Vec<f64>> = fields.take(3).map(decimal).collect();
-        let Some(&[x, y, z]) = coordinates.as_deref() else {
+        let Some(id) = fields.next().and_then(integer) else {
+            let upper = line.to_ascii_uppercase();
+            let mut words = upper.split(u8::is_ascii_whitespace);
+            with_angles |= words.any(|word| word == b"THXY");
+            continue;
+        };
+        let values: Option<Vec<f64>> = fields.take(if with_angles { 6 } else { 3 }).map(decimal).collect();
+        let (Some(&[x, y, z, ref angles @ ..]), false) =
+            (values.as_deref(), with_angles && values.as_ref().is_some_and(|own| own.len() < 6))
+        else {
             return Err(syntax(
                 file,
                 k + 1,
@@ -42,6 +52,8 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
         };
         read.nodes.ids.push(id);
         read.nodes.positions.push([x, y, z]);
+        let angles = <[f64; 3]>::try_from(angles).unwrap_or_default();
+        read.axes.extend(axes(angles).map(|axes| (id, axes)));
     }
     Ok(read)
 }

@@ -3,6 +3,7 @@
 
 mod eblock;
 
+use super::ansys_axes::axes;
 use super::{Found, NodeFile, syntax};
 use crate::input::bytes::InputFile;
 use crate::input::coordinates::{excerpt, real};
@@ -80,11 +81,12 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
             continue;
         }
         let id = integer(field(line, 0, 0, width));
-        let mut x = [0.0; 3];
+        // Three coordinates, and three angles of nodes that are rotated.
+        let mut values = [0.0; 6];
         let mut good = id.is_some();
-        for (axis, value) in x.iter_mut().enumerate().take(reals) {
+        for (axis, value) in values.iter_mut().enumerate().take(reals) {
             let own = field(line, count * width, axis, length);
-            // Coordinates that are zero at the end of a line are left out.
+            // Values that are zero at the end of a line are left out.
             match if own.is_empty() { Some(0.0) } else { real(own) } {
                 Some(own) => *value = own,
                 None => good = false,
@@ -98,7 +100,9 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
             ));
         };
         read.nodes.ids.push(id);
-        read.nodes.positions.push(x);
+        let [x, y, z, xy, yz, zx] = values;
+        read.nodes.positions.push([x, y, z]);
+        read.axes.extend(axes([xy, yz, zx]).map(|axes| (id, axes)));
     }
     Err(syntax(file, text.len(), "file ends within NBLOCK: it may be cut off".to_owned()))
 }

@@ -22,7 +22,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
         return Err(refused(file, message, "convert it to netCDF-4: nccopy -k 4 FILE.exo NEW.exo"));
     }
     match read_exodus(file) {
-        Ok((nodes, sets, elements)) => Ok(NodeFile { nodes, sets, elements }),
+        Ok((nodes, sets, elements)) => Ok(NodeFile { nodes, sets, elements, ..NodeFile::default() }),
         Err(found) => Err(found.into_iter().map(|diagnostic| diagnostic.in_file(file.path())).collect()),
     }
 }

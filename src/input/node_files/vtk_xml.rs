@@ -31,7 +31,7 @@ fn points_and_sets(bytes: &[u8]) -> Unpacked<NodeFile> {
     };
     let sets = mesh.sets(&ids)?;
     let elements = mesh.cells(&ids)?;
-    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, elements })
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, elements, ..NodeFile::default() })
 }
 
 fn is_list_of_whole_numbers(array: &Element<'_>) -> bool {

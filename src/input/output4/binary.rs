@@ -43,7 +43,8 @@ impl Binary {
             let (record, next) = self.record(bytes, at).ok_or_else(|| cut_off("a header"))?;
             let [columns, rows, form, kind] = [0, 1, 2, 3].map(|k| self.integer(record, k).unwrap_or(0));
             let name = record.get(4 * self.word..).unwrap_or_default();
-            let mut stored = Stored::new(Header::new(columns, rows, form, kind, name)?);
+            let name = if self.word == 8 { Header::name_of_wide_words(name) } else { name.to_vec() };
+            let mut stored = Stored::new(Header::new(columns, rows, form, kind, &name)?);
             let size = self.size(&stored.header);
             at = next;
             loop {

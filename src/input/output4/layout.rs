@@ -35,7 +35,7 @@ impl Header {
         kind: i64,
         name: &[u8],
     ) -> Result<Self, Diagnostic> {
-        let name: String = String::from_utf8_lossy(name).trim_matches(['\0', ' ']).to_uppercase();
+        let name: String = String::from_utf8_lossy(unpadded(name)).to_uppercase();
         let is_name = |c: char| c.is_ascii_graphic();
         if columns <= 0
             || rows == 0
@@ -54,6 +54,15 @@ impl Header {
             kind,
             is_big: rows < 0 || rows.unsigned_abs() >= BIG,
         })
+    }
+
+    /// A name that is stored in words of eight bytes: four letters in each, or eight.
+    pub(super) fn name_of_wide_words(name: &[u8]) -> Vec<u8> {
+        let letters = |word: &[u8]| match word.split_at_checked(4) {
+            Some((four, rest)) if unpadded(rest).is_empty() => four.to_vec(),
+            _ => word.to_vec(),
+        };
+        name.chunks(8).flat_map(letters).collect()
     }
 
     pub(super) fn is_real(&self) -> bool {
@@ -92,6 +101,14 @@ impl Header {
         }
         Ok(row as u32 - 1)
     }
+}
+
+/// A name without the blanks and zero bytes that fill its field.
+pub(super) fn unpadded(name: &[u8]) -> &[u8] {
+    let fills = |b: &u8| b.is_ascii_whitespace() || *b == 0;
+    let start = name.iter().position(|b| !fills(b)).unwrap_or(name.len());
+    let end = name.iter().rposition(|b| !fills(b)).map_or(start, |last| last + 1);
+    &name[start..end]
 }
 
 /// What a column record is.

@@ -1,7 +1,7 @@
 //! Text files: a header with the format of the numbers, a line for each column or string, and the numbers,
 //! side by side without blanks.
 
-use super::layout::{Column, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
+use super::layout::{Column, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::whole;
 use crate::input::bytes::InputFile;
@@ -46,7 +46,7 @@ impl<'a> Heading<'a> {
         }
         let [columns, rows, form, kind] = numbers;
         let is_matrix = columns > 0 && rows != 0 && (1..=15).contains(&form) && (1..=4).contains(&kind);
-        let name = field(4)?.trim_ascii();
+        let name = unpadded(field(4)?);
         let is_name = name.iter().all(u8::is_ascii_graphic);
         let format = format(line.get(ends[4]..).unwrap_or_default().trim_ascii())?;
         (is_matrix && is_name).then_some(Self { numbers, name, format })

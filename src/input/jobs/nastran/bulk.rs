@@ -1,11 +1,12 @@
 //! What the bulk data and the case control of a deck say: places, axes of rows, boundary, supports, sets.
 
 use super::assigned::Assigned;
+use super::constraints::Constraints;
 use super::elements;
 use super::sets::SetLines;
 use super::systems::{Definition, Grid, Kind, SystemCard};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::bulk_cards::{Card, Item, read_deck, whole};
+use crate::input::bulk_cards::{Card, Item, components, read_deck, whole};
 use crate::input::coordinates::excerpt;
 use crate::input::dmig::Dmigs;
 use crate::input::jobs::Found;
@@ -42,6 +43,7 @@ pub(super) struct Bulk {
     pub dmigs: Dmigs,
     pub sets: SetLines,
     pub assigned: Assigned,
+    pub constraints: Constraints,
     /// PARAM,COUPMASS.
     pub coupled_mass: bool,
     pub has_elements: bool,
@@ -75,6 +77,7 @@ impl Bulk {
             Item::Control(line) => {
                 bulk.sets.line(line);
                 bulk.assigned.line(line);
+                bulk.constraints.control(line);
                 Ok(())
             }
             Item::Begin(place) => {
@@ -180,10 +183,11 @@ impl Bulk {
                 self.is_superelement = true;
                 Some(())
             }
-            _ => {
-                self.element(card);
-                Some(())
-            }
+            _ => self.constraints.card(card, path).map(|is_constraint| {
+                if !is_constraint {
+                    self.element(card);
+                }
+            }),
         };
         if read.is_none() {
             let fields: Vec<String> = (0..card.len().min(8)).map(|k| excerpt(card.field(k))).collect();
@@ -203,15 +207,18 @@ impl Bulk {
             x: [card.real(2)?, card.real(3)?, card.real(4)?],
             axes: system(5)?,
             has_support_field: !card.field(6).is_empty(),
+            held: components(card.field(6))?,
             file,
             line: card.line(),
         };
-        let held = components(card.field(6))?;
+        let held = grid.held.clone();
         if !held.is_empty() && held != [0] {
             self.is_supported(card, path);
             self.supported.push(Members { first: id, last: id, components: held });
         }
-        if self.grids.insert(id, grid).is_some() {
+        let same = grid.clone();
+        // The same card may stand in several included files.
+        if self.grids.insert(id, grid).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("grid {id} is given twice");
             self.complain(Diagnostic::new(Code::NodeDuplicate, message).in_file(path).at_line(card.line()));
         }
@@ -285,7 +292,8 @@ impl Bulk {
 
     fn add_system(&mut self, card: &Card, field: usize, path: &Path, system: SystemCard) -> Option<()> {
         let id = card.integer(field).filter(|id| *id > 0)?;
-        if self.systems.insert(id, system).is_some() {
+        let same = system.clone();
+        if self.systems.insert(id, system).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("coordinate system {id} is given twice");
             self.complain(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(card.line()));
         }
@@ -315,11 +323,6 @@ fn kind(card: &Card) -> Option<Kind> {
         b'S' => Some(Kind::Spherical),
         _ => None,
     }
-}
-
-/// Components: digits from 0 to 6. Scalar points have 0 or none.
-fn components(field: &[u8]) -> Option<Vec<u8>> {
-    field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
 }
 
 /// Points with components in turn.

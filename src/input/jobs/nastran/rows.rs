@@ -4,17 +4,17 @@
 use super::bulk::Bulk;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::dmig::Point;
-use crate::model::DofLabel;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The label of a row. Scalar points have one direction.
-pub(super) fn label((node, component): Point) -> DofLabel {
-    DofLabel { node, direction: component.max(1) }
+/// True if matrices of `n` rows may be those of a set of the deck.
+pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
+    bulk.resequenced || points(bulk, n, "", Path::new("")).is_ok()
 }
 
-/// Points of the rows of matrices with `n` rows: the g-set, the a-set of the deck, the g-set without what
-/// supports hold, or the displacements where all elements are solids; the first that has as many.
+/// Points of the rows of matrices with `n` rows: the g-set, the a-set of the deck, the g-set without what follows
+/// others by constraints, without what supports hold as well, or the displacements where all elements are solids;
+/// the first that has as many.
 ///
 /// # Errors
 /// FB112 when none has.
@@ -40,16 +40,25 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
             return Ok(boundary.into_iter().collect());
         }
     }
+    let (followers, followed) = bulk.constraints.points();
+    let left: BTreeSet<Point> = all().difference(&followers).copied().collect();
+    if !followers.is_empty() {
+        counted.push(("without what follows by constraints".to_owned(), left.len()));
+        if left.len() == n {
+            return Ok(left.into_iter().collect());
+        }
+    }
     let supported = bulk.supported();
     if !supported.is_empty() {
-        let free: Vec<Point> = all().difference(&supported).copied().collect();
+        let free: Vec<Point> = left.difference(&supported).copied().collect();
         counted.push(("without supports".to_owned(), free.len()));
         if free.len() == n {
             return Ok(free);
         }
     }
     if bulk.has_elements && !bulk.has_rotations {
-        let displacements: Vec<Point> = all().into_iter().filter(|(_, component)| *component <= 3).collect();
+        let moves = |point: &Point| point.1 <= 3 || followed.contains(point);
+        let displacements: Vec<Point> = left.into_iter().filter(moves).collect();
         counted.push(("displacements only".to_owned(), displacements.len()));
         if displacements.len() == n {
             return Ok(displacements);

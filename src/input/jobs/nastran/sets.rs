@@ -1,6 +1,6 @@
 //! SET of the case control: numbers, ranges and exceptions, which may go on in further lines.
 
-use crate::input::jobs::NodeSets;
+use crate::input::node_file::NodeSets;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The lines of case control that are sets.

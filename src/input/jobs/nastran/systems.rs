@@ -24,6 +24,7 @@ pub(super) enum Kind {
 }
 
 /// A grid: where it lies in which system, and the system of its rows.
+#[derive(Debug, Clone)]
 pub(super) struct Grid {
     /// System of the coordinates (CP) and of the rows (CD); `None` only while the deck is read.
     pub system: Option<i64>,
@@ -31,12 +32,15 @@ pub(super) struct Grid {
     pub axes: Option<i64>,
     /// Whether it says itself what holds it.
     pub has_support_field: bool,
+    /// Components that it says are held.
+    pub held: Vec<u8>,
     /// Where its card stands: index of the file, and line.
     pub file: usize,
     pub line: usize,
 }
 
 /// The card of a system.
+#[derive(Debug, Clone)]
 pub(super) struct SystemCard {
     kind: Kind,
     definition: Definition,
@@ -45,6 +49,7 @@ pub(super) struct SystemCard {
 }
 
 /// Origin, a point of the z axis, and a point of the plane of x and z.
+#[derive(Debug, Clone, PartialEq)]
 pub(super) enum Definition {
     /// Three grids.
     Grids([i64; 3]),
@@ -52,7 +57,20 @@ pub(super) enum Definition {
     Points { reference: i64, points: [[f64; 3]; 3] },
 }
 
+impl Grid {
+    /// True if both cards say the same.
+    pub(super) fn is_the_same(&self, other: &Self) -> bool {
+        let said = |own: &Self| (own.system, own.x, own.axes, own.held.clone());
+        said(self) == said(other)
+    }
+}
+
 impl SystemCard {
+    /// True if both cards say the same.
+    pub(super) fn is_the_same(&self, other: &Self) -> bool {
+        self.kind == other.kind && self.definition == other.definition
+    }
+
     pub(super) fn new(kind: Kind, definition: Definition, path: &Path, line: usize) -> Self {
         Self { kind, definition, path: path.to_path_buf(), line }
     }

@@ -1,12 +1,11 @@
-//! Rows along the axes of the grids, turned into the basic system: K becomes A K A', where A has the axes of
-//! the rows of each grid in its columns.
+//! Rows along axes of their nodes, turned into those of the model: K becomes A K A', where A has the axes of the
+//! rows of each node in its columns.
 
 use crate::base::diagnostic::Diagnostic;
 use crate::input::assemble::{Entry, Storage, assemble, push};
-use crate::model::{DofLabel, RawMatrix};
+use crate::model::{DofLabel, NodeAxes as Block, RawMatrix};
+use crate::numerics::linalg::CscMatrix;
 use std::collections::HashMap;
-
-type Block = [[f64; 3]; 3];
 
 /// Three rows that are turned together, or one that is not.
 struct Group {
@@ -57,7 +56,7 @@ impl Turn {
         Ok(Self { groups, group_of })
     }
 
-    /// The matrix with its rows and columns along the basic axes. Blocks that are a multiple of the identity
+    /// Returns the matrix with its rows and columns along the basic axes. Blocks that are a multiple of the identity
     /// stay as they are where both their nodes have the same axes.
     pub(super) fn turned(&self, raw: RawMatrix) -> Result<RawMatrix, Diagnostic> {
         let mut pieces = Vec::new();
@@ -89,6 +88,24 @@ impl Turn {
     }
 }
 
+impl Turn {
+    /// Returns A: column i has the rows of the model that row i moves with.
+    pub(super) fn axes(&self) -> CscMatrix {
+        let mut entries = Vec::new();
+        for (row, &(group, k)) in (0u32..).zip(&self.group_of) {
+            let Group { rows, axes } = &self.groups[group as usize];
+            match axes {
+                None => entries.push((row, row, 1.0)),
+                Some(axes) => {
+                    let along = rows.iter().zip(axes[usize::from(k)]);
+                    entries.extend(along.map(|(&own, value)| (own, row, value)));
+                }
+            }
+        }
+        CscMatrix::from_triplets(self.group_of.len(), self.group_of.len(), &entries)
+    }
+}
+
 impl Group {
     fn count(&self) -> usize {
         if self.axes.is_some() { 3 } else { 1 }
@@ -112,7 +129,6 @@ fn turned_block(block: Block, rows: &Group, columns: &Group) -> Block {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::linalg::CscMatrix;
     use std::path::PathBuf;
 
     #[test]
