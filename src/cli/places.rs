@@ -74,8 +74,8 @@ pub(super) fn refuse_replacing<'i, 'o>(
 }
 
 /// No output may replace a file that was read, also those that no argument names: what a deck includes or assigns.
-pub(super) fn refuse_replacing_read<'o>(outputs: impl Iterator<Item = &'o PathBuf>) -> Result<()> {
-    outputs.map(|output| refuse_read(output)).collect()
+pub(super) fn refuse_replacing_read<'o>(mut outputs: impl Iterator<Item = &'o PathBuf>) -> Result<()> {
+    outputs.try_for_each(|output| refuse_read(output))
 }
 
 /// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`: with a number or a name before
