@@ -22,7 +22,7 @@ const HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one element of ty
 /// # Errors
 /// FB111 for a coupling whose reference node or nodes cannot be identified.
 pub(super) fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i64, [f64; 3]>> {
-    let is_coupling = |card: &&Card| card.keyword.replace(' ', "") == "DISTRIBUTINGCOUPLING";
+    let is_coupling = |card: &&Card| card.keyword == "DISTRIBUTINGCOUPLING";
     let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
     for card in deck.cards().iter().filter(is_coupling) {
         let node = reference_node(card, mesh).map_err(|why| refused(deck, card, &why))?;
