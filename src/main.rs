@@ -18,7 +18,10 @@ fn main() -> std::process::ExitCode {
     };
     // Where no handler can be set the work is done all the same: an interruption then leaves a temporary
     // file, which the next run removes.
+    let ignored = process::Ignored::now();
     let _ = ctrlc::set_handler(interrupted);
+    // A run of hours goes on when its terminal closes.
+    ignored.again();
     std::process::ExitCode::from(work(arguments) as u8)
 }
 

@@ -128,6 +128,40 @@ pub fn end(code: ExitCode) -> ! {
     std::process::exit(code as i32)
 }
 
+/// The signals of an interruption that this process was started to ignore, as `nohup` and jobs in the background are.
+pub struct Ignored(#[cfg(unix)] Vec<libc::c_int>);
+
+impl Ignored {
+    /// Those of SIGHUP, SIGINT and SIGTERM that are ignored now.
+    pub fn now() -> Self {
+        #[cfg(unix)]
+        {
+            let is_ignored = |signal: &libc::c_int| {
+                // SAFETY: asks how a signal is handled, into a structure that zeros are valid for.
+                unsafe {
+                    let mut action: libc::sigaction = std::mem::zeroed();
+                    libc::sigaction(*signal, std::ptr::null(), &mut action) == 0
+                        && action.sa_sigaction == libc::SIG_IGN
+                }
+            };
+            Self([libc::SIGHUP, libc::SIGINT, libc::SIGTERM].into_iter().filter(is_ignored).collect())
+        }
+        #[cfg(not(unix))]
+        Self()
+    }
+
+    /// Ignores these again, where a handler has taken their place.
+    pub fn again(&self) {
+        #[cfg(unix)]
+        for &signal in &self.0 {
+            // SAFETY: sets how a signal is handled; the handler that was set before is never called for it.
+            unsafe {
+                libc::signal(signal, libc::SIG_IGN);
+            }
+        }
+    }
+}
+
 /// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files
 /// may be open as the system allows, since every output holds one; the C library keeps one pool of memory for
 /// all threads, not 64 MiB of address space for each.

@@ -6,7 +6,7 @@ use super::reader::{MatrixRole, MatrixSource, Reader, is_hdf5};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::model::RawMatrix;
-use hdf5_metno::{File, Group, LinkType};
+use hdf5_metno::{File, Group};
 
 mod array;
 mod exodus;
@@ -70,9 +70,9 @@ impl Reader for Hdf5 {
 fn named(file: &File, name: &str) -> Found<Group> {
     let mut group = file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])?;
     for part in name.split('/').filter(|part| !part.is_empty()) {
-        if Members::of(&group).link(part) == Some(LinkType::External) {
-            let message = format!("`{part}` of group `{name}` is a link to another file");
-            return Err(vec![layout(message).with_help("give that file itself")]);
+        if Members::of(&group).is_elsewhere(part) {
+            let message = format!("`{part}` of group `{name}` is a soft or external link, which is not followed");
+            return Err(vec![layout(message).with_help("name the group that it leads to, in the file that holds it")]);
         }
         group = group.group(part).map_err(|_| {
             let what =

@@ -157,7 +157,7 @@ fn damping_that_feeds_energy_is_refused_and_overdamped_modes_are_told() {
     let error = run(damped(inner), BodyFrame::Model).unwrap_err();
     assert!(error.has(Code::DampingIndefinite), "{error}");
     for (damping, code) in [
-        (Damping::Ratio(1.0), Code::ManifestSyntax),
+        (Damping::Ratio(-0.1), Code::ManifestSyntax),
         (Damping::Ratio(f64::NAN), Code::ManifestSyntax),
         (Damping::Bands(Vec::new()), Code::ManifestSyntax),
         (Damping::Rayleigh { alpha: f64::INFINITY, beta: 0.0 }, Code::ManifestSyntax),

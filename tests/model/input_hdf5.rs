@@ -286,6 +286,28 @@ fn links_to_other_files_are_not_followed() {
     }
 }
 
+/// A soft link may lead through an external one: the numbers then lie in another file, whatever the fingerprint of this
+/// one says.
+#[test]
+fn soft_links_are_not_followed() {
+    let folder = tempfile::tempdir().unwrap();
+    let other = folder.path().join("other.h5");
+    let file = File::create(&other).unwrap();
+    store(&file.create_group("K").unwrap(), 3, &small(), Layout::Columns, Index::I32, false);
+    file.close().unwrap();
+    for group in [None, Some("/K"), Some("/soft")] {
+        let error = read(group, MatrixRole::Stiffness, |file| {
+            file.link_external(other.to_str().unwrap(), "/K", "ext").unwrap();
+            file.link_soft("/ext", "soft").unwrap();
+            let matrix = file.create_group("K").unwrap();
+            for name in ["data", "indices", "indptr", "shape"] {
+                matrix.link_soft(&format!("/ext/{name}"), name).unwrap();
+            }
+        });
+        assert!(error.unwrap_err().has(Code::Hdf5Layout), "{group:?}");
+    }
+}
+
 /// A path that HDF5 cannot take is an error, not a panic.
 #[test]
 fn names_with_blanks_and_accents_are_fine() {

@@ -63,6 +63,37 @@ fn a_signal_during_convert_leaves_the_folder_as_it_was() {
     }
 }
 
+/// `nohup` and the shell's jobs in the background start programs that ignore signals: a run of hours outlives its
+/// terminal.
+#[test]
+fn signals_that_are_ignored_from_the_start_stay_ignored() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (model, out) = (folder.path().join("model"), folder.path().join("out"));
+    std::fs::create_dir(&model).expect("a folder");
+    std::fs::create_dir(&out).expect("a folder");
+    let raw = Mesh::block(Kind::Hex8, [12; 3], [1.0; 3])
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
+    let manifest = write_model(&model, &raw, Triangle::Lower);
+    for signal in ["HUP", "INT", "TERM"] {
+        let mut child = Command::new("sh")
+            .args(["-c", "trap '' $0; exec \"$@\"", signal, env!("CARGO_BIN_EXE_flexbody"), "convert"])
+            .arg(&manifest)
+            .args(["--modes", "30", "--output", "body.flex.h5"])
+            .current_dir(&out)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the program");
+        wait_for_temporary_files(&out, 1, &mut child);
+        let sent = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).status();
+        assert!(sent.expect("kill").success());
+        assert_eq!(child.wait().expect("a child").code(), Some(0), "SIG{signal}");
+        assert_eq!(members(&out), ["body.flex.h5"]);
+        std::fs::remove_file(out.join("body.flex.h5")).expect("a body");
+    }
+}
+
 #[test]
 #[ignore = "slow"]
 fn an_interrupted_convert_goes_on_from_its_checkpoint() {

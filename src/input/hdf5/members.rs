@@ -28,9 +28,14 @@ impl Members {
         self.0.get(name).copied()
     }
 
-    /// Whether `name` is there and not a link to another file.
+    /// True if `name` is there by a hard link: a soft link may lead through another file.
     pub(super) fn is_here(&self, name: &str) -> bool {
-        self.link(name).is_some_and(|link| link != LinkType::External)
+        self.link(name) == Some(LinkType::Hard)
+    }
+
+    /// True if `name` is a soft or an external link, which are not followed.
+    pub(super) fn is_elsewhere(&self, name: &str) -> bool {
+        self.link(name).is_some_and(|link| link != LinkType::Hard)
     }
 
     pub(super) fn hard_links(&self) -> impl Iterator<Item = &str> {

@@ -3,7 +3,7 @@
 use super::members::Members;
 use crate::base::diagnostic::{Code, Diagnostic};
 use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
-use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, LinkType, SliceOrIndex};
+use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, SliceOrIndex};
 use std::ops::Range;
 
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -68,8 +68,8 @@ impl Numbers {
 fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<(Dataset, String)> {
     let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
     let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
-    if members.link(name) == Some(LinkType::External) {
-        return Err(refuse(Code::Hdf5Layout, "lies in another file".into()));
+    if members.is_elsewhere(name) {
+        return Err(refuse(Code::Hdf5Layout, "is a soft or external link, which is not followed".into()));
     }
     let dataset =
         group.dataset(name).map_err(|e| refuse(Code::Hdf5Layout, format!("cannot be opened: {e}")))?;
