@@ -71,8 +71,11 @@ fn named(file: &File, name: &str) -> Found<Group> {
     let mut group = file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])?;
     for part in name.split('/').filter(|part| !part.is_empty()) {
         if Members::of(&group).is_elsewhere(part) {
-            let message = format!("`{part}` of group `{name}` is a soft or external link, which is not followed");
-            return Err(vec![layout(message).with_help("name the group that it leads to, in the file that holds it")]);
+            let message =
+                format!("`{part}` of group `{name}` is a soft or external link, which is not followed");
+            return Err(vec![
+                layout(message).with_help("name the group that it leads to, in the file that holds it"),
+            ]);
         }
         group = group.group(part).map_err(|_| {
             let what =

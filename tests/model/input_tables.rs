@@ -243,7 +243,8 @@ const MANIFESTS: &[(&str, bool)] = &[
     ("basis={loads=''}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
     ("basis={modes=3}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
     ("basis=1\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
-    ("damping={ratio=1}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
+    ("damping={ratio=3}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", true),
+    ("damping={ratio=-0.1}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
     ("damping={}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
     ("damping={ratio=0.1,matrix='D'}\n[files]\nstiffness='K'\nmass='M'\nnodes='n'\n", false),
 ];

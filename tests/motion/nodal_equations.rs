@@ -332,7 +332,9 @@ fn real_models_have_the_reduced_equations() {
         let files = ModelFiles::from_arguments(k, m, path("nodes.csv"), Some(path("dofs.csv")), None)
             .expect("no units");
         let dimension = if name == "i_plane_stress" { 2 } else { 3 };
-        assert_projection(name, read_model(&ModelFiles { dimension, ..files }).expect("readable"));
+        // Some are in mm, t, s, which changes no number.
+        let files = ModelFiles { dimension, allow_implausible: true, ..files };
+        assert_projection(name, read_model(&files).expect("readable"));
     }
 }
 

@@ -272,7 +272,8 @@ fn every_mode_of_one_element_and_of_a_block_together_is_the_whole_body() {
         let raw = mesh.assemble(&UNIT, MassRule::Consistent).raw_model();
         let flexible = raw.stiffness.matrix.n_cols() - 6;
         let done = converted(raw, flexible, Method::Auto);
-        assert!(done.diagnostics.is_empty(), "{:?}", codes(&done.diagnostics));
+        // A density of one is no matter's.
+        assert_eq!(codes(&done.diagnostics), [Code::InertiaImplausible]);
         let body = done.body;
         assert_eq!((body.n_modes(), body.certificate().proved_modes), (flexible, Some(flexible)));
         let invariants = body.invariants();

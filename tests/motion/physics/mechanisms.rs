@@ -2,13 +2,14 @@
 //! double pendulum.
 
 use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::flexible::{body_of, fixture};
+use crate::support::flexible::body_of;
+use crate::support::general::raw_fixture;
 use crate::support::integrate;
 use crate::support::jointed::{Assembly, End, Joint, Jointed, Scales, Start};
 use crate::support::mesh::Mesh;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
-use flexbody::model::{Coupling, NodeSet};
+use flexbody::model::{Coupling, NodeSet, Reference};
 use flexbody::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
 use serde::Deserialize;
@@ -57,6 +58,17 @@ enum Seat {
     Node { body: usize, node: i64 },
 }
 
+/// A body of the fixtures with joints at the means of its interfaces, where those of the record are.
+fn placed(one: &Placed) -> FlexBody {
+    let mut raw = raw_fixture(&one.model);
+    for set in &mut raw.interfaces {
+        let index = |id: &i64| raw.nodes.ids.iter().position(|own| own == id).expect("a node");
+        let places = set.nodes.iter().map(|id| Vector3::from(raw.nodes.positions[index(id)]));
+        set.reference = Reference::Point((places.sum::<Vector3<f64>>() / set.nodes.len() as f64).into());
+    }
+    body_of(raw, one.modes, BodyFrame::Principal)
+}
+
 fn interface(body: &FlexBody, name: &str) -> BodyPoint {
     let found = body.interfaces().iter().find(|one| one.name == name).expect("an interface");
     BodyPoint::interface(body, found, Terms::ALL).expect("a reference point")
@@ -80,8 +92,7 @@ impl Mechanism {
 
     /// Moves as Exudyn says, and keeps its energy.
     fn check(&self, what: &str) {
-        let bodies: Vec<FlexBody> =
-            self.bodies.iter().map(|one| fixture(&one.model, one.modes, BodyFrame::Principal)).collect();
+        let bodies: Vec<FlexBody> = self.bodies.iter().map(placed).collect();
         let equations: Vec<EquationsOfMotion> =
             bodies.iter().map(|body| EquationsOfMotion::new(body, Terms::ALL)).collect();
         let gravity = Vector3::from(self.gravity);

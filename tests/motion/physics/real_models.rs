@@ -94,7 +94,10 @@ fn shared() -> Vec<Case> {
         let (rigid, modes) = (&reference["consistent"], &reference["modes"]);
         let path = |name: &str| folder.join(name);
         let (k, m, nodes) = (path("K.mtx.gz"), path("M.mtx.gz"), path("nodes.csv"));
-        let files = ModelFiles::from_arguments(k, m, nodes, Some(path("dofs.csv")), None).expect("no units");
+        let mut files =
+            ModelFiles::from_arguments(k, m, nodes, Some(path("dofs.csv")), None).expect("no units");
+        // Some are in mm, t, s, which changes no number.
+        files.allow_implausible = true;
         let sylvester = &modes["sylvester"];
         Case {
             name: folder.file_name().expect("a folder").to_string_lossy().into_owned(),
