@@ -45,8 +45,11 @@ impl<'m> CoupledModel<'m> {
         let rigid: Vec<NodeSet> =
             sets.iter().filter(|set| set.coupling == Some(Coupling::Rigid)).cloned().collect();
         let mut taken = HashSet::new();
-        let mut is_apart =
-            |joint: &CoupledInterface| joint.rows.iter().fold(true, |apart, row| taken.insert(*row) && apart);
+        let mut is_apart = |joint: &CoupledInterface| {
+            let apart = !joint.rows.iter().any(|row| taken.contains(row));
+            taken.extend(joint.rows.iter().copied());
+            apart
+        };
         let joints: Vec<CoupledInterface> = coupled_sets(model, &rigid)
             .into_iter()
             .filter(|joint| deformation(model, joint, vectors) <= RIGID && is_apart(joint))
