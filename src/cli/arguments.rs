@@ -218,7 +218,7 @@ pub struct JobArguments {
     /// Names of the stiffness and the mass matrix of the job, where it has several pairs (Nastran)
     #[arg(long, value_name = "K,M")]
     pub matrices: Option<String>,
-    /// Units of length, mass and time where no manifest states them [default: m,kg,s, not checked]
+    /// Units of length, mass and time where no manifest states them [default: m,kg,s; refused where no matter has such a density]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
     /// 2 for a plane model, with x and y only, where no manifest states it [default: 3]
