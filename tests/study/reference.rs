@@ -11,7 +11,7 @@ use flexbody::body::convert::{ConvertSettings, convert};
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::body::verification::accept;
-use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
+use flexbody::model::{Coupling, Damping, FeModel, NodeSet, RawModel};
 use flexbody::motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Initial, Load, Measure, ModeStart, OtherModes, OutputErrors,
     Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate, trace, trace_at,
@@ -37,7 +37,15 @@ fn beam_of(element: Element, rule: MassRule, cells: [i32; 3]) -> FeModel {
     rooted_beam(element, rule, cells, Coupling::Averaging)
 }
 
+fn raw_beam() -> RawModel {
+    raw_rooted_beam(Element::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Averaging)
+}
+
 fn rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> FeModel {
+    FeModel::from_raw(raw_rooted_beam(element, rule, cells, coupling)).expect("a sound model").model
+}
+
+fn raw_rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(element, &grid(cells), |[x, y, z]| {
         [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
@@ -46,7 +54,7 @@ fn rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coup
     let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.1);
     let root = NodeSet::new("root", nodes.map(|(id, _)| *id).collect());
     let interfaces = vec![NodeSet { coupling: Some(coupling), ..root }];
-    FeModel::from_raw(RawModel { interfaces, ..raw }).expect("a sound model").model
+    RawModel { interfaces, ..raw }
 }
 
 /// Loads and spins of the scenes are along the axes of the body, which are principal.
@@ -424,6 +432,24 @@ fn a_static_start_stays_as_it_is() {
     assert!(calm[0] > 0.0 && spread(&calm) < 1e-6, "{calm:?}");
     scene.initial.settled = false;
     assert!(spread(&energies(&scene)) > 0.5);
+}
+
+/// Damping of the model acts on what the body lacks too: a force at the frequency of a mode beyond its own builds up less
+/// than it would without (by a third, as 0.69 instead of 0.46 of the stress).
+#[test]
+fn what_is_lacking_is_damped_as_the_model_is() {
+    let undamped = model();
+    let rates: Vec<f64> = body(&undamped, 8).modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
+    let scene = pulled(&undamped, 16, Vector3::new(1e-5, 4e-5, 2e-5), rates[6] / rates[0], Vector3::zeros());
+    // A tenth of the critical damping at that frequency.
+    let damping = Some(Damping::Rayleigh { alpha: 0.0, beta: 0.2 / rates[6] });
+    let damped = FeModel::from_raw(RawModel { damping, ..raw_beam() }).expect("a sound model").model;
+    for model in [&undamped, &damped] {
+        let few = body(model, 6);
+        let estimate = estimated(model, &few, &scene).errors.stress.expect("a deformed body");
+        let [_, found] = true_errors(model, &few, &scene);
+        assert!((estimate / found - 1.0).abs() < 0.02, "{estimate:.3e}, {found:.3e}");
+    }
 }
 
 /// Errors of the motion of `body` against that of `whole`, both of one model.

@@ -20,15 +20,23 @@ pub(super) const ROUNDING: f64 = 1e-12;
 /// are K-orthogonal to these, have under the forces whose static responses are E c(t), and under forces M Psi
 /// m_ff^-1 g(t), which do g to the modes.
 pub(super) struct Lacking {
-    /// K_ff, m_ff and D_ff of the modes that follow (nf x nf); none of them: 0 x 0.
+    /// K_ff and m_ff of the modes that follow (nf x nf); none of them: 0 x 0.
     pub modal_stiffness: Mat<f64>,
     pub modal_mass: Mat<f64>,
-    pub modal_damping: Mat<f64>,
+    pub damping: LackingDamping,
     /// Psi'M E (nf x k).
     pub shared_mass: Mat<f64>,
     /// E'K E and E'M E (k x k).
     pub stiffness: Mat<f64>,
     pub mass: Mat<f64>,
+}
+
+/// Damping of the equations of all nodes.
+pub(super) enum LackingDamping {
+    /// That of the modes of the body, D_ff (nf x nf): D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M.
+    OfModes(Mat<f64>),
+    /// That of the model: [Psi, E]'D [Psi, E] (nf + k square).
+    OfModel(Mat<f64>),
 }
 
 /// Amplitudes (nf + k) x m: y of the modes, then z of the responses, at the instants.
@@ -56,7 +64,7 @@ impl Lacking {
     /// ```
     ///
     /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the
-    /// modes on all nodes, of which the diagonal counts in the own motions of the system. Each of these is
+    /// equations of all nodes, of which the diagonal counts in the own motions of the system. Each of these is
     /// solved exactly. Where c changes slowly beside its frequency that is the static response; where it
     /// changes as fast, or begins with a shock, the static response would be too small. What is missed drags
     /// along modes that are no eigenvectors, by its inertia.
@@ -72,7 +80,7 @@ impl Lacking {
     ) -> Option<Answer> {
         let (shapes, inertias) = self.own_motions()?;
         let seen = self.seen_by_modes(&shapes)?;
-        let dampings = self.dampings(&seen);
+        let dampings = self.dampings(&shapes, &seen);
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
         let of_responses = shapes.as_ref().subrows(nf, k).to_owned();
         let forces = combine(self.stiffness.as_ref(), amplitudes.as_ref());
@@ -124,11 +132,15 @@ impl Lacking {
         Some(seen)
     }
 
-    /// x'D x of the own motions, with D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M, of their parts in the modes.
-    fn dampings(&self, seen: &Mat<f64>) -> Vec<f64> {
-        let product = combine(self.modal_damping.as_ref(), seen.as_ref());
-        let of = |j: usize| (0..seen.nrows()).map(|i| seen[(i, j)] * product[(i, j)]).sum();
-        (0..seen.ncols()).map(of).collect()
+    /// x'D x of the own motions x; those of the modes act on the parts `seen` by these.
+    fn dampings(&self, shapes: &Mat<f64>, seen: &Mat<f64>) -> Vec<f64> {
+        let (damping, parts) = match &self.damping {
+            LackingDamping::OfModes(damping) => (damping, seen),
+            LackingDamping::OfModel(damping) => (damping, shapes),
+        };
+        let product = combine(damping.as_ref(), parts.as_ref());
+        let of = |j: usize| (0..parts.nrows()).map(|i| parts[(i, j)] * product[(i, j)]).sum();
+        (0..parts.ncols()).map(of).collect()
     }
 }
 
@@ -237,7 +249,7 @@ mod tests {
         Lacking {
             modal_stiffness: none(),
             modal_mass: none(),
-            modal_damping: none(),
+            damping: LackingDamping::OfModes(none()),
             shared_mass: Mat::zeros(0, 2),
             stiffness: Mat::from_fn(2, 2, |i, j| if i == j { stiffness[i] } else { 0.0 }),
             mass: Mat::identity(2, 2),
@@ -296,7 +308,7 @@ mod tests {
         let system = Lacking {
             modal_stiffness: one(9.0),
             modal_mass: one(1.0),
-            modal_damping: one(0.0),
+            damping: LackingDamping::OfModes(one(0.0)),
             shared_mass: one(0.3),
             stiffness: one(100.0),
             mass: one(0.5),
@@ -323,7 +335,7 @@ mod tests {
         }
         assert!((0..grid.times.len()).any(|i| value[(0, i)].abs() > 0.01), "the mode moves");
         // With damping, of which the diagonal counts: what a Runge-Kutta method of order 4 makes of it.
-        let damped = Lacking { modal_damping: one(0.4), ..system };
+        let damped = Lacking { damping: LackingDamping::OfModes(one(0.4)), ..system };
         let steady = Mat::full(1, grid.times.len(), 1.0);
         let pushed = damped.answered(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;
         let largest = |from: usize| (from..from + 1000).map(|i| pushed[(0, i)].abs()).fold(0.0, f64::max);

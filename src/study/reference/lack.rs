@@ -1,6 +1,6 @@
 //! The motion that a body lacks, and the errors that it makes.
 
-use super::answered::{Answer, Lacking};
+use super::answered::{Answer, Lacking, LackingDamping};
 use super::grid::Grid;
 use super::missed::Missed;
 use super::residual::{BLOCK, NodalView};
@@ -53,10 +53,14 @@ impl<'a> Lack<'a> {
         let (nf, k) = (view.vectors.ncols(), missed.responses.ncols());
         let weighted = weigh(missed.responses.as_ref());
         let modal_stiffness = symmetric_part(body.invariants().modal_stiffness());
+        let columns = side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]);
         let system = Lacking {
             modal_stiffness: modal_stiffness.clone(),
             modal_mass: view.modal_mass.clone(),
-            modal_damping: view.modal_damping.clone(),
+            damping: match view.damped_by_model(columns.as_ref()) {
+                Some(damped) => LackingDamping::OfModel(gram(columns.as_ref(), damped.as_ref())),
+                None => LackingDamping::OfModes(view.modal_damping.clone()),
+            },
             shared_mass: gram(view.vectors.as_ref(), weighted.as_ref()),
             stiffness: missed.energy.clone(),
             mass: symmetric_part(&gram(missed.responses.as_ref(), weighted.as_ref())),
@@ -71,16 +75,7 @@ impl<'a> Lack<'a> {
             (0..all.nrows()).map(move |row| (0..all.ncols()).map(|i| all[(row, i)]).collect::<Vec<f64>>())
         });
         let shown = grid.telling(SHOWN, histories);
-        Self {
-            view,
-            grid,
-            looked_at,
-            columns: side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]),
-            answer,
-            shown,
-            modal_stiffness,
-            energy: missed.energy.clone(),
-        }
+        Self { view, grid, looked_at, columns, answer, shown, modal_stiffness, energy: missed.energy.clone() }
     }
 
     /// z (k x m): the amplitudes of the responses.

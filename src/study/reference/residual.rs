@@ -9,7 +9,7 @@ use crate::motion::scene::Instant;
 use crate::numerics::linalg::{
     SymmetricMatrix, combine, dense_cholesky, gram, multiply, solve_lower, solve_upper, subtract_combination,
 };
-use faer::Mat;
+use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
 /// Instants that are computed together.
@@ -188,21 +188,25 @@ impl<'m> NodalView<'m> {
     /// D Psi, as the equations of all nodes have it: that of the model, else that of the modes on the nodes
     /// (theory 6.15).
     fn damping_of_modes(&self) -> Mat<f64> {
-        match self.damping {
-            Some(Damping::Rayleigh { alpha, beta }) => {
-                let of_stiffness = self.model.pencil().apply_stiffness(self.vectors.as_ref());
-                Mat::from_fn(self.vectors.nrows(), self.vectors.ncols(), |i, j| {
-                    alpha * self.weighted[(i, j)] + beta * of_stiffness[(i, j)]
-                })
+        self.damped_by_model(self.vectors.as_ref())
+            .unwrap_or_else(|| combine(self.weighted.as_ref(), self.over_mass(&self.modal_damping).as_ref()))
+    }
+
+    /// D x with the damping of the model by mass and stiffness or by a matrix; `None` where it has none of these.
+    pub fn damped_by_model(&self, x: MatRef<'_, f64>) -> Option<Mat<f64>> {
+        let pencil = self.model.pencil();
+        match self.damping? {
+            Damping::Rayleigh { alpha, beta } => {
+                let (inertial, elastic) = (pencil.apply_mass(x), pencil.apply_stiffness(x));
+                let force = |i, j| alpha * inertial[(i, j)] + beta * elastic[(i, j)];
+                Some(Mat::from_fn(x.nrows(), x.ncols(), force))
             }
-            Some(Damping::Matrix(damping)) => {
-                let mut forces = Mat::zeros(self.vectors.nrows(), self.vectors.ncols());
-                multiply(damping, 1, self.vectors.as_ref(), forces.as_mut());
-                forces
+            Damping::Matrix(damping) => {
+                let mut forces = Mat::zeros(x.nrows(), x.ncols());
+                multiply(damping, 1, x, forces.as_mut());
+                Some(forces)
             }
-            None | Some(Damping::Ratio(_) | Damping::Bands(_)) => {
-                combine(self.weighted.as_ref(), self.over_mass(&self.modal_damping).as_ref())
-            }
+            Damping::Ratio(_) | Damping::Bands(_) => None,
         }
     }
 
