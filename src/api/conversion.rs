@@ -54,7 +54,7 @@ pub enum Frame {
     Model,
 }
 
-/// What is asked of a conversion. The default: 20 free-surface modes, proved complete, about the centre of mass along the
+/// Settings of a conversion. The default: 20 free-surface modes, proved complete, about the centre of mass along the
 /// axes of the model.
 #[derive(Debug, Clone, Default)]
 pub struct ConvertOptions {

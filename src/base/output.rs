@@ -256,7 +256,7 @@ impl OutputSlot {
     /// in place, what stood in the places of the others before comes back, on file systems with hard links.
     ///
     /// # Errors
-    /// As [`OutputSlot::write`]; [`Usage`](Code::Usage) where one would replace a file that the run has read.
+    /// Every error of [`OutputSlot::write`]; [`Usage`](Code::Usage) where one would replace a file that the run read.
     pub fn commit_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
         let mut slots: Vec<Self> = slots.into_iter().collect();
         for slot in &slots {

@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// Most symbolic links that one path may lead through, as on Linux.
 const MOST_LINKS: usize = 40;
 
-/// What was read since the run began; `None` outside of a run of the program, where a file may be read and replaced.
+/// Files read since the run began; `None` outside of a run of the program, where a file may be read and replaced.
 static READ: Mutex<Option<Vec<FileIdentity>>> = Mutex::new(None);
 
 fn read() -> MutexGuard<'static, Option<Vec<FileIdentity>>> {
@@ -54,7 +54,7 @@ pub fn replaces(output: &Path) -> Diagnostic {
     Diagnostic::new(Code::Usage, message).with_help("choose another output name")
 }
 
-/// What a path stands for, however it is spelt.
+/// File that a path names, however the path is spelt.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileIdentity {
     path: PathBuf,

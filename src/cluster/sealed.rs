@@ -27,16 +27,16 @@ pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
     format!("{head}\n{body}\n")
 }
 
-/// What a file of an input holds.
+/// Reads the value that a file of an input holds.
 ///
 /// # Errors
-/// As [`open_kept`].
+/// Every error of [`open_kept`].
 pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     note_read(path);
     open_kept(path, format)
 }
 
-/// What a file holds that the run keeps for itself and replaces.
+/// Reads the value of a file that the run keeps for itself and replaces.
 ///
 /// # Errors
 /// [`ClusterUnreadable`](Code::ClusterUnreadable) where it cannot be read or is no file of `format`;

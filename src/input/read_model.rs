@@ -165,37 +165,23 @@ impl ModelMatrices {
 
 impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
-        let JobModel {
-            stiffness,
-            mass,
-            nodes,
-            dofs,
-            given_rows,
-            sets,
-            unresolved,
-            elements,
-            files,
-            diagnostics,
-        } = job;
         let path = |role: &str| {
-            let file = files.iter().find(|(own, _)| *own == role).or(files.first());
+            let file = job.files.iter().find(|(own, _)| *own == role).or(job.files.first());
             file.map(|(_, path)| path.clone()).unwrap_or_default()
         };
-        let (nodes_path, dofs_path) = (path("deck"), path("dofs"));
-        let dofs = Some(dofs);
         Self {
-            stiffness,
-            mass,
-            nodes,
-            nodes_path,
-            dofs,
-            dofs_path,
-            given_rows,
-            sets,
-            unresolved,
-            elements,
-            files,
-            diagnostics,
+            nodes_path: path("deck"),
+            dofs_path: path("dofs"),
+            stiffness: job.stiffness,
+            mass: job.mass,
+            nodes: job.nodes,
+            dofs: Some(job.dofs),
+            given_rows: job.given_rows,
+            sets: job.sets,
+            unresolved: job.unresolved,
+            elements: job.elements,
+            files: job.files,
+            diagnostics: job.diagnostics,
         }
     }
 }

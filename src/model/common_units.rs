@@ -1,6 +1,6 @@
 //! Units in which numbers of a model are those of common materials.
 
-/// What to do about numbers whose units nothing states, with the units in which they are those of matter.
+/// Advice on numbers whose units nothing states, with the units in which they are those of matter.
 pub(super) fn state_units(fitting: &str) -> String {
     let those = match fitting {
         "" => "state the units".to_owned(),

@@ -86,7 +86,7 @@ fn square(term: &[(u32, f64)], size: f64) -> impl Iterator<Item = (u32, u32, f64
     pairs.map(move |(a, b)| (a.0, b.0, (a.1 * b.1) * size))
 }
 
-/// What takes the products of M with a direction v out of it: (I - v v') M (I - v v') - M, by entries.
+/// Terms that take the products of M with a direction v out of it: (I - v v') M (I - v v') - M, by entries.
 fn rest(mass: &SymmetricMatrix, follower: &Follower) -> Vec<(u32, u32, f64)> {
     let v = &follower.direction;
     let mut product: Vec<(u32, f64)> = Vec::new();

@@ -15,7 +15,7 @@ pub(crate) fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5
     open_kept(path, what, foreign)
 }
 
-/// The same for a file that the run keeps for itself and replaces.
+/// Opens a file that the run keeps for itself and replaces, so that it does not count as read.
 pub(crate) fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))

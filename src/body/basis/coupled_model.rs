@@ -3,7 +3,7 @@
 
 use super::echelon::Echelon;
 use super::interface_rows::{CoupledInterface, coupled_sets};
-use super::modal_basis::input_error;
+use super::modal_basis::problem_of_span;
 use super::rigid_modes::rigid_modes;
 use crate::base::error::Result;
 use crate::model::{Coupling, FeModel, NodeSet};
@@ -97,7 +97,7 @@ impl<'m> CoupledModel<'m> {
     /// The rigid modes in the degrees of freedom that are left (m x 6, in the plane m x 3), orthonormal in T'MT.
     ///
     /// # Errors
-    /// Those of [`rigid_modes`].
+    /// Every error of [`rigid_modes`].
     pub fn rigid_modes(&self) -> Result<Mat<f64>> {
         let rigid = rigid_modes(self.model, &self.model.pencil())?;
         Ok(match &self.coupling {
@@ -120,19 +120,16 @@ impl<'m> CoupledModel<'m> {
 
     /// The eigenproblem for responses; nothing is searched in it, so no estimate of an eigenvalue is needed.
     pub(super) fn problem<'a>(&'a self, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
-        EigenProblem {
-            pencil: self.pencil(),
-            rigid,
-            first_estimate: f64::INFINITY,
-            input_error: input_error(self.model),
-            order: self.coupling.is_none().then(|| self.model.elimination()).flatten(),
-            resume: Resume::default(),
+        let whole = problem_of_span(self.model, rigid, Resume::default());
+        match &self.coupling {
+            Some(own) => EigenProblem { pencil: own.reduced.pencil(), order: None, ..whole },
+            None => whole,
         }
     }
 }
 
-/// What the modes leave of the rigid motion of an interface that fits best, displacements and rotations each relative
-/// to the largest of any node in any mode.
+/// Difference of an interface's motion in the modes from the rigid motion that fits it best, displacements and
+/// rotations each relative to the largest of any node in any mode.
 fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f64>) -> f64 {
     let own = joint.gather(vectors);
     let left = &own - combine(joint.motion(), gram(joint.measure(), own.as_ref()).as_ref());

@@ -37,7 +37,7 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -
     if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
 }
 
-/// Where nodes must not lie that are to determine every rotation, and how many of them do.
+/// Names the place on which nodes that determine every rotation must not all lie, and the number of nodes that suffice.
 fn determining(dimension: usize) -> (&'static str, &'static str) {
     if dimension == 2 {
         ("one point", "two nodes")

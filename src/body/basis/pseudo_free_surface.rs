@@ -68,7 +68,7 @@ struct ShapeSet<'a> {
     shapes: Mat<f64>,
     /// Whether each shape is still in the set.
     is_in: Vec<bool>,
-    /// What moves no mass, or next to none, of shapes that are left out.
+    /// Directions that move no mass, or next to none, of shapes that are left out.
     without_mass: Vec<Mat<f64>>,
     outcome: Independent,
 }

@@ -116,8 +116,8 @@ impl UserLoads {
     /// Loads for `model`, given by its matrix rows.
     ///
     /// # Errors
-    /// As [`ImportedShapes::new`](super::ImportedShapes::new); [`ShapesSize`](Code::ShapesSize) for a load on a row that
-    /// has neither stiffness nor mass.
+    /// Every error of [`ImportedShapes::new`](super::ImportedShapes::new); [`ShapesSize`](Code::ShapesSize) for a load
+    /// on a row that has neither stiffness nor mass.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let source = raw.source.clone();
         Ok(Self { loads: columns(model, raw, Given::Loads)?, source })

@@ -133,7 +133,7 @@ impl FlexBody {
         Some(self.eigenpairs_in_frame()?.0)
     }
 
-    /// The same body with the damping ratio of `ratios` at its frequency for each of its eigenpairs in its frame: D =
+    /// Gives the body the damping ratio of `ratios` at its frequency for each of its eigenpairs in its frame: D =
     /// m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes these are the modes.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! Whether the body of another program's file is one.
+//! Accepts the body of another program's file only where every identity of a body holds.
 
 use super::Imported;
 use crate::base::diagnostic::{Code, Diagnostic};

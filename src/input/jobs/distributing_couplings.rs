@@ -109,11 +109,7 @@ fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
     let weight = fast_float2::parse(weight).ok().filter(|weight: &f64| weight.is_finite())?;
     let nodes: BTreeSet<i64> = match integer(name) {
         Some(node) => BTreeSet::from([node]),
-        None => {
-            let set = String::from_utf8_lossy(name);
-            let (_, own) = mesh.sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(&set))?;
-            own.iter().copied().collect()
-        }
+        None => mesh.set(&String::from_utf8_lossy(name))?.iter().copied().collect(),
     };
     let places: Option<Vec<[f64; 3]>> = nodes.iter().map(|node| mesh.nodes.get(node).copied()).collect();
     Some((places?, weight))
