@@ -9,7 +9,7 @@ use flexbody::base::provenance::SourceFile;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::invariants::BodyFrame;
 use flexbody::formats::export::{ExportOptions, Points};
-use flexbody::formats::import::{ImportFormat, ImportedFile, audit, import_body};
+use flexbody::formats::import::{ImportFormat, ImportFrame, ImportedFile, audit, import_body};
 use flexbody::formats::{export, find_format};
 use flexbody::formats::{find_import_format, recognise};
 use flexbody::input::InputFile;
@@ -420,7 +420,8 @@ fn axes_that_are_no_rotation_are_refused() {
         let imported = read(&edited(file("fembs"), change));
         assert_eq!(findings(&imported), ["FB748 ap_is_a_rotation"]);
         let source = SourceFile::new("body", Path::new("body.SID_FEM"), "0".repeat(64));
-        let error = import_body(&imported, source, UnitSystem::default()).expect_err(words);
+        let error =
+            import_body(&imported, source, UnitSystem::default(), &ImportFrame::Kept).expect_err(words);
         assert!(error.has(Code::ForeignUnsound) && error.to_string().contains(words), "{error}");
     }
 }
