@@ -577,4 +577,20 @@ fn what_embslib_leaves_out_is_told() {
     assert!(sid().losses(&body, &ExportOptions::default()).is_empty());
     let told = sid().losses(&body, &dialect("embs"));
     assert!(matches!(&told[..], [loss] if loss.starts_with("the geometric stiffness for ")), "{told:?}");
+    // Modes that move the centre of mass.
+    let body = crate::support::file_bodies::body(2, 4, 3, 1, 0);
+    let coriolis =
+        |name: &str| sid().losses(&body, &dialect(name)).iter().any(|loss| loss.contains("Coriolis"));
+    assert!(coriolis("embs") && !coriolis("fembeam"));
+}
+
+#[test]
+fn more_frames_than_the_reader_of_embslib_counts_are_refused() {
+    let body = crate::support::file_bodies::body(1, 100_000, 1, 0, 0);
+    let options = ExportOptions { points: Points::Nodes, ..dialect("embs") };
+    let refused = export(&body, sid(), &options, true).expect_err("100000 frames");
+    let said = refused.to_string();
+    assert!(said.contains("FB720") && said.contains("100000 frames") && said.contains("--points"), "{said}");
+    let options = ExportOptions { points: Points::Some(vec![body.nodes().ids[7]]), ..options };
+    assert!(export(&body, sid(), &options, true).is_ok());
 }

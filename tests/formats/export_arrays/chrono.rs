@@ -72,9 +72,11 @@ impl Reduced {
         let ni = m.nrows() - nb;
         assert_eq!((ni % 6, ni / 6), (0, files.stated("then ", " internal nodes")));
         let inner = |a: &DMatrix<f64>| a.view((nb, nb), (ni, ni)).into_owned();
+        // The eigensolvers of Chrono take fewer modes than coordinates, and a positive mass.
+        assert!(n_modes < ni && inner(m).cholesky().is_some());
         let held = inner(k).cholesky().expect("internal nodes are held by the boundary");
         let static_modes = -held.solve(&k.view((nb, 0), (ni, nb)).into_owned());
-        // Fixed-interface modes by the largest 1 / lambda: coordinates without mass have 0 there.
+        // Fixed-interface modes by the largest 1 / lambda: the lowest come first.
         let l = held.l();
         let half = l.solve_lower_triangular(&inner(m)).expect("regular");
         let inverse = l.solve_lower_triangular(&half.transpose()).expect("regular");
