@@ -58,7 +58,7 @@ impl Assembly {
     pub(super) fn of(told: &InterfaceMatrices<'_>) -> Result<Self> {
         let refuse = |what: &str| {
             let message = format!("chrono needs the centre of mass of the body: {what}");
-            let help = "make the body anew: flexbody convert --basis craig-bampton";
+            let help = "convert the model again: flexbody convert --basis craig-bampton";
             Diagnostic::new(Code::ExportLoses, message).with_help(help)
         };
         let extended = Extended::of(told);
@@ -156,7 +156,7 @@ impl Extended {
         self.n_boundary + self.n_modes + self.n_fill + 3
     }
 
-    /// A matrix of the body with zeros for all other coordinates.
+    /// Returns a matrix of the body with zeros for all other coordinates.
     fn padded(&self, a: &Mat<f64>) -> Mat<f64> {
         let inner = self.n_boundary + self.n_modes;
         let of_body = |i: usize, j: usize| if i < inner && j < inner { a[(i, j)] } else { 0.0 };

@@ -44,7 +44,7 @@ pub(crate) enum ModeIndex {
 }
 
 impl ModeIndex {
-    /// What the reason of a layout says.
+    /// Words about `m1` in the reason of a layout.
     pub(crate) fn words(self) -> &'static str {
         match self {
             Self::Middle => "m1 has the mode as its middle index",

@@ -53,7 +53,7 @@ pub(crate) enum ModalName {
     Absent,
     /// The name of the body. Readers of these files split the line at the sign of equality.
     OfBody,
-    /// The same word for every body: a reader looks for names of arrays in all of the line.
+    /// A word that is fixed for all bodies: a reader looks for names of arrays in all of the line.
     Fixed(&'static str),
 }
 

@@ -78,7 +78,7 @@ impl ExportFormat for Sid {
                 places.len(),
                 dialect.name
             );
-            let help = "--points names the frames that joints need";
+            let help = "choose the frames that joints need with --points";
             return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
         }
         let mut exported = Exported::single(file(body, &places, dialect).into_bytes());
