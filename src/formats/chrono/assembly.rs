@@ -11,9 +11,10 @@
 //! further internal nodes are amplitudes of modes on top of that displacement, rotations are amplitudes alone.
 //!
 //! The modes need not move the centre of mass in all directions. Three further coordinates, displacements of the mass
-//! that moves in no mode (the *rest*), complete the basis, and modes that are coupled to nothing fill the last node: the
-//! eigensolvers of Chrono want fewer modes than coordinates, and a mass matrix that is positive definite. Frequencies of
-//! both lie above those of all modes: a reduction to as many modes as the body has leaves them out and is the body again.
+//! that moves in no mode (the *rest*), complete the basis, and modes that are coupled to nothing fill the last node:
+//! the eigensolvers of Chrono want fewer modes than coordinates, and a mass matrix that is positive definite.
+//! Frequencies of both lie above those of all modes: a reduction to as many modes as the body has leaves them out and
+//! is the body again.
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;

@@ -65,7 +65,8 @@ fn centre_of_mass(body: &FlexBody) -> [f64; 3] {
 fn table(told: &InterfaceMatrices<'_>, assembly: &Assembly, [x, y, z]: [f64; 3]) -> Vec<u8> {
     let internal = assembly.mass.nrows() / 6 - told.frames.len();
     let mut table = format!(
-        "# boundary nodes in the order of the matrices, then {internal} internal nodes, all at the centre of mass {x:e} {y:e} {z:e}; modes to request: {}\nname,x,y,z\n",
+        "# boundary nodes in the order of the matrices, then {internal} internal nodes, all at the centre of mass \
+         {x:e} {y:e} {z:e}; modes to request: {}\nname,x,y,z\n",
         Assembly::modes_to_request(assembly.n_modes)
     );
     for (name, [x, y, z]) in &told.frames {

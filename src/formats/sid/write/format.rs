@@ -104,7 +104,10 @@ fn coriolis_of_frame(body: &FlexBody) -> Option<String> {
     let of_mode = |k: usize| (0..3).map(|a| c1[(a, k)].abs()).fold(0.0, f64::max) / bound.c1(k);
     let share = (0..body.n_modes()).map(of_mode).fold(0.0, f64::max);
     (share > ROUNDING).then(|| {
-        format!("the Coriolis force 2 omega x C1 qd on the frame: C1 is up to {share:.1e} of its Cauchy-Schwarz bound, EMBSlib leaves the force out")
+        format!(
+            "the Coriolis force 2 omega x C1 qd on the frame: C1 is up to {share:.1e} of its Cauchy-Schwarz \
+             bound, EMBSlib leaves the force out"
+        )
     })
 }
 
