@@ -226,16 +226,16 @@ fn the_command_makes_a_body_on_an_interface() {
         let (code, out, err) = run(&["simulate", body, "--scene", "scene.toml", "--json"]);
         assert_eq!(code, Some(0), "{err}");
         let json: serde_json::Value = serde_json::from_str(&out).expect("JSON");
-        json["extremes"].clone()
+        serde_json::json!([json["results"]["points"], json["results"]["last"], json["results"]["reaction"]])
     };
     let [held, mean] = ["held.flex.h5", "mean.flex.h5"].map(|body| {
         let mut all = Vec::new();
         numbers(&motion(body), &mut all);
         all
     });
-    assert!(held.len() == mean.len(), "{held:?}, {mean:?}");
+    assert!(held.len() == mean.len() && held.len() > 20, "{held:?}, {mean:?}");
     for (a, b) in held.iter().zip(&mean) {
-        assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()), "{held:?}, {mean:?}");
+        assert!((a - b).abs() <= 1e-6 * a.abs().max(b.abs()) + 1e-12, "{held:?}, {mean:?}");
     }
     // Selections and trades are about modes of free bodies; what cannot stand anywhere is refused.
     for words in [

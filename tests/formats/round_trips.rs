@@ -96,7 +96,7 @@ fn difference(a: &Mat<f64>, b: &Mat<f64>) -> f64 {
 fn what_is_written_comes_back() {
     let folder = tempfile::tempdir().expect("a folder");
     let formats = readable();
-    assert_eq!(formats.len(), 8, "sid in four dialects, mbdyn in two, mbsim, exudyn");
+    assert_eq!(formats.len(), 9, "sid in five dialects, mbdyn in two, mbsim, exudyn");
     let mut wrong = Vec::new();
     for (name, body) in bodies() {
         for (format, reader, dialect) in &formats {
