@@ -15,7 +15,10 @@ pub(super) fn modes(html: &mut String, facts: &Facts<'_>) {
     completeness(html, facts);
     let modes = &facts.modes;
     if !modes.truncation.is_empty() {
-        let row = |t: &Truncation| vec![escape(&t.load), significant(t.before, 3), significant(t.after, 3)];
+        // A load of an interface without residual vectors.
+        let after =
+            |t: &Truncation| if t.before == t.after { "-".to_owned() } else { significant(t.after, 3) };
+        let row = |t: &Truncation| vec![escape(&t.load), significant(t.before, 3), after(t)];
         let rows: Vec<_> = modes.truncation.iter().map(row).collect();
         let caption = "Static responses: what the modes lack, in the norm of K";
         table(

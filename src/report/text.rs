@@ -172,8 +172,11 @@ fn modes(page: &mut Page, facts: &Facts<'_>) {
         None => format!("{}: {}", counted(*count, "mode"), plain(origin)),
     });
     page.list("static", &modes.truncation, |t| {
-        let (before, after) = (significant(t.before, 2), significant(t.after, 2));
-        format!("{}: error {before} with free modes alone, {after} with residual vectors", plain(&t.load))
+        let (load, before, after) = (plain(&t.load), significant(t.before, 2), significant(t.after, 2));
+        if t.before == t.after {
+            return format!("{load}: error {before} with free modes alone");
+        }
+        format!("{load}: error {before} with free modes alone, {after} with residual vectors")
     });
     if let Some(damping) = &modes.damping {
         page.entry("damping", &damping.in_words());

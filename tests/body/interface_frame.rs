@@ -179,7 +179,10 @@ fn numbers(value: &serde_json::Value, into: &mut Vec<f64>) {
     match value {
         serde_json::Value::Number(number) => into.push(number.as_f64().expect("a float")),
         serde_json::Value::Array(all) => all.iter().for_each(|one| numbers(one, into)),
-        serde_json::Value::Object(all) => all.values().for_each(|one| numbers(one, into)),
+        serde_json::Value::Object(all) => {
+            let told = all.iter().filter(|(name, _)| !name.ends_with("_seconds"));
+            told.for_each(|(_, one)| numbers(one, into));
+        }
         _ => {}
     }
 }

@@ -254,6 +254,25 @@ fn responses_to_interface_loads_are_exact_and_what_adds_nothing_is_named() {
     assert!(displacement < 1e-9 && energy[0] < 1e-9, "{displacement:e} {energy:?}");
 }
 
+/// Without residual vectors the part of the static responses at interfaces that free modes lack is known all the same:
+/// that of the modal sum over all modes.
+#[test]
+fn free_modes_know_what_they_lack_at_interfaces() {
+    let plate = curved_plate();
+    let model = model(&plate);
+    let free = modes(&model, &lowest(6), Vec::new()).expect("modes");
+    let with = modes(&model, &lowest(6), vec![Loads::Interfaces]).expect("modes");
+    assert_eq!(free.truncation.len(), with.truncation.len());
+    for (own, exact) in free.truncation.iter().zip(&with.truncation) {
+        assert_eq!((&own.load, own.before), (&exact.load, own.after));
+        assert!((own.before - exact.before).abs() < 1e-4, "{own:?} {exact:?}");
+    }
+    assert!(
+        free.truncation.iter().any(|one| one.before > 0.3)
+            && with.truncation.iter().all(|one| one.after < 1e-6)
+    );
+}
+
 #[test]
 fn user_loads_that_repeat_or_only_move_the_body_are_named() {
     let plate = curved_plate();

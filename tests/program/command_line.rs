@@ -98,7 +98,7 @@ fn usage_errors_end_with_2_say_what_is_wrong_and_write_nothing() {
         ("convert model.toml -o b.h5 --max-frequency nan", "a positive number is expected"),
         ("convert model.toml -o b.h5 --threads 0", "0 is not in 1.."),
         ("convert model.toml -o b.h5 --accuracy exact", "[possible values: fast, standard, certified]"),
-        ("convert model.toml -o b.h5 --frame moon", "[possible values: com, principal, model]"),
+        ("convert model.toml -o b.h5 --frame moon", "expected com, principal, model or interface=NAME"),
         ("convert model.toml -o b.h5 --stiffness K.mtx", "cannot be used with"),
         ("convert --stiffness K.mtx -o b.h5", "--mass <FILE>"),
         ("convert --stiffness K.mtx --mass M.mtx --nodes nodes.csv --units m,kg -o b.h5", "error[FB202]"),

@@ -97,7 +97,7 @@ fn complete() -> FlexBody {
         bound: 0.1,
         limit: 0.2,
     }];
-    parts.conditions = ReferenceConditions::Interface("left".to_owned());
+    parts.conditions = ReferenceConditions::Interface("right".to_owned());
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 4]], vec![[0, 1]], n).expect("a triangle"));
     FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -312,6 +312,7 @@ fn what_a_file_of_another_program_has_none_of_is_listed() {
     parts.source.n_dofs = 0;
     parts.frame = Frame::model();
     parts.interfaces.clear();
+    parts.conditions = ReferenceConditions::Unstated;
     parts.geometric_stiffness.clear();
     parts.inertia_stiffness = None;
     (parts.modes.modal_damping, parts.modes.rotation, parts.modes.internal) = (None, None, None);

@@ -11,7 +11,7 @@
 //! modes are Psi' X with X'm'X = I and X'diag(lambda)X = diag(mu): those of the body that is held at the interface,
 //! as far as the span has them.
 
-use super::{BodyModes, NodesInFrame, interfaces_in_frame, rigid_mass};
+use super::{BodyModes, NodesInFrame, rigid_mass};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::basis::ModalBasis;
@@ -24,6 +24,7 @@ use crate::numerics::linalg::{
 };
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::HashMap;
 
 /// The frame on interface `name` of `model`: its reference point and the axes of the model.
 ///
@@ -43,6 +44,20 @@ pub(super) fn frame_of_interface(model: &FeModel, name: &str) -> Result<Frame> {
         }
         _ => Err(impossible(format!("interface `{name}` is free and has no reference point for the frame"))),
     }
+}
+
+/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where
+/// none was stated.
+pub(crate) fn interfaces_in_frame(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
+    let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+    let sets = model.interfaces().iter();
+    sets.map(|set| Interface {
+        name: set.name.clone(),
+        nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
+        coupling: if coupled { Some(set.coupling()) } else { set.coupling },
+        reference: set.reference.point().map(|x| frame.to_body(&[x])[0]),
+    })
+    .collect()
 }
 
 fn impossible(message: String) -> Error {

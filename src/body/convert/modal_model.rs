@@ -17,7 +17,6 @@ use crate::model::{FeModel, GeometricStiffness, Nodes};
 use crate::numerics::eigen::{Accuracy, Resume};
 use faer::Mat;
 use nalgebra::Vector3;
-use std::collections::HashMap;
 
 /// A checked model and its modes in body axes; of the mass nothing is condensed yet.
 pub struct ModalModel<'m> {
@@ -81,7 +80,7 @@ impl<'m> ModalModel<'m> {
             modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
-        let interfaces = interfaces_in_frame(model, &frame, coupled);
+        let interfaces = interface_frame::interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,
             settings,
@@ -152,18 +151,4 @@ fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperti
         (Some(mass), _) => choose_frame(mass, positions, wanted),
         (None, d) => choose_general_frame(|about| rigid_mass(model, &about), positions, d, wanted),
     }
-}
-
-/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where
-/// none was stated.
-pub(crate) fn interfaces_in_frame(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
-    let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
-    let sets = model.interfaces().iter();
-    sets.map(|set| Interface {
-        name: set.name.clone(),
-        nodes: set.nodes.iter().filter_map(|id| index.get(id)).copied().collect(),
-        coupling: if coupled { Some(set.coupling()) } else { set.coupling },
-        reference: set.reference.point().map(|x| frame.to_body(&[x])[0]),
-    })
-    .collect()
 }

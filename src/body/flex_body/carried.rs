@@ -85,13 +85,13 @@ impl FlexBody {
                 lacking.join(", ")
             )));
         }
-        let at = self.place_of(carrier)?;
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
-        if along_model && at.reference == Vector3::zeros() && self.rests(&at.motion) {
+        if along_model && self.rests_on(carrier)? {
             let mut parts = self.clone().into_parts();
             parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
             return Self::new(parts);
         }
+        let at = self.place_of(carrier)?;
         let body = self.in_model_axes(at.reference)?;
         let CarriedPoint { motion, .. } = body.place_of(carrier)?;
         let mut parts = body.into_parts();
@@ -233,6 +233,20 @@ impl FlexBody {
         let half = solve_lower(&lower, self.invariants().modal_stiffness());
         let eigen = symmetric_eigen(solve_lower(&lower, &half.transpose().to_owned()).as_ref())?;
         Some((eigen.values, solve_upper(&lower, &eigen.vectors)))
+    }
+
+    /// True if the origin of the frame is the reference point of `carrier`, which moves in no mode.
+    ///
+    /// # Errors
+    /// FB212 and FB214, as [`FlexBody::carried`].
+    fn rests_on(&self, carrier: &Carrier) -> Result<bool> {
+        if let (ReferenceConditions::Interface(own), Carrier::Interface(name)) = (self.conditions(), carrier)
+            && own == name
+        {
+            return Ok(true);
+        }
+        let at = self.place_of(carrier)?;
+        Ok(at.reference == Vector3::zeros() && self.rests(&at.motion))
     }
 
     /// Whether the place with `motion` moves in no mode.

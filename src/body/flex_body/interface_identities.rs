@@ -31,9 +31,10 @@ impl Parts {
         let places: Vec<[f64; 3]> = interface.nodes.iter().map(|&i| self.nodes.positions[i]).collect();
         let (extent, own) = (span(&self.nodes.positions), span(&places));
         let arm = if own > 0.0 { own } else { extent };
+        // Rotations of a single node that rests are zeros, as those of nodes without rotations.
+        let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
         let moved = |j: usize| {
-            let turned =
-                rows.rotation.as_ref().map_or(f64::INFINITY, |rotation| arm * rotation.col(j).norm_max());
+            let turned = rows.rotation.as_ref().map_or(unknown, |rotation| arm * rotation.col(j).norm_max());
             rows.translation.col(j).norm_max().max(turned) / self.modes.shape.col(j).norm_max()
         };
         let modes = (0..self.modes.shape.ncols()).map(moved);

@@ -6,7 +6,7 @@ use crate::numerics::linalg::larger;
 
 /// What the digits of FE matrices leave of K_ff beside its diagonal, and more: so near to it, eigenvalues
 /// differ from the diagonal by the square of this.
-const NEARLY_DIAGONAL: f64 = 1e-6;
+const NEARLY_DIAGONAL: f64 = 1e-5;
 
 /// Distance of the modes from mass-normalised free-surface modes, the worst of the identities that these fulfil;
 /// `None` if they are such modes.
