@@ -1,0 +1,148 @@
+"""Bodies of the fixtures in several frames, and their files."""
+
+import shutil
+import tomllib
+
+import h5py
+import numpy as np
+
+import common
+from common import ROOT
+
+from . import adams, arrays, embedded, exudyn, matrices, mbdyn, mbsim, openradioss, pictures, sid
+from .oracle import Damping, Interface, Model, Nodes
+
+# Rayleigh damping, 1/s and s.
+ALPHA, BETA = 30.0, 1e-7
+
+
+class Source:
+    """A fixture with couplings and reference points for its interfaces, converted with the Craig-Bampton basis: static deflections at interfaces are then those of all nodes."""
+
+    def __init__(self, folder, fixture, interfaces, fixed_modes, damped=False):
+        """`interfaces`: name, coupling, reference point or None for the only node, nodes or None for those of the fixture."""
+        self.folder, self.fixed_modes = folder / fixture, fixed_modes
+        shutil.copytree(ROOT / "fixtures/models" / fixture, self.folder)
+        path = self.folder / "model.toml"
+        manifest = tomllib.loads(path.read_text())
+        given = {one["name"]: one["nodes"] for one in manifest.get("interface", [])}
+        lines, self.interfaces = [], []
+        text = path.read_text().split("[[interface]]")[0]
+        table = np.genfromtxt(self.folder / "nodes.csv", delimiter=",", names=True)
+        at = {int(node): np.array([x, y, z]) for node, x, y, z in zip(table["node"], table["x"], table["y"], table["z"])}
+        for name, coupling, reference, nodes in interfaces:
+            nodes = nodes or given[name]
+            place = at[nodes[0]] if reference is None else np.array(reference, float)
+            lines.append(f'[[interface]]\nname = "{name}"\nnodes = {nodes}\ncoupling = "{coupling}"')
+            if reference is not None:
+                lines.append(f"reference = {place.tolist()}")
+            self.interfaces.append(Interface(name, coupling, nodes, place))
+        if damped:
+            lines.append(f"[damping]\nrayleigh = {{ alpha = {ALPHA}, beta = {BETA} }}")
+        path.write_text(text + "\n".join(lines) + "\n")
+        self.model = Model(self.folder, self.interfaces, Damping(ALPHA, BETA) if damped else Damping())
+
+    def alone(self, node):
+        """The interface that this node is by itself, or None."""
+        return next((i.name for i in self.interfaces if i.nodes == [node]), None)
+
+
+class Body:
+    """A source in a frame: the flex-body file and the files of all formats, made when they are asked for."""
+
+    def __init__(self, flexbody, source, frame, folder):
+        self.flexbody, self.source, self.frame = flexbody, source, frame
+        self.folder = folder / f"{source.folder.name} {frame.replace('=', ' ')}"
+        self.folder.mkdir()
+        self.path = self.folder / "body.flex.h5"
+        common.run(flexbody, "convert", source.folder / "model.toml", "--basis", "craig-bampton", "--modes", source.fixed_modes, "--frame", frame, "--lumped", "none", "--quiet", "-o", self.path)
+        with h5py.File(self.path) as file:
+            self.general = file["source"].attrs["mass_structure"] == "general"
+            rotation = file["modes/rotation"][()] if "rotation" in file["modes"] else None
+            # Of formats that have no rotations of nodes: shapes of the same modes.
+            self.rotation = None if rotation is None else rotation.transpose(1, 2, 0)
+
+    def file(self, target, units=None):
+        """Path of the export; `units`: of length, mass and time."""
+        to, dialect, suffix, options = target.to, target.dialect, target.suffix, []
+        path = self.folder / f"{to} {dialect or 'usual'} {'other' if units else 'own'}" / f"body{suffix}"
+        if not path.exists():
+            path.parent.mkdir()
+            options += ["--dialect", dialect] if dialect else []
+            options += ["--to-units", units] if units else []
+            if target.places:
+                options += ["--points", "interfaces," + ",".join(str(node) for node in self.source.model.ids)]
+            common.export(self.flexbody, self.path, to, path, *options)
+        return path
+
+    def read(self, target, units=None):
+        return target.reader(self.file(target, units), self)
+
+
+class Target:
+    """A row of the table: a format, a dialect, and what reads its file. `places`: the format takes `--points`."""
+
+    def __init__(self, name, to, reader, suffix="", dialect=None, places=True, general="undeformed"):
+        self.name, self.to, self.dialect, self.suffix, self.places = name, to, dialect, suffix, places
+        self.reader = reader
+        # How far the equations hold for nodes that turn.
+        self.general = general
+
+
+def targets(dialects):
+    """Every format and dialect; `dialects` of sid are those that the program has."""
+    found = [Target("exudyn", "exudyn", lambda path, body: exudyn.Exudyn(path), ".hdf5")]
+    for dialect in dialects:
+        found.append(Target(f"sid, {dialect}", "sid", lambda path, body, dialect=dialect: sid.Sid(path, dialect), ".SID_FEM", dialect, general="first"))
+    found += [
+        Target("mbdyn, level19", "mbdyn", lambda path, body: mbdyn.Mbdyn(path), ".fem", "level19", general="first"),
+        Target("mbdyn, level13", "mbdyn", lambda path, body: mbdyn.Mbdyn(path), ".fem", "level13", general="small"),
+        Target("mbsim", "mbsim", lambda path, body: mbsim.Mbsim(path), ".h5"),
+        Target("openradioss", "openradioss", lambda path, body: openradioss.OpenRadioss(path), ".fxb"),
+        Target("adams-invariants, json", "adams-invariants", lambda path, body: adams.Adams(path), ".json", "json"),
+        Target("adams-invariants, text", "adams-invariants", lambda path, body: adams.AdamsText(path), ".txt", "text"),
+        Target("npz", "npz", lambda path, body: arrays.npz(path), ".npz", places=False, general="first"),
+        Target("json", "json", lambda path, body: arrays.read_json(path), ".json", places=False, general="first"),
+        Target("embedded, double", "embedded", lambda path, body: embedded.Embedded(path, body.general), ".bin", "double", general="first"),
+        Target("embedded, float", "embedded", lambda path, body: embedded.Embedded(path, body.general), ".bin", "float", general="first"),
+    ]
+    return found
+
+
+CHRONO = Target("chrono", "chrono", lambda path, body: matrices.Chrono(path), ".csv", places=False)
+SIMSCAPE = [Target(f"simscape, {dialect}", "simscape", lambda path, body: matrices.Simscape(path), suffix, dialect, places=False) for dialect, suffix in [("mat5", ".mat"), ("hdf5", ".h5")]]
+VTK = Target("vtk", "vtk", lambda path, body: pictures.Vtk(path), ".vtu")
+GLTF = Target("gltf", "gltf", lambda path, body: pictures.Gltf(path), ".glb", places=False)
+
+
+def fit(positions, places):
+    """Origin and axes of the frame in which the nodes have `positions`, `places` being those in the model: x_model = origin + axes x."""
+    centre, other = positions.mean(0), places.mean(0)
+    u, _, v = np.linalg.svd((places - other).T @ (positions - centre))
+    axes = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
+    origin = other - axes @ centre
+    wrong = np.abs(positions @ axes.T + origin - places).max() / np.ptp(places, 0).max()
+    return origin, axes, wrong
+
+
+def nodes_of(equations, body, model):
+    """The oracle with the shapes and the frame of the file, and by how much the places of its nodes are off, relative to the extent."""
+    source = body.source
+    names = {source.alone(node): node for node in model.ids if source.alone(node)}
+    # Labels of mbdyn: an interface that is a node by itself has its name, reference points are no nodes.
+    number = lambda label: names[label] if label in names else int(label) if label.isdigit() else -1
+    ids = [number(label) for label in equations.labels] if hasattr(equations, "labels") else equations.ids
+    first = {}
+    for i, node in enumerate(ids):
+        first.setdefault(node, i)
+    pick = [first[node] for node in model.ids]
+    origin, axes, wrong = fit(equations.positions[pick], model.x)
+    # The nodes of the models do not lie in a plane, so that the frame is the only one.
+    rotation = equations.rotation
+    if body.rotation is None:
+        rotation = None
+    elif rotation is None:
+        rotation = body.rotation
+    else:
+        rotation = rotation[pick]
+    return Nodes(model, origin, axes, equations.shape[pick], rotation), wrong

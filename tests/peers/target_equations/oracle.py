@@ -1,0 +1,361 @@
+"""Equations of motion of all nodes of an FE model, from K, M and the positions of the nodes.
+
+Nothing here comes from flexbody or from a format. A node with rotations is a point and three directors, vectors that turn with it (docs/theory.md, section 6); a node
+without rotations is a point. Points and directors have a constant mass `E`, one number for each pair. With the places z(q) of points and directors in the body frame, the
+acceleration of each along body axes is
+
+    gamma = a + alpha x z + w x (w x z) + 2 w x z' + z''        (no a for directors)
+
+and the forces that a motion (a, alpha, q'') takes are the projections of E gamma on what the motion may do: sum of the points, moments z x E gamma, z_q' E gamma. For a
+solid z = x + Psi q, so that these equations are exact at any q. Directors are taken to the second order of their rotation.
+
+What a consistent mass matrix of beams and shells holds beside E (`rest`) does not turn: it is multiplied by the velocities of the rows along body axes, (6.1) of the theory.
+Arrays are about the origin and along the axes of the body frame. `a` is the acceleration of its origin: no velocity of translation enters.
+"""
+
+import gzip
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+import scipy.sparse.linalg as spl
+
+
+def skew(v):
+    """Matrix of the cross product with v; of several vectors a stack of matrices."""
+    v = np.asarray(v, float)
+    zero = np.zeros(v.shape[:-1])
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    return np.stack([np.stack([zero, -z, y], -1), np.stack([z, zero, -x], -1), np.stack([-y, x, zero], -1)], -2)
+
+
+def matrix(path):
+    """Sparse matrix of a Matrix Market file, compressed or not."""
+    if path.suffix == ".gz":
+        with gzip.open(path) as file:
+            return scipy.io.mmread(file).tocsr()
+    return scipy.io.mmread(path).tocsr()
+
+
+@dataclass
+class Interface:
+    """Nodes that follow a reference point (`rigid`), or whose mean motion it follows (`averaging`); the point in model axes."""
+
+    name: str
+    coupling: str
+    nodes: list
+    reference: np.ndarray
+
+
+@dataclass
+class Damping:
+    """Rayleigh damping: alpha in 1/time, beta in time."""
+
+    alpha: float = 0.0
+    beta: float = 0.0
+
+
+class Model:
+    """K, M, nodes and interfaces of an FE model in model axes, in units of the model or in others (`scaled`)."""
+
+    def __init__(self, folder, interfaces, damping):
+        self.k, self.m = matrix(folder / "K.mtx.gz"), matrix(folder / "M.mtx.gz")
+        table = np.genfromtxt(folder / "nodes.csv", delimiter=",", names=True)
+        self.ids = table["node"].astype(int)
+        self.x = np.stack([table["x"], table["y"], table["z"]], 1)
+        rows = np.genfromtxt(folder / "dofs.csv", delimiter=",", names=True)
+        self.index = {node: i for i, node in enumerate(self.ids)}
+        self.row = {(self.index[int(node)], int(axis) - 1): i for i, (node, axis) in enumerate(zip(rows["node"], rows["dir"]))}
+        self.interfaces, self.damping = interfaces, damping
+        self.split()
+
+    def scaled(self, length, mass):
+        """The model of a solid in other units of length and mass: one unit of the model is `length` and `mass` of the new ones."""
+        assert not self.turning, "rows of rotations would need units of their own"
+        other = object.__new__(Model)
+        other.__dict__.update(self.__dict__)
+        other.x, other.k, other.m = length * self.x, mass * self.k, mass * self.m
+        other.interfaces = [Interface(i.name, i.coupling, i.nodes, length * i.reference) for i in self.interfaces]
+        other.split()
+        return other
+
+    def split(self):
+        """E of points and directors, and `rest`, what the mass matrix holds beside: symmetric parts of the blocks of displacements and rotations, differences of axes."""
+        n = len(self.ids)
+        self.turning = sorted({i for i, axis in self.row if axis > 2})
+        director = {i: n + 3 * k for k, i in enumerate(self.turning)}
+        self.size = n + 3 * len(self.turning)
+        place = {row: at for at, row in self.row.items()}
+        blocks, coo = {}, self.m.tocoo()
+        for row, column, value in zip(coo.row, coo.col, coo.data):
+            (i, a), (j, b) = place[row], place[column]
+            blocks.setdefault((i, j, a > 2, b > 2), np.zeros((3, 3)))[a % 3, b % 3] += value
+        rows, columns, values, rest = [], [], [], {}
+
+        def add(i, j, value):
+            rows.append(i), columns.append(j), values.append(value)
+
+        for (i, j, left, right), block in blocks.items():
+            if not left and not right:
+                mean = np.trace(block) / 3
+                add(i, j, mean)
+                block = block - mean * np.eye(3)
+            elif left and right:
+                second = np.trace(block) / 2 * np.eye(3) - block.T
+                for a in range(3):
+                    for b in range(3):
+                        add(director[i] + a, director[j] + b, second[a, b])
+                block = np.zeros((3, 3))
+            else:
+                # Rows of displacements, columns of rotations: -h~ + N.
+                upright = block if right else block.T
+                odd = (upright - upright.T) / 2
+                first = -np.array([odd[2, 1], odd[0, 2], odd[1, 0]])
+                for a in range(3):
+                    if right:
+                        add(i, director[j] + a, first[a])
+                    else:
+                        add(director[i] + a, j, first[a])
+                block = (block + block.T) / 2
+            rest[i, j, left, right] = block
+        self.e = sp.csr_matrix((values, (rows, columns)), (self.size, self.size))
+        largest = max(np.abs(block).max() for (_, _, left, right), block in blocks.items() if not left and not right)
+        self.rest = {at: block for at, block in rest.items() if np.abs(block).max() > 1e-11 * largest}
+
+    def rest_matrix(self):
+        """`rest` with the rows (3 i + a) of displacements of all nodes, then those of rotations."""
+        n = len(self.ids)
+        at = lambda i, rotation: 3 * i + (3 * n if rotation else 0)
+        rows, columns, values = [], [], []
+        for (i, j, left, right), block in self.rest.items():
+            for (a, b), value in np.ndenumerate(block):
+                rows.append(at(i, left) + a), columns.append(at(j, right) + b), values.append(value)
+        return sp.csr_matrix((values, (rows, columns)), (6 * n, 6 * n))
+
+    def fit(self, interface):
+        """Weights A of (5.3) of an interface: the translation and rotation of its reference point are A' u, with u the rows of its nodes in model axes.
+
+        Returns row numbers and A (rows x 6). A single node with rotations is the point itself, moved by its lever.
+        """
+        rows, motions = [], []
+        for node in interface.nodes:
+            i = self.index[node]
+            lever = self.x[i] - interface.reference
+            for a in range(3):
+                rows.append(self.row[i, a])
+                motions.append(np.concatenate([np.eye(3)[a], np.cross(np.eye(3), lever)[:, a]]))
+            if i in self.turning and (len(interface.nodes) == 1 or interface.coupling == "rigid"):
+                for a in range(3):
+                    rows.append(self.row[i, 3 + a])
+                    motions.append(np.concatenate([np.zeros(3), np.eye(3)[a]]))
+        r = np.array(motions)
+        return np.array(rows), r
+
+    def weights(self, interface):
+        rows, r = self.fit(interface)
+        return rows, r @ np.linalg.inv(r.T @ r)
+
+    def compliance(self, held, loaded):
+        """Motion of the reference point of `loaded` (model axes) under unit forces and moments there, 6 x 6, while that of `held` stays: of all nodes, without modes."""
+        return self.static(held, loaded, np.eye(6), None)
+
+    def sag(self, held, watched, gravity):
+        """Motion of the reference point of `watched` under gravity (model axes), while that of `held` stays: of all nodes, without modes."""
+        return self.static(held, watched, np.zeros((6, 1)), gravity)
+
+    def static(self, held, loaded, forces, gravity):
+        """Static solution with the coupling of every interface: rigid ones by elimination, averaging ones by multipliers."""
+        n = self.k.shape[0]
+        taken, columns = set(), []
+        for interface in self.interfaces:
+            if interface.coupling == "rigid":
+                rows, r = self.fit(interface)
+                taken |= set(rows)
+                columns.append((interface, rows, r))
+        free = [row for row in range(n) if row not in taken]
+        t = sp.lil_matrix((n, len(free) + 6 * len(columns)))
+        for k, row in enumerate(free):
+            t[row, k] = 1
+        first = {}
+        for k, (interface, rows, r) in enumerate(columns):
+            first[interface.name] = len(free) + 6 * k
+            for row, motion in zip(rows, r):
+                t[row, len(free) + 6 * k : len(free) + 6 * k + 6] = motion
+        t = t.tocsr()
+        # One row for each condition: what picks the motion of an interface out of the unknowns.
+        pick = {}
+        for interface in (held, loaded):
+            if interface.coupling == "rigid":
+                at = first[interface.name]
+                pick[interface.name] = sp.csr_matrix((np.ones(6), (range(6), range(at, at + 6))), (6, t.shape[1]))
+            else:
+                rows, weights = self.weights(interface)
+                pick[interface.name] = sp.csr_matrix(weights.T) @ t[rows]
+        k = (t.T @ self.k @ t).tocsr()
+        scale = abs(k).max()
+        condition = scale * pick[held.name]
+        load = pick[loaded.name].T @ forces
+        if gravity is not None:
+            load = load + (t.T @ (self.m @ self.rigid(np.zeros(3))[:, :3] @ gravity)).reshape(-1, 1)
+        system = sp.bmat([[k, condition.T], [condition, None]]).tocsc()
+        solved = spl.splu(system).solve(np.vstack([load, np.zeros((6, load.shape[1]))]))
+        return pick[loaded.name] @ solved[: t.shape[1]]
+
+    def rigid(self, origin):
+        """The six rigid motions about a point, by rows of the matrices, model axes."""
+        r = np.zeros((self.k.shape[0], 6))
+        for (i, axis), row in self.row.items():
+            if axis < 3:
+                r[row, axis] = 1
+                r[row, 3:] = np.cross(np.eye(3), self.x[i] - origin)[:, axis]
+            else:
+                r[row, axis] = 1
+        return r
+
+
+class Nodes:
+    """The model in a body frame with shapes of all nodes: restricted equations of motion."""
+
+    def __init__(self, model, origin, axes, translations, rotations=None):
+        """`axes`: columns are the body axes in model axes. `translations`, `rotations` (nodes x 3 x modes) along body axes, in the order of the nodes of the model."""
+        self.model, self.origin, self.axes = model, np.asarray(origin), np.asarray(axes)
+        n, nf = len(model.ids), translations.shape[2]
+        self.nf = nf
+        self.x = (model.x - self.origin) @ self.axes
+        self.psi = translations
+        self.theta = np.zeros((n, 3, nf)) if rotations is None else rotations
+        # Directors are the axes of the model seen from the body: the rows of `axes`.
+        self.point = np.zeros(model.size)
+        self.point[:n] = 1
+        rows = np.zeros((model.k.shape[0], nf))
+        for (i, axis), row in model.row.items():
+            shape = translations if axis < 3 else self.theta
+            rows[row] = self.axes[axis % 3] @ shape[i]
+        self.rows = rows
+        self.stiffness, self.mass = rows.T @ (model.k @ rows), rows.T @ (model.m @ rows)
+        self.damping = model.damping.alpha * self.mass + model.damping.beta * self.stiffness
+        if model.rest:
+            turn = sp.kron(sp.eye(2 * n), sp.csr_matrix(self.axes))
+            self.rest = (turn.T @ model.rest_matrix() @ turn).tocsr()
+        else:
+            self.rest = None
+
+    def shapes(self, q):
+        """z_q: motion of points and directors for each mode; of directors to first order in q."""
+        parts = [self.psi]
+        for i in self.model.turning:
+            turn, now = self.theta[i], skew(self.theta[i] @ q)
+            for a in range(3):
+                e = self.axes[a]
+                by = skew(turn.T) @ e  # modes x 3
+                parts.append((by + 0.5 * (by @ now.T + np.einsum("jab,b->ja", skew(turn.T), now @ e))).T[None])
+        return np.concatenate(parts)
+
+    def places(self, q):
+        """z, and the second order in q' of z'' for q'' = 0."""
+        parts = [self.x + self.psi @ q]
+        for i in self.model.turning:
+            now = skew(self.theta[i] @ q)
+            parts.append(self.axes @ (np.eye(3) + now + 0.5 * now @ now).T)
+        return np.vstack(parts)
+
+    def bent(self, qd):
+        """z_qq [q', q']: of directors only."""
+        parts = [np.zeros_like(self.x)]
+        for i in self.model.turning:
+            rate = skew(self.theta[i] @ qd)
+            parts.append(self.axes @ (rate @ rate).T)
+        return np.vstack(parts)
+
+    def balance(self, q, w, qd, a, alpha, qdd):
+        """Force, moment about the origin and modal forces that a motion takes: inertia, stiffness and damping."""
+        out = self.inertia(q, w, qd, a, alpha, qdd)
+        out[6:] += self.stiffness @ q + self.damping @ qd
+        return out
+
+    def inertia(self, q, w, qd, a, alpha, qdd):
+        """Forces of inertia alone."""
+        z, zq = self.places(q), self.shapes(q)
+        zd = zq @ qd
+        gamma = np.outer(self.point, a) + np.cross(alpha, z) + np.cross(w, np.cross(w, z)) + 2 * np.cross(w, zd) + zq @ qdd + self.bent(qd)
+        f = self.model.e @ gamma
+        out = np.concatenate([f[: len(self.x)].sum(0), np.cross(z, f).sum(0), np.einsum("iaj,ia->j", zq, f)])
+        if self.rest is not None:
+            out += self.inertia_of_rest(q, w, qd, a, alpha, qdd)
+        return out
+
+    def inertia_of_rest(self, q, w, qd, a, alpha, qdd):
+        """The same of `rest`: T = v' N v / 2 with v = (v_i, w + theta_i'), by the equations of Boltzmann and Hamel."""
+        n = len(self.x)
+        psi = np.concatenate([self.psi.reshape(3 * n, -1), self.theta.reshape(3 * n, -1)])
+        turn = lambda u: np.concatenate([-skew(u).reshape(3 * n, 3), np.zeros((3 * n, 3))])
+        base = turn(self.x) + np.concatenate([np.zeros((3 * n, 3)), np.tile(np.eye(3), (n, 1))])
+        b = np.hstack([np.concatenate([np.tile(np.eye(3), (n, 1)), np.zeros((3 * n, 3))]), base + turn(self.psi @ q), psi])
+        bd = turn(self.psi @ qd)
+        nu = np.concatenate([np.zeros(3), w, qd])
+        momentum = self.rest @ (b @ nu)
+        rate = self.rest @ (b @ np.concatenate([a, alpha, qdd]) + bd @ w)
+        out = b.T @ rate
+        out[3:6] += bd.T @ momentum + np.cross(w, b[:, 3:6].T @ momentum)
+        out[:3] += np.cross(w, b[:, :3].T @ momentum)
+        # dT/dq_j: B_j w at displacements.
+        turned = np.cross(w, self.psi, axisb=1, axisc=1).reshape(3 * n, -1)
+        out[6:] -= turned.T @ momentum[: 3 * n]
+        return out
+
+    def mass_matrix(self, q):
+        zero = np.zeros(self.nf)
+        return np.stack([self.inertia(q, np.zeros(3), zero, e[:3], e[3:6], e[6:]) for e in np.eye(6 + self.nf)], 1)
+
+    def accelerations(self, q, w, qd, applied):
+        """(a, alpha, q'') under applied generalised forces."""
+        still = self.balance(q, w, qd, np.zeros(3), np.zeros(3), np.zeros(self.nf))
+        return np.linalg.solve(self.mass_matrix(q), applied - still)
+
+    def gravity(self, q, g):
+        """Generalised forces of gravity g along body axes."""
+        z, zq = self.places(q), self.shapes(q)
+        f = self.model.e @ np.outer(self.point, g)
+        return np.concatenate([f[: len(self.x)].sum(0), np.cross(z, f).sum(0), np.einsum("iaj,ia->j", zq, f)])
+
+    def nodal(self, q, accelerations, w, qd):
+        """Accelerations of all nodes along body axes, relative to nothing."""
+        a, alpha, qdd = accelerations[:3], accelerations[3:6], accelerations[6:]
+        r, rd = self.x + self.psi @ q, self.psi @ qd
+        return a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2 * np.cross(w, rd) + self.psi @ qdd
+
+    def interface(self, name):
+        """Reference point of an interface and its translation and rotation in the modes, body axes, by the least squares of its nodes."""
+        interface = next(i for i in self.model.interfaces if i.name == name)
+        rows, weights = self.model.weights(interface)
+        motion = weights.T @ self.rows[rows]
+        turn = self.axes.T
+        return (interface.reference - self.origin) @ self.axes, turn @ motion[:3], turn @ motion[3:]
+
+    def force(self, name, q, force):
+        """Generalised forces of a force at an interface, body axes."""
+        place, translation, _ = self.interface(name)
+        return np.concatenate([force, np.cross(place + translation @ q, force), translation.T @ force])
+
+    def moment(self, name, q, moment, finite=False):
+        """Generalised forces of a moment at an interface, body axes. `finite`: by the power on the axes exp(theta~), differentiated; else on small rotations."""
+        _, _, rotation = self.interface(name)
+        if not finite:
+            return np.concatenate([np.zeros(3), moment, rotation.T @ moment])
+        step, out = 1e-6 / max(np.abs(rotation @ q).max(), 1e-3), []
+        for e in np.eye(self.nf):
+            scale = step / max(np.abs(rotation @ e).max(), 1e-300)
+            ahead, behind, now = (exponential(rotation @ (q + s * scale * e)) for s in (1, -1, 0))
+            rate = (ahead - behind) / (2 * scale) @ now.T
+            out.append(moment @ np.array([rate[2, 1] - rate[1, 2], rate[0, 2] - rate[2, 0], rate[1, 0] - rate[0, 1]]) / 2)
+        return np.concatenate([np.zeros(3), moment, out])
+
+
+def exponential(theta):
+    """Rotation matrix of a rotation vector."""
+    angle = np.linalg.norm(theta)
+    k = skew(theta)
+    if angle < 1e-8:
+        return np.eye(3) + k + k @ k / 2
+    return np.eye(3) + np.sin(angle) / angle * k + (1 - np.cos(angle)) / angle**2 * k @ k

@@ -1,0 +1,67 @@
+"""vtk and gltf: places of the nodes and shapes of the modes, which is all that these pictures hold."""
+
+import json
+import re
+import struct
+import xml.etree.ElementTree as xml
+
+import numpy as np
+
+VTK_TYPES = {"Float64": "<f8", "Float32": "<f4", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1"}
+
+
+class Picture:
+    """Positions in model axes and metres per unit of length, shapes (points x 3 x modes) along axes of the model up to a factor of each mode, numbers of the nodes where the file has them."""
+
+
+class Vtk(Picture):
+    rounding = 0.0
+
+    def __init__(self, path):
+        data = path.read_bytes()
+        mark = data.index(b"_", data.index(b"<AppendedData")) + 1
+        head = data[: data.index(b"<AppendedData")].decode() + "</VTKFile>"
+        root = xml.fromstring(head if "</UnstructuredGrid>" in head else head.replace("</VTKFile>", "</UnstructuredGrid></VTKFile>"))
+
+        def array(entry):
+            at = mark + int(entry.get("offset"))
+            (length,) = struct.unpack("<Q", data[at : at + 8])
+            found = np.frombuffer(data[at + 8 : at + 8 + length], VTK_TYPES[entry.get("type")])
+            return found.reshape(-1, int(entry.get("NumberOfComponents", "1")))
+
+        entries = {entry.get("Name"): entry for entry in root.iter("DataArray")}
+        at_points = {entry.get("Name"): array(entry) for entry in root.find(".//PointData")}
+        self.positions = array(root.find(".//Points/DataArray"))
+        self.ids = at_points["node"][:, 0]
+        modes = sorted(name for name in at_points if name.startswith("mode_"))
+        turns = sorted(name for name in at_points if name.startswith("rotation_"))
+        self.shape = np.stack([at_points[name] for name in modes], 2)
+        self.rotation = np.stack([at_points[name] for name in turns], 2) if turns else None
+        self.frequency = array(entries["frequency_hz"])[:, 0]
+
+
+class Gltf(Picture):
+    # Single precision.
+    rounding = 6e-8
+
+    def __init__(self, path):
+        data = path.read_bytes()
+        (length,) = struct.unpack("<I", data[12:16])
+        document, start = json.loads(data[20 : 20 + length]), 20 + length + 8
+
+        def array(number):
+            accessor = document["accessors"][number]
+            view = document["bufferViews"][accessor["bufferView"]]
+            at = start + view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
+            width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+            assert accessor["componentType"] == 5126
+            return np.frombuffer(data, "<f4", accessor["count"] * width, at).reshape(-1, width).astype(float)
+
+        primitive = document["meshes"][0]["primitives"][0]
+        node = next(one for one in document["nodes"] if "mesh" in one)
+        self.positions = array(primitive["attributes"]["POSITION"]) + np.array(node.get("translation", [0, 0, 0]))
+        self.turned = node.get("rotation", [0, 0, 0, 1])
+        self.shape = np.stack([array(target["POSITION"]) for target in primitive["targets"]], 2)
+        self.rotation, self.ids = None, None
+        names = document["meshes"][0]["extras"]["targetNames"]
+        self.frequency = np.array([float(found[1]) if (found := re.search(r"\(([\d.e+-]+) Hz\)", name)) else np.nan for name in names])
