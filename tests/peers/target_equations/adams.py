@@ -18,6 +18,8 @@ def values(entry):
 
 
 class Adams(Equations):
+    ARRAYS = {"i1": "m", "i2": "mL", "i3": "s", "i4": "sL", "i5": "1", "i6": "1", "i7": "mL2", "i8": "sL", "i9": "1", "k": "own", "d": "own"}
+
     def __init__(self, path):
         document = json.loads(path.read_text())
         get = {entry["name"]: values(entry) for entry in document["quantities"] if entry["values"] is not None}

@@ -40,6 +40,8 @@ class Source:
         if damped:
             lines.append(f"[damping]\nrayleigh = {{ alpha = {ALPHA}, beta = {BETA} }}")
         path.write_text(text + "\n".join(lines) + "\n")
+        # Size of the unit of length of the model in metres.
+        self.metre = {"mm": 1e-3, "m": 1.0}[manifest["model"]["units"]["length"]]
         self.model = Model(self.folder, self.interfaces, Damping(ALPHA, BETA) if damped else Damping())
 
     def alone(self, node):
@@ -58,6 +60,7 @@ class Body:
         common.run(flexbody, "convert", source.folder / "model.toml", "--basis", "craig-bampton", "--modes", source.fixed_modes, "--frame", frame, "--lumped", "none", "--quiet", "-o", self.path)
         with h5py.File(self.path) as file:
             self.general = file["source"].attrs["mass_structure"] == "general"
+            self.modes = len(file["modes/eigenvalue"])
             rotation = file["modes/rotation"][()] if "rotation" in file["modes"] else None
             # Of formats that have no rotations of nodes: shapes of the same modes.
             self.rotation = None if rotation is None else rotation.transpose(1, 2, 0)
@@ -69,6 +72,7 @@ class Body:
         if not path.exists():
             path.parent.mkdir()
             options += ["--dialect", dialect] if dialect else []
+            options += ["--modes", str(self.modes)] if target.all_modes else []
             options += ["--to-units", units] if units else []
             if target.places:
                 options += ["--points", "interfaces," + ",".join(str(node) for node in self.source.model.ids)]
@@ -87,6 +91,8 @@ class Target:
         self.reader = reader
         # How far the equations hold for nodes that turn.
         self.general = general
+        # True if the format shows some of the modes unless it is told to show all.
+        self.all_modes = False
 
 
 def targets(dialects):
@@ -112,7 +118,8 @@ def targets(dialects):
 CHRONO = Target("chrono", "chrono", lambda path, body: matrices.Chrono(path), ".csv", places=False)
 SIMSCAPE = [Target(f"simscape, {dialect}", "simscape", lambda path, body: matrices.Simscape(path), suffix, dialect, places=False) for dialect, suffix in [("mat5", ".mat"), ("hdf5", ".h5")]]
 VTK = Target("vtk", "vtk", lambda path, body: pictures.Vtk(path), ".vtu")
-GLTF = Target("gltf", "gltf", lambda path, body: pictures.Gltf(path), ".glb", places=False)
+GLTF = Target("gltf", "gltf", lambda path, body: pictures.Gltf(path, body.source.metre), ".glb", places=False)
+GLTF.all_modes = True
 
 
 def fit(positions, places):
@@ -132,6 +139,9 @@ def nodes_of(equations, body, model):
     # Labels of mbdyn: an interface that is a node by itself has its name, reference points are no nodes.
     number = lambda label: names[label] if label in names else int(label) if label.isdigit() else -1
     ids = [number(label) for label in equations.labels] if hasattr(equations, "labels") else equations.ids
+    if getattr(equations, "counted", False):
+        # Interfaces first, then the other nodes, as they were asked for.
+        ids = [i.nodes[0] if len(i.nodes) == 1 else -1 for i in source.interfaces] + [node for node in model.ids if not source.alone(node)]
     first = {}
     for i, node in enumerate(ids):
         first.setdefault(node, i)

@@ -48,25 +48,22 @@ def worst(found, right, scale):
 
 
 def accelerations(equations, nodes, scale, order, damped=True):
-    """Exact equations: accelerations of all nodes at random states under random generalised forces. Others: the forces that a motion takes, to the order that the equations have."""
+    """Exact equations: accelerations of all nodes at random states under random generalised forces. Others: the forces that a motion takes, to the order that the equations have;
+    those that hold at rest ("rest") also without angular velocity."""
     found = 0.0
-    nf = nodes.nf
-    keep = nodes.damping
-    if not damped:
-        nodes.damping = 0 * keep
-    try:
-        for state in states(scale, nf):
-            if order == "exact":
-                right = nodes.accelerations(state.q, state.w, state.qd, state.applied)
-                told = equations.accelerations(state.q, state.w, state.qd, state.applied)
-                field, other = (nodes.nodal(state.q, one, state.w, state.qd) for one in (right, told))
-                found = max(found, float(np.abs(other - field).max() / np.abs(field).max()))
-                # The modes that the nodes of the model hardly see.
-                found = max(found, float(np.abs(told[6:] - right[6:]).max() / np.abs(right[6:]).max()))
-            else:
-                found = max(found, *series(equations, nodes, scale, state, order))
-    finally:
-        nodes.damping = keep
+    nodes = nodes if damped else nodes.undamped()
+    for state in states(scale, nodes.nf):
+        if order == "exact":
+            right = nodes.accelerations(state.q, state.w, state.qd, state.applied)
+            told = equations.accelerations(state.q, state.w, state.qd, state.applied)
+            field, other = (nodes.nodal(state.q, one, state.w, state.qd) for one in (right, told))
+            found = max(found, float(np.abs(other - field).max() / np.abs(field).max()))
+            # The modes that the nodes of the model hardly see.
+            found = max(found, float(np.abs(told[6:] - right[6:]).max() / np.abs(right[6:]).max()))
+        else:
+            found = max(found, *series(equations, nodes, scale, state, order))
+            if order == "rest":
+                found = max(found, *series(equations, nodes, scale, state, "small"))
     return found
 
 
@@ -76,13 +73,16 @@ def series(equations, nodes, scale, state, order):
     q = state.q if order in ("first", "small") else zero
     qd = state.qd if order != "rest" else zero
     w = 0 * state.w if order == "small" else state.w
+    rigid = (lambda s: s) if order == "small" else (lambda s: 1.0)
 
     def slope(one):
-        at = lambda s: one.balance(s * q, w, s * qd, state.a, state.alpha, s * state.qdd)
+        at = lambda s: one.balance(s * q, w, s * qd, rigid(s) * state.a, rigid(s) * state.alpha, s * state.qdd)
         # Central differences of fourth order: what is odd in the amplitude beyond the first power is of the fifth.
         h = 0.05
         return (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
 
+    if order == "small":
+        return (worst(slope(equations), slope(nodes), scale),)
     still = lambda one: one.balance(zero, w, zero, state.a, state.alpha, zero)
     return worst(still(equations), still(nodes), scale), worst(slope(equations), slope(nodes), scale)
 
@@ -146,42 +146,29 @@ def deflection(equations, nodes, scale):
         # What does work on a unit force or moment: six columns of generalised forces.
         unit = [equations.force(place, zero, e) for e in np.eye(3)] + [equations.moment(place, zero, e) for e in np.eye(3)]
         motions[interface.name] = np.stack(unit, 1)
-    length = scale.length
-    size = np.concatenate([np.full(3, length), np.ones(3)])
     for held in nodes.model.interfaces:
         for loaded in nodes.model.interfaces:
             if held is loaded:
                 continue
-            condition = motions[held.name].T * np.concatenate([np.ones(3), np.full(3, 1 / length), np.full(nodes.nf, 1.0)])
             told = held_motion(stiffness, motions[held.name], motions[loaded.name])
             right = compliance(nodes, held, loaded)
             diagonal = np.sqrt(np.diag(right))
             found = max(found, float(np.abs((told - right) / np.outer(diagonal, diagonal)).max()))
-            del condition
-    del size
     return found
 
 
 def held_motion(stiffness, held, loaded):
     """Motion of `loaded` under unit loads there, with the six motions of `held` zero."""
-    nf = len(stiffness)
-    k = np.zeros((6 + nf, 6 + nf))
-    k[6:, 6:] = stiffness
     # Rigid motion that keeps `held` where it is follows from q: held' (rigid, q) = 0.
     follow = -np.linalg.solve(held[:6].T, held[6:].T)
-    basis = np.vstack([follow, np.eye(nf)])
-    load = basis.T @ loaded
-    return load.T @ np.linalg.solve(basis.T @ k @ basis, load)
+    load = follow.T @ loaded[:6] + loaded[6:]
+    return load.T @ np.linalg.solve(stiffness, load)
 
 
 def compliance(nodes, held, loaded):
     """The same of all nodes, body axes."""
-    cache = nodes.model.__dict__.setdefault("solved", {})
-    key = held.name, loaded.name
-    if key not in cache:
-        cache[key] = nodes.model.compliance(held, loaded)
     turn = np.kron(np.eye(2), nodes.axes)
-    return turn.T @ cache[key] @ turn
+    return turn.T @ nodes.model.compliance(held, loaded) @ turn
 
 
 def damping(equations, nodes, scale):
@@ -200,3 +187,98 @@ def shapes(nodes, free, wrong):
     diagonal = np.sqrt(np.diag(stiffness))
     off = stiffness / np.outer(diagonal, diagonal) - np.eye(nodes.nf) if free else np.zeros(1)
     return max(float(np.abs(mass - np.eye(nodes.nf)).max()) if free else 0.0, float(np.abs(off).max()), wrong)
+
+
+class Coordinates:
+    """What all nodes say of bodies in the motions of their interfaces: the same subspace by modes and rigid motion, and static solutions without modes. `nodes` is the oracle of the same body."""
+
+    def __init__(self, nodes, damped=True):
+        self.nodes, self.scale = nodes, Scale(nodes)
+        zero = np.zeros(nodes.nf)
+        self.mass, nf = nodes.mass_matrix(zero), nodes.nf
+        self.stiffness, self.damping = np.zeros((6 + nf, 6 + nf)), np.zeros((6 + nf, 6 + nf))
+        self.stiffness[6:, 6:], self.damping[6:, 6:] = nodes.stiffness, nodes.damping
+        # Motion of every reference point in (rigid, q).
+        rows = []
+        for interface in nodes.model.interfaces:
+            loads = [nodes.force(interface.name, zero, e) for e in np.eye(3)] + [nodes.moment(interface.name, zero, e) for e in np.eye(3)]
+            rows.append(np.stack(loads))
+        self.motion = np.vstack(rows)
+        # Units of the rows: a translation by the radius of gyration, a rotation by one.
+        self.unit = np.tile(np.concatenate([np.full(3, self.scale.length), np.ones(3)]), len(rows))
+
+    def receptance(self, w, damped):
+        dynamic = self.stiffness - w * w * self.mass + (1j * w * self.damping if damped else 0)
+        return self.motion @ np.linalg.solve(dynamic, self.motion.T)
+
+
+def small_motion(matrices, oracle, damped, columns=slice(None)):
+    """Motion of all interfaces under oscillating loads there, at half, 1.7 and 6 times the lowest frequency of a mode: K, M (and the damping) of the file beside those of all nodes."""
+    found, b = 0.0, matrices.boundary
+    for factor in (0.5, 1.7, 6.0):
+        w = factor * oracle.scale.first
+        dynamic = matrices.k - w * w * matrices.m + (1j * w * matrices.d if damped else 0)
+        told, right = np.linalg.inv(dynamic)[:b, :b], oracle.receptance(w, damped)
+        keep = np.isin(np.arange(b) % 6, np.arange(6)[columns])
+        size = np.outer(oracle.unit, oracle.unit)
+        found = max(found, float(np.abs((told - right) / size)[:, keep].max() / np.abs(right / size)[:, keep].max()))
+    return found
+
+
+def weight(matrices, oracle):
+    """Resultant force and moment of gravity along the three axes, about the origin of the body frame."""
+    found, nodes = 0.0, oracle.nodes
+    for axis in np.eye(3):
+        right = nodes.gravity(np.zeros(nodes.nf), axis)[:6]
+        told = matrices.gravity_rigid(axis)
+        size = np.concatenate([np.ones(3), np.full(3, oracle.scale.length)]) * oracle.scale.mass
+        found = max(found, float(np.abs((told - right) / size).max()))
+    return found
+
+
+def sag(matrices, oracle):
+    """Motion of every interface under gravity while another is held, beside the solution of all nodes without modes."""
+    found, nodes = 0.0, oracle.nodes
+    turn = np.kron(np.eye(2), nodes.axes)
+    for i, held in enumerate(nodes.model.interfaces):
+        for j, watched in enumerate(nodes.model.interfaces):
+            if i == j:
+                continue
+            told, right = [], []
+            for axis in np.eye(3):
+                told.append(matrices.static(i, matrices.gravity(axis))[6 * j : 6 * j + 6])
+                right.append(turn.T @ nodes.model.sag(held, watched, nodes.axes @ axis)[:, 0])
+            told, right = np.array(told) / oracle.unit[:6], np.array(right) / oracle.unit[:6]
+            found = max(found, float(np.abs(told - right).max() / np.abs(right).max()))
+    return found
+
+
+def static(matrices, oracle):
+    """Motion of an interface under loads on it while another is held, beside the solution of all nodes without modes."""
+    found, nodes = 0.0, oracle.nodes
+    for i, held in enumerate(nodes.model.interfaces):
+        for j, loaded in enumerate(nodes.model.interfaces):
+            if i != j:
+                right = compliance(nodes, held, loaded)
+                diagonal = np.sqrt(np.diag(right))
+                found = max(found, float(np.abs((matrices.compliance(i, j) - right) / np.outer(diagonal, diagonal)).max()))
+    return found
+
+
+def points(matrices, oracle):
+    """Places of the interfaces in the body frame, over the extent."""
+    right = np.array([oracle.nodes.interface(one.name)[0] for one in oracle.nodes.model.interfaces])
+    return float(np.abs(matrices.points - right).max() / oracle.scale.extent)
+
+
+def drawn(picture, model, single):
+    """Places of the nodes and shapes of a picture: Psi' M Psi and Psi' K Psi without what couples two modes; of vtk also mass-normalised, with the frequencies of the file."""
+    nodes, wrong = picture.nodes(model)
+    mass, stiffness = nodes.mass, nodes.stiffness
+    unit = np.eye(nodes.nf)
+    size, stiff = np.sqrt(np.diag(mass)), np.sqrt(np.diag(stiffness))
+    found = max(wrong, float(np.abs(mass / np.outer(size, size) - unit).max()), float(np.abs(stiffness / np.outer(stiff, stiff) - unit).max()))
+    if not single:
+        time = np.abs(np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2 * np.pi * picture.frequency) - 1).max()
+        found = max(found, float(np.abs(size - 1).max()), float(time))
+    return found

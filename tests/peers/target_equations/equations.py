@@ -22,12 +22,16 @@ class Equations:
     # How far the equations of the program go: "exact"; "first" order in q, q', q''; "undeformed": at q = 0, linear in q' and q''; "rest": at q = q' = 0, linear in q'';
     # "small": without angular velocity, linear in q, q', q''.
     order = "exact"
+    # The same of gravity, where it is another.
+    gravity_order = None
     has_damping = True
     has_gravity = True
     # True if a moment acts on the axes exp(theta~) of a place, and not on small rotations.
     finite_moments = False
     # Significant digits of the numbers of the file, as a relative rounding.
     rounding = 0.0
+    # What a reader keeps of the arrays of its file, and the kind of each: see selftest.py.
+    ARRAYS = {}
 
     def mass(self, q):
         """Mass matrix of (a, alpha, q'')."""

@@ -15,6 +15,11 @@ from .oracle import skew
 class Exudyn(Equations):
     has_damping = False
 
+    # The moment of `UFforceFFRFreducedOrder` is that of the undeformed centre of mass.
+    gravity_order = "undeformed"
+    ARRAYS = {"total": "m", "chi": "L", "chi_tilde": "L", "inertia": "mL2", "mff": "1", "kff": "own", "phi_psi": "s", "phi_psi_tilde": "s", "x_psi": "sL", "x_psi_tilde": "sL",
+              "psi_psi": "1", "psi_tilde_psi_tilde": "1"}
+
     def __init__(self, path):
         with h5py.File(path) as file:
             get = lambda name: np.array(file[name][()], float)
@@ -29,13 +34,25 @@ class Exudyn(Equations):
             self.rotation = None
             self.ids = file["nodeNumbers"][()]
             self.general = file["massMatrixReduced"].attrs.get("mass_structure", b"") in (b"general", "general")
-            self.places = {}
+            self.places, file_interfaces = {}, {}
             for key in file["interfaces"]:
                 entry = file["interfaces"][key]
                 nodes, weights = entry["meshNodeNumbers"][()].astype(int), entry["weights"][()]
+                file_interfaces[key] = nodes
                 self.places[key] = self.marker(nodes, weights, entry["offset"][()], entry["marker"][()] in (b"rigid", "rigid"))
+        self.whole_nodes(file_interfaces)
         self.modes = len(self.mff)
-        self.order = "rest" if self.general else "exact"
+        self.order = "undeformed" if self.general else "exact"
+
+    def whole_nodes(self, interfaces):
+        """A node that is an interface by itself has six nodes around it in the file: their mean is the node."""
+        for key, nodes in interfaces.items():
+            number = set(self.ids[nodes])
+            if len(nodes) > 1 and len(number) == 1:
+                place = self.places[key]
+                self.ids = np.concatenate([np.where(np.isin(np.arange(len(self.ids)), nodes), -1, self.ids), [number.pop()]])
+                self.positions = np.vstack([self.positions, place.position])
+                self.shape = np.concatenate([self.shape, place.translation[None]])
 
     def marker(self, nodes, weights, offset, rigid):
         mean = weights @ self.positions[nodes]

@@ -1,14 +1,15 @@
 """Chrono and Simscape: K, M and damping in the motions of the interfaces and the amplitudes of internal coordinates. Both are equations of small motions.
 
-Chrono: `ChModalAssembly` (src/chrono_modal/ChModalAssembly.cpp) reduces boundary and internal nodes once more (`ApplyModeAccelerationTransformation`: Psi_S = -K_II^-1 K_IB) and has
-gravity of its own (`IntLoadResidual_F`, step 4, `m_modal_automatic_gravity`, on by default): g on the first three coordinates of every node of six, internal ones too; of M g the first three
-rows of every node; those of internal nodes go to the boundary by Psi_S.
+Chrono: `ChModalAssembly` (src/chrono_modal/ChModalAssembly.cpp) reduces boundary and internal nodes once more (`ApplyModeAccelerationTransformation`, CRAIG_BAMPTON without static correction):
+Psi_S = -K_II^-1 K_IB and the lowest modes of the internal nodes, as many as are requested. It has gravity of its own (`IntLoadResidual_F`, step 4, `m_modal_automatic_gravity`, on by default): g on the
+first three coordinates of every node of six, internal ones too; of M g the first three rows of every node; those of internal nodes go to the boundary by Psi_S and to the modes by Psi_D (step 5).
 
-Simscape: *Reduced Order Flexible Solid*, K, M, C in the six coordinates of each interface frame and the modes; it has no gravity of its own in the file: gravity acts as an
-acceleration of the frames, M times the rigid translation.
+Simscape: *Reduced Order Flexible Solid*, K, M, C in the six coordinates of each interface frame and the modes. Gravity acts as an acceleration of the frames: M times the rigid translation.
 """
 
 import csv
+import json
+import re
 
 import h5py
 import numpy as np
@@ -34,6 +35,10 @@ class Matrices:
             out[6 * i + 3 : 6 * i + 6, 3:] = np.eye(3)
         return out
 
+    def gravity_rigid(self, g):
+        """Force and moment about the origin of gravity: on rigid motion of the boundary, which takes everything else along."""
+        return self.rigid().T @ self.gravity(g)[: self.boundary]
+
     def static(self, held, load):
         """Motion of the boundary under a load on all coordinates while the interface number `held` stays."""
         free = [i for i in range(len(self.k)) if not 6 * held <= i < 6 * held + 6]
@@ -50,28 +55,35 @@ class Matrices:
 class Chrono(Matrices):
     def __init__(self, path):
         read = lambda name: np.asarray(scipy.io.mmread(path.with_suffix(f".{name}.mtx")).todense())
-        k, m = read("K"), read("M")
-        d = read("R") if path.with_suffix(".R.mtx").exists() else None
-        rows = [row for row in csv.reader(line for line in path.read_text().splitlines() if not line.startswith("#"))][1:]
-        self.names = [row[0] for row in rows]
-        super().__init__(k, m, d, np.array([row[-3:] for row in rows], float))
+        # M, K and R of boundary and internal nodes.
+        self.file_k, self.file_m = read("K"), read("M")
+        self.file_d = read("R") if path.with_suffix(".R.mtx").exists() else None
+        lines = path.read_text().splitlines()
+        rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
+        self.names = [row["name"] for row in rows]
+        self.points = np.array([[row[axis] for axis in "xyz"] for row in rows], float)
+        told = re.search(r"modes to request: (\d+)|in place of (\d+) fixed-interface modes", "".join(lines))
+        self.requested = int(told[1] or told[2])
+        self.assemble()
+
+    def assemble(self):
+        """The reduction of Chrono."""
+        b = 6 * len(self.points)
+        k, m = self.file_k, self.file_m
+        follow = -np.linalg.solve(k[b:, b:], k[b:, :b])
+        # Largest reciprocal eigenvalues: coordinates may have no mass.
+        _, modes = scipy.linalg.eigh((m[b:, b:] + m[b:, b:].T) / 2, (k[b:, b:] + k[b:, b:].T) / 2)
+        modes = modes[:, ::-1][:, : self.requested]
+        self.reduction = np.block([[np.eye(b), np.zeros((b, self.requested))], [follow, modes]])
+        reduced = lambda matrix: None if matrix is None else self.reduction.T @ matrix @ self.reduction
+        super().__init__(reduced(k), reduced(m), reduced(self.file_d), self.points)
 
     def gravity(self, g):
-        """Generalised forces on the boundary coordinates and on internal ones, as IntLoadResidual_F collects them."""
-        acceleration = np.zeros(len(self.m))
-        nodes = len(self.m) // 6
-        for i in range(nodes):
-            acceleration[6 * i : 6 * i + 3] = g
-        whole, kept = self.m @ acceleration, np.zeros(len(self.m))
-        for i in range(nodes):
-            kept[6 * i : 6 * i + 3] = whole[6 * i : 6 * i + 3]
-        return kept
-
-    def gravity_rigid(self, g):
-        """Force and moment about the origin of gravity: internal nodes by Psi_S, which follow the boundary."""
-        load, b = self.gravity(g), self.boundary
-        follow = -np.linalg.solve(self.k[b:, b:], self.k[b:, :b]) if len(self.k) > b else np.zeros((0, b))
-        return self.rigid().T @ (load[:b] + follow.T @ load[b:])
+        """Generalised forces on the boundary coordinates and the modes, as IntLoadResidual_F collects them."""
+        size = len(self.file_m)
+        moved = np.where(np.arange(size) % 6 < 3, np.tile(np.concatenate([g, np.zeros(3)]), size // 6), 0.0)
+        whole = self.file_m @ moved
+        return self.reduction.T @ np.where(np.arange(size) % 6 < 3, whole, 0.0)
 
 
 class Simscape(Matrices):
@@ -83,8 +95,6 @@ class Simscape(Matrices):
         else:
             with h5py.File(path) as file:
                 get = {name: file[name][()] for name in file if name in ("K", "M", "C", "P0", "axes", "origin")}
-                import json
-
                 names = json.loads(file["frames"].asstr()[()])
             self.axes, self.origin = get["axes"], get["origin"].ravel()
         self.names = names
@@ -96,6 +106,3 @@ class Simscape(Matrices):
         for i in range(len(self.points)):
             motion[6 * i : 6 * i + 3] = g
         return self.m @ motion
-
-    def gravity_rigid(self, g):
-        return self.rigid().T @ self.gravity(g)[: self.boundary]

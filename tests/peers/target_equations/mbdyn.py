@@ -25,6 +25,8 @@ def groups(text):
 
 
 class Mbdyn(Equations):
+    ARRAYS = {"m": "m", "inv2": "mL", "inv7": "mL2", "inv3": "s", "inv4": "sL", "inv5": "1", "inv8": "sL", "inv9": "1", "mff": "1", "kff": "own", "d": "own"}
+
     def __init__(self, path):
         record = groups(path.read_text())
         n, nf = int(record[1][1]), sum(int(word) for word in record[1][2:5])
@@ -44,6 +46,8 @@ class Mbdyn(Equations):
         zeros = lambda *shape: np.zeros(shape)
         # Without groups 14 to 18 rigid motion and modes are not coupled: small motions of a body that does not spin.
         self.order = "exact" if 14 in record else "small"
+        if 14 not in record:
+            self.ARRAYS = {name: kind for name, kind in self.ARRAYS.items() if name not in ("inv5", "inv8", "inv9")}
         self.inv3 = get(14).reshape(3, nf) if 14 in record else zeros(3, nf)
         self.inv4 = get(15).reshape(3, nf) if 15 in record else zeros(3, nf)
         # Axis, mode, axis; axis, mode, mode; axis, mode, mode, axis.

@@ -10,6 +10,8 @@ from .equations import Equations, Place, assemble
 
 
 class Mbsim(Equations):
+    ARRAYS = {"m": "m", "rdm": "mL", "rrdm": "mL2", "pdm": "s", "rpdm": "sL", "pp": "1", "ke": "own", "de": "own"}
+
     def __init__(self, path):
         with h5py.File(path) as file:
             get = lambda name: np.array(file[name][()], float)

@@ -29,6 +29,8 @@ class OpenRadioss(Equations):
     # Fields of 16 columns.
     rounding = 5e-11
 
+    ARRAYS = {"axes": "1", "alpha": "own", "beta": "own", "lm": "1", "ls": "own", "glm": "m", "cpm": "s", "cps": "own"}
+
     def __init__(self, path):
         lines = [line for line in path.read_text().splitlines() if line.strip() and not line.startswith(("#", "$"))]
         head = [int(word) for word in lines[0].split()]
@@ -87,7 +89,9 @@ class OpenRadioss(Equations):
         for i in range(3):
             bent[3 * i : 3 * i + 3] = self.axes @ np.cross(w, np.cross(w, np.eye(3)[i]))
         coupling = np.einsum("ab,abrm->rm", self.axes, self.cpm)
-        return np.concatenate([self.tie().T @ self.glm @ bent, coupling.T @ bent])
+        # RC: stiffness that couples rigid and local modes, by the transposed matrix of the axes (TMROT).
+        held = np.einsum("ab,barm->rm", self.axes, self.cps)
+        return np.concatenate([self.tie().T @ (self.glm @ bent + held @ q), coupling.T @ bent])
 
     def elastic(self, q, qd):
         return self.ls * q + (self.alpha * self.lm + self.beta * self.ls) * qd

@@ -13,6 +13,7 @@ What a consistent mass matrix of beams and shells holds beside E (`rest`) does n
 Arrays are about the origin and along the axes of the body frame. `a` is the acceleration of its origin: no velocity of translation enters.
 """
 
+import copy
 import gzip
 from dataclasses import dataclass
 
@@ -68,6 +69,8 @@ class Model:
         self.index = {node: i for i, node in enumerate(self.ids)}
         self.row = {(self.index[int(node)], int(axis) - 1): i for i, (node, axis) in enumerate(zip(rows["node"], rows["dir"]))}
         self.interfaces, self.damping = interfaces, damping
+        # Compliances by the names of the held and the loaded interface.
+        self.solved = {}
         self.split()
 
     def scaled(self, length, mass):
@@ -75,6 +78,7 @@ class Model:
         assert not self.turning, "rows of rotations would need units of their own"
         other = object.__new__(Model)
         other.__dict__.update(self.__dict__)
+        other.solved = {}
         other.x, other.k, other.m = length * self.x, mass * self.k, mass * self.m
         other.interfaces = [Interface(i.name, i.coupling, i.nodes, length * i.reference) for i in self.interfaces]
         other.split()
@@ -86,7 +90,7 @@ class Model:
         self.turning = sorted({i for i, axis in self.row if axis > 2})
         director = {i: n + 3 * k for k, i in enumerate(self.turning)}
         self.size = n + 3 * len(self.turning)
-        place = {row: at for at, row in self.row.items()}
+        place = {at: row for row, at in self.row.items()}
         blocks, coo = {}, self.m.tocoo()
         for row, column, value in zip(coo.row, coo.col, coo.data):
             (i, a), (j, b) = place[row], place[column]
@@ -158,7 +162,10 @@ class Model:
 
     def compliance(self, held, loaded):
         """Motion of the reference point of `loaded` (model axes) under unit forces and moments there, 6 x 6, while that of `held` stays: of all nodes, without modes."""
-        return self.static(held, loaded, np.eye(6), None)
+        key = held.name, loaded.name
+        if key not in self.solved:
+            self.solved[key] = self.static(held, loaded, np.eye(6), None)
+        return self.solved[key]
 
     def sag(self, held, watched, gravity):
         """Motion of the reference point of `watched` under gravity (model axes), while that of `held` stays: of all nodes, without modes."""
@@ -241,32 +248,35 @@ class Nodes:
         else:
             self.rest = None
 
+    def undamped(self):
+        """The same without damping, for formats that have no place for it."""
+        other = copy.copy(self)
+        other.damping = 0 * self.damping
+        return other
+
     def shapes(self, q):
         """z_q: motion of points and directors for each mode; of directors to first order in q."""
-        parts = [self.psi]
-        for i in self.model.turning:
-            turn, now = self.theta[i], skew(self.theta[i] @ q)
-            for a in range(3):
-                e = self.axes[a]
-                by = skew(turn.T) @ e  # modes x 3
-                parts.append((by + 0.5 * (by @ now.T + np.einsum("jab,b->ja", skew(turn.T), now @ e))).T[None])
-        return np.concatenate(parts)
+        turns = self.theta[self.model.turning]
+        if not len(turns):
+            return self.psi
+        now = skew(turns @ q)
+        modes = turns.transpose(0, 2, 1)[:, None]
+        # Node, director, mode, axis.
+        by = np.cross(modes, self.axes[None, :, None])
+        second = np.einsum("nxy,najy->najx", now, by) + np.cross(modes, np.einsum("nxy,ay->nax", now, self.axes)[:, :, None])
+        moved = (by + second / 2).transpose(0, 1, 3, 2)
+        return np.concatenate([self.psi, moved.reshape(-1, 3, self.nf)])
 
     def places(self, q):
-        """z, and the second order in q' of z'' for q'' = 0."""
-        parts = [self.x + self.psi @ q]
-        for i in self.model.turning:
-            now = skew(self.theta[i] @ q)
-            parts.append(self.axes @ (np.eye(3) + now + 0.5 * now @ now).T)
-        return np.vstack(parts)
+        """z: places of points and directors; directors turn to second order in q."""
+        now = skew(self.theta[self.model.turning] @ q)
+        turned = np.einsum("nxy,ay->nax", np.eye(3) + now + now @ now / 2, self.axes)
+        return np.vstack([self.x + self.psi @ q, turned.reshape(-1, 3)])
 
     def bent(self, qd):
         """z_qq [q', q']: of directors only."""
-        parts = [np.zeros_like(self.x)]
-        for i in self.model.turning:
-            rate = skew(self.theta[i] @ qd)
-            parts.append(self.axes @ (rate @ rate).T)
-        return np.vstack(parts)
+        rate = skew(self.theta[self.model.turning] @ qd)
+        return np.vstack([np.zeros_like(self.x), np.einsum("nxy,ay->nax", rate @ rate, self.axes).reshape(-1, 3)])
 
     def balance(self, q, w, qd, a, alpha, qdd):
         """Force, moment about the origin and modal forces that a motion takes: inertia, stiffness and damping."""
@@ -286,22 +296,22 @@ class Nodes:
         return out
 
     def inertia_of_rest(self, q, w, qd, a, alpha, qdd):
-        """The same of `rest`: T = v' N v / 2 with v = (v_i, w + theta_i'), by the equations of Boltzmann and Hamel."""
-        n = len(self.x)
-        psi = np.concatenate([self.psi.reshape(3 * n, -1), self.theta.reshape(3 * n, -1)])
-        turn = lambda u: np.concatenate([-skew(u).reshape(3 * n, 3), np.zeros((3 * n, 3))])
-        base = turn(self.x) + np.concatenate([np.zeros((3 * n, 3)), np.tile(np.eye(3), (n, 1))])
-        b = np.hstack([np.concatenate([np.tile(np.eye(3), (n, 1)), np.zeros((3 * n, 3))]), base + turn(self.psi @ q), psi])
-        bd = turn(self.psi @ qd)
-        nu = np.concatenate([np.zeros(3), w, qd])
-        momentum = self.rest @ (b @ nu)
-        rate = self.rest @ (b @ np.concatenate([a, alpha, qdd]) + bd @ w)
-        out = b.T @ rate
-        out[3:6] += bd.T @ momentum + np.cross(w, b[:, 3:6].T @ momentum)
+        """The same of `rest`: T = v' N v / 2 with v = (v_i, w + theta_i'), by the equations of Boltzmann and Hamel at V = 0."""
+        n = 3 * len(self.x)
+        points, turning = np.tile(np.eye(3), (n // 3, 1)), np.zeros((n, 3))
+        lever = lambda u: -skew(u).reshape(n, 3)
+        now, theta = lever(self.x + self.psi @ q), self.theta.reshape(n, -1)
+        psi, rate = self.psi.reshape(n, -1), lever(self.psi @ qd)
+        b = np.vstack([np.hstack([points, now, psi]), np.hstack([turning, points, theta])])
+        momentum = self.rest @ (b @ np.concatenate([np.zeros(3), w, qd]))
+        moved = b @ np.concatenate([a, alpha, qdd])
+        moved[:n] += rate @ w
+        out = b.T @ (self.rest @ moved)
         out[:3] += np.cross(w, b[:, :3].T @ momentum)
-        # dT/dq_j: B_j w at displacements.
-        turned = np.cross(w, self.psi, axisb=1, axisc=1).reshape(3 * n, -1)
-        out[6:] -= turned.T @ momentum[: 3 * n]
+        out[3:6] += rate.T @ momentum[:n] + np.cross(w, b[:, 3:6].T @ momentum)
+        # dT/dq_j: the mode carried round by w, at displacements.
+        turned = np.cross(w, self.psi, axisb=1, axisc=1).reshape(n, -1)
+        out[6:] -= turned.T @ momentum[:n]
         return out
 
     def mass_matrix(self, q):
@@ -343,11 +353,12 @@ class Nodes:
         _, _, rotation = self.interface(name)
         if not finite:
             return np.concatenate([np.zeros(3), moment, rotation.T @ moment])
-        step, out = 1e-6 / max(np.abs(rotation @ q).max(), 1e-3), []
+        out = []
         for e in np.eye(self.nf):
-            scale = step / max(np.abs(rotation @ e).max(), 1e-300)
-            ahead, behind, now = (exponential(rotation @ (q + s * scale * e)) for s in (1, -1, 0))
-            rate = (ahead - behind) / (2 * scale) @ now.T
+            # Steps of a thousandth of a radian, differences of fourth order.
+            h = 1e-3 / max(np.abs(rotation @ e).max(), 1e-300)
+            at = lambda s: exponential(rotation @ (q + s * h * e))
+            rate = (8 * (at(1) - at(-1)) - (at(2) - at(-2))) / (12 * h) @ at(0).T
             out.append(moment @ np.array([rate[2, 1] - rate[1, 2], rate[0, 2] - rate[2, 0], rate[1, 0] - rate[0, 1]]) / 2)
         return np.concatenate([np.zeros(3), moment, out])
 

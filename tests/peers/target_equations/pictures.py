@@ -7,11 +7,29 @@ import xml.etree.ElementTree as xml
 
 import numpy as np
 
+from .oracle import Nodes
+
 VTK_TYPES = {"Float64": "<f8", "Float32": "<f4", "Int64": "<i8", "Int32": "<i4", "UInt8": "u1"}
 
 
 class Picture:
-    """Positions in model axes and metres per unit of length, shapes (points x 3 x modes) along axes of the model up to a factor of each mode, numbers of the nodes where the file has them."""
+    """`positions` and `shape` (points x 3 x modes) along axes of the model; `ids`: numbers of the nodes, None where the file has none; `frequency`: of each mode."""
+
+    # Metres, or 0 where lengths are those of the model.
+    metre = 0.0
+
+    def nodes(self, model):
+        """The oracle with the shapes of the picture, and by how much its places are off, relative to the extent."""
+        extent = np.ptp(model.x, 0).max()
+        places = self.positions / self.metre if self.metre else self.positions
+        if self.ids is None:
+            pick = [int(np.argmin(((places - x) ** 2).sum(1))) for x in model.x]
+        else:
+            at = {int(number): i for i, number in enumerate(self.ids)}
+            pick = [at[int(node)] for node in model.ids]
+        wrong = float(np.abs(places[pick] - model.x).max() / extent)
+        rotation = None if self.rotation is None else self.rotation[pick]
+        return Nodes(model, np.zeros(3), np.eye(3), self.shape[pick], rotation), wrong
 
 
 class Vtk(Picture):
@@ -44,7 +62,7 @@ class Gltf(Picture):
     # Single precision.
     rounding = 6e-8
 
-    def __init__(self, path):
+    def __init__(self, path, metre):
         data = path.read_bytes()
         (length,) = struct.unpack("<I", data[12:16])
         document, start = json.loads(data[20 : 20 + length]), 20 + length + 8
@@ -59,9 +77,16 @@ class Gltf(Picture):
 
         primitive = document["meshes"][0]["primitives"][0]
         node = next(one for one in document["nodes"] if "mesh" in one)
-        self.positions = array(primitive["attributes"]["POSITION"]) + np.array(node.get("translation", [0, 0, 0]))
-        self.turned = node.get("rotation", [0, 0, 0, 1])
-        self.shape = np.stack([array(target["POSITION"]) for target in primitive["targets"]], 2)
+        turn = quaternion(node.get("rotation", [0, 0, 0, 1]))
+        self.positions = array(primitive["attributes"]["POSITION"]) @ turn.T + np.array(node.get("translation", [0, 0, 0]))
+        self.shape = np.stack([array(target["POSITION"]) @ turn.T for target in primitive["targets"]], 2)
+        self.metre = metre
         self.rotation, self.ids = None, None
         names = document["meshes"][0]["extras"]["targetNames"]
         self.frequency = np.array([float(found[1]) if (found := re.search(r"\(([\d.e+-]+) Hz\)", name)) else np.nan for name in names])
+
+
+def quaternion(xyzw):
+    x, y, z, w = xyzw
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])

@@ -1,7 +1,10 @@
 """SID_FEM: the equations of Wallrapp (Schwertassek, Wallrapp, *Dynamik flexibler Mehrkörpersysteme*), as Modelica's EMBSlib has them in Components.mo (`EMBS_Body`).
 
-EMBSlib leaves out 2 w~ Ct' q' ("the derivation of the center of gravity is neglected"); here it stands. mdCM, J and the coupling Cr are of first order in q, and with them the equations;
-the modal forces of solids have no more than that. What a dialect says of the columns of Gr and Ge is written here again: see docs/formats/sid.md.
+EMBSlib leaves out 2 w~ Ct' q' ("the derivation of the center of gravity is neglected"), which is zero for modes of the free body, and adds m w~ v although its acceleration is that of
+the frame in space: here the first stands and the second does not. mdCM, J and the coupling Cr are of first order in q, and with them the equations.
+
+What a dialect says of the order of numbers is written here again (docs/formats/sid.md); of `embs` it is what the reader in C (`matrix3Index` of ReadSID_C.h: modes, rows, columns) and the
+declaration `Real[nr, nq, nc]` of Modelica (by rows) make of m1(i, j, k).
 """
 
 import re
@@ -12,26 +15,32 @@ from .equations import Equations, Place, assemble
 from .oracle import skew
 
 INERTIA = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-# Column of axis a and mode k of Gr, of Ge, and whether the mode stands in the middle of m1.
+# Columns of Gr and of Ge, and where the mode stands in m1: in the middle, last, or as EMBSlib takes it.
 BY_AXES, BY_MODES = "axes", "modes"
-DIALECTS = {"fembs": (BY_AXES, BY_AXES, True), "morembs": (BY_AXES, BY_AXES, True), "py-sid": (BY_MODES, BY_AXES, True), "fembeam": (BY_MODES, BY_MODES, False),
-            "embslib": (BY_MODES, BY_MODES, True)}
+MIDDLE, LAST, EMBSLIB = "middle", "last", "EMBSlib"
+DIALECTS = {"fembs": (BY_AXES, BY_AXES, MIDDLE), "morembs": (BY_AXES, BY_AXES, MIDDLE), "py-sid": (BY_MODES, BY_AXES, MIDDLE), "fembeam": (BY_MODES, BY_MODES, LAST),
+            "embs": (BY_MODES, BY_MODES, EMBSLIB)}
 ENTRY = re.compile(r"(m[01])\s*\(\s*(\d+)\s*,\s*(\d+)\s*(?:,\s*(\d+)\s*)?\)\s*=\s*(\S+)")
 
 
 class Taylor:
     """An object of the file: `m0` (rows x columns), `m1` (rows x columns x modes)."""
 
-    def __init__(self, header, entries, modes, middle):
+    def __init__(self, header, entries, modes, third):
         rows, columns = header["nrow"], header["ncol"]
         self.m0, self.m1 = np.zeros((rows, columns)), np.zeros((rows, columns, modes))
+        stored = np.zeros(rows * columns * modes)
         for kind, i, j, k, value in entries:
             if kind == "m0":
                 self.m0[i - 1, j - 1] = value
-            elif middle:
+            elif third == MIDDLE:
                 self.m1[i - 1, k - 1, j - 1] = value
-            else:
+            elif third == LAST:
                 self.m1[i - 1, j - 1, k - 1] = value
+            else:
+                stored[(j - 1) * columns * rows + (i - 1) * columns + k - 1] = value
+        if third == EMBSLIB:
+            self.m1 = stored.reshape(rows, modes, columns).transpose(0, 2, 1)
         if header["structure"] == 2:
             # One triangle or both.
             for part in [self.m0, *np.moveaxis(self.m1, 2, 0)]:
@@ -44,7 +53,7 @@ class Taylor:
         return self.m0 + self.m1 @ q
 
 
-def objects(text, middle):
+def objects(text, third):
     """Mass, number of modes, objects of the body, and those of each frame by its number."""
     mass = modes = None
     body, frames, current, header, entries, target = {}, {}, None, {}, [], None
@@ -67,7 +76,7 @@ def objects(text, middle):
         elif word in ("order", "nrow", "ncol", "nq", "nqn", "structure"):
             header[word] = int(value)
         elif line.strip().startswith("end ") and current and line.strip()[4:].strip().lower() == current.lower():
-            (body if target is None else target)[current] = Taylor(header, entries, modes, middle)
+            (body if target is None else target)[current] = Taylor(header, entries, modes, third)
             current, header, entries = None, {}, []
         elif re.fullmatch(r"\s*(origin|phi|psi|AP|sigma|mdCM|mCM|J|mmi|Ct|Cr|Me|Gr|Ge|Oe|ksigma|Ke|De)\s*", line):
             current, header, entries = line.strip(), {}, []
@@ -77,9 +86,14 @@ def objects(text, middle):
 class Sid(Equations):
     order = "first"
 
+    ARRAYS = {"m": "m", "md.m0": "mL", "md.m1": "s", "j.m0": "mL2", "j.m1": "sL", "ct.m0": "s", "cr.m0": "sL", "cr.m1": "1", "me": "1", "gr": "sL", "ge": "1", "oe.m0": "sL", "oe.m1": "1",
+              "ke": "own", "de": "own"}
+
     def __init__(self, path, dialect):
-        gr_by, ge_by, middle = DIALECTS[dialect]
-        self.m, nf, body, frames = objects(path.read_text(), middle)
+        gr_by, ge_by, third = DIALECTS[dialect]
+        self.m, nf, body, frames = objects(path.read_text(), third)
+        # Frames have numbers of their own, in the order of the places.
+        self.counted = dialect == "embs"
         self.modes = nf
         get = lambda *names: next(body[name] for name in names if name in body)
         self.md, self.j, self.ct, self.cr, self.oe = get("mdCM", "mCM"), get("J", "mmi"), get("Ct"), get("Cr"), get("Oe")

@@ -1,0 +1,287 @@
+"""Runs every check on every format, with a limit and its reason for each, and writes the table of docs/export.md."""
+
+import re
+import subprocess
+from dataclasses import dataclass
+
+import numpy as np
+
+import common
+from common import Absent, Row
+
+from . import bodies, checks
+
+COLUMNS = ["shapes", "accelerations", "gravity", "force", "moment", "deflection", "damping", "units", "frames", "carried frames", "rotations"]
+# Limits and their reasons. Numbers of a file have 15 to 17 digits; forces and accelerations are sums of some thousands of products of them.
+ROUNDING = 1e-10
+# Static solutions and K of the modes: rigid motion strains the matrices of the fixtures, of 14 digits, by 1e-10 of the first mode.
+STIFFNESS = 1e-8
+# openradioss: fields of 16 columns have 11 to 15 digits, of numbers about the ends of axes of length one.
+COLUMNS_OF_16 = 1e-8
+# Numbers of 24 bits: eight roundings of them in an entry that counts.
+SINGLE = 1e-6
+# Differences of numbers of 24 bits over amplitudes of a twentieth, and products with K.
+SINGLE_SLOPE = 1e-4
+
+SOLID = [("bolt_base", "rigid", [42.0, 24.0, 10.0], None), ("bolt_wall", "averaging", [6.0, 24.0, 38.0], None)]
+BEAMS = [(name, "rigid", None, None) for name in ("front_left", "front_right", "rear_left", "rear_right")]
+REGION = [("weight", "rigid", None, [500]), ("end", "averaging", [-0.01, 0.08, 0.05], list(range(1, 12)))]
+
+MARKS = {"first": "1", "undeformed": "2", "rest": "3", "small": "4"}
+NOTES = {
+    "1": "To first order in q, q' and q'', at any angular velocity: SID has mdCM, J and Cr to first order, and directors of nodes that turn are in $T$ to second order (theory 6.2a).",
+    "2": "At q = 0, to first order in q' and q'': the format has no stiffness of inertia of nodes that turn. Of mbdyn, which has it, for the beams only: it has no symmetric part of W3.",
+    "3": "At q = q' = 0 at any angular velocity, and without angular velocity to first order: the engine has no terms of it with q and q'.",
+    "4": "Without angular velocity, to first order: no groups 14 to 18.",
+    "5": "Small motions at rest: receptances at three frequencies between all interfaces. Deflection under gravity, beside its resultants, is in the column of gravity.",
+    "6": "Masses of the nodes come from the deck: gravity acts on these.",
+    "7": "Rayleigh damping only, an argument of `AddObjectFFRFreducedOrder`.",
+    "8": "In metres and in single precision, whatever the units of the body are. Angles between the modes: each is drawn with a factor of its own.",
+    "9": "On the axes $e^{\\tilde\\theta}$ at a random q (theory 6.8).",
+}
+
+
+@dataclass
+class Cell:
+    """One entry: the largest difference and its limit, or why there is none."""
+
+    found: float = None
+    limit: float = 0.0
+    marks: str = ""
+
+    def good(self):
+        return self.found is None or self.found <= self.limit
+
+    def text(self):
+        marks = "".join(f"<sup>{mark}</sup>" for mark in self.marks)
+        if self.found is None:
+            return "not held" + marks
+        number = f"{self.found:.0e}"
+        return (number if self.good() else f"**{number}**") + marks
+
+
+NOT_HELD = Cell()
+
+
+class Bench:
+    """The bodies of a run. `quick`: fewer of them, for CI."""
+
+    def __init__(self, flexbody, folder, quick):
+        self.flexbody, self.folder, self.quick = flexbody, folder, quick
+        self.told = subprocess.run([str(flexbody), "convert", "--help"], capture_output=True, text=True).stdout
+        solid = bodies.Source(folder, "bracket_hex20", SOLID, 6, damped=True)
+        region = bodies.Source(folder, "mpc_block", REGION, 6, damped=True)
+        make = lambda source, frame: bodies.Body(flexbody, source, frame, folder)
+        self.solid, self.region = make(solid, "com"), make(region, "com")
+        self.dialects = [name for name in bodies.sid.DIALECTS if self.has_dialect(name)]
+        # One unit of the model in m and kg.
+        self.other = solid.model.scaled(1e-3, 1e3)
+        self.frames, self.carried, self.turning = [], [], [self.region]
+        if not quick:
+            self.frames = [make(solid, "principal"), make(solid, "model"), make(region, "model")]
+            beams = bodies.Source(folder, "car_frame", BEAMS, 3, damped=True)
+            self.turning += [make(beams, "com"), make(beams, "principal")]
+        if "interface=" in self.told:
+            self.carried = [make(solid, "interface=bolt_base")] + ([] if quick else [make(solid, "interface=bolt_wall"), make(region, "interface=weight")])
+
+    def has_dialect(self, name):
+        """True if `export` of the program that runs knows the dialect of sid."""
+        words = [self.flexbody, "export", self.solid.path, "--to", "sid", "--dialect", name, "--allow-loss", "--quiet", "-o", self.folder / f"{name}.SID_FEM"]
+        told = subprocess.run([str(word) for word in words], capture_output=True, text=True)
+        # FB801: the usage is wrong.
+        return "FB801" not in told.stderr
+
+
+def evaluated(target, body, model, order=None, units=None):
+    """Results of all checks of a target on a body, by the names of the columns."""
+    equations = body.read(target, units)
+    return checked(equations, target, body, model, order)
+
+
+def checked(equations, target, body, model, order=None, oracle=None):
+    """`oracle`: the nodes with the shapes of the file, and how far off their places are; else they are made of the file."""
+    nodes, wrong = oracle or bodies.nodes_of(equations, body, model)
+    scale = checks.Scale(nodes)
+    if order is None:
+        order = equations.order
+        if body.general and equations.order in ("exact", "first"):
+            order = target.general if not (target.to == "mbdyn" and nodes.rest is not None) else "undeformed"
+    free = not body.frame.startswith("interface=")
+    found = {
+        "order": order,
+        "shapes": checks.shapes(nodes, free, wrong),
+        "accelerations": checks.accelerations(equations, nodes, scale, order, equations.has_damping),
+        "gravity": checks.gravity(equations, nodes, scale, equations.gravity_order or order) if equations.has_gravity else None,
+        "force": checks.force(equations, nodes, scale, order),
+        "moment": checks.moment(equations, nodes, scale, order),
+        "deflection": checks.deflection(equations, nodes, scale),
+        "damping": checks.damping(equations, nodes, scale) if equations.has_damping else None,
+    }
+    return found
+
+
+def limits(target, order):
+    """Limits of the checks of a format."""
+    single = target.dialect == "float"
+    if single:
+        slope = order in ("first", "undeformed", "small")
+        return {"accelerations": SINGLE_SLOPE if slope else 10 * SINGLE, "deflection": 10 * SINGLE, "else": SINGLE}
+    if target.to == "openradioss":
+        return {"deflection": STIFFNESS, "else": COLUMNS_OF_16}
+    # Without spin the forces of stiff modes are the largest ones.
+    return {"deflection": STIFFNESS, "accelerations": STIFFNESS if order == "small" else ROUNDING, "else": ROUNDING}
+
+
+def limit(target, order, column):
+    found = limits(target, order)
+    return found.get(column, found["else"])
+
+
+def cell(target, results, column):
+    """Largest of a column over results, each over its limit; the entry is that which is nearest to its limit."""
+    pairs = [(result[column], limit(target, result["order"], column), result["order"]) for result in results]
+    if any(found is None for found, _, _ in pairs):
+        return NOT_HELD
+    found, most, _ = max(pairs, key=lambda pair: pair[0] / pair[1])
+    orders = {order for _, _, order in pairs if order in MARKS} if column == "accelerations" else set()
+    return Cell(found, most, "".join(sorted(MARKS[order] for order in orders)))
+
+
+PHYSICS = ["accelerations", "gravity", "force", "moment", "deflection"]
+
+
+def whole(target, results):
+    """One entry for all checks of bodies that a column is about; what a format has no place for has columns of its own."""
+    if not results:
+        return Cell(marks="")
+    pairs = []
+    for result in results:
+        for column in PHYSICS + (["damping"] if result["damping"] is not None else []):
+            if result[column] is not None:
+                pairs.append((result[column], limit(target, result["order"], column)))
+    found, most = max(pairs, key=lambda pair: pair[0] / pair[1])
+    orders = {result["order"] for result in results if result["order"] in MARKS}
+    return Cell(found, most, "".join(sorted(MARKS[order] for order in orders)))
+
+
+def flexible(target, bench):
+    """The entries of a format with equations of the floating frame."""
+    own = evaluated(target, bench.solid, bench.solid.source.model)
+    cells = {column: cell(target, [own], column) for column in COLUMNS[:7]}
+    if cells["gravity"] is NOT_HELD:
+        cells["gravity"] = Cell(marks="6")
+    if cells["damping"] is NOT_HELD:
+        cells["damping"] = Cell(marks="7")
+    if target.to == "embedded":
+        cells["moment"].marks = "9"
+    cells["units"] = whole(target, [evaluated(target, bench.solid, bench.other, units="m,kg,s")])
+    each = lambda some: [evaluated(target, body, body.source.model) for body in some]
+    cells["frames"], cells["carried frames"] = whole(target, each(bench.frames)), whole(target, each(bench.carried))
+    cells["rotations"] = whole(target, each(bench.turning))
+    return cells
+
+
+def reference(bench, body, model):
+    """The oracle of a body for formats without shapes: with the shapes of npz."""
+    npz = next(target for target in bodies.targets([]) if target.name == "npz")
+    nodes, wrong = bodies.nodes_of(body.read(npz), body, body.source.model)
+    assert checks.shapes(nodes, not body.frame.startswith("interface="), wrong) < STIFFNESS
+    if model is not body.source.model:
+        factor = model.x.ravel() @ body.source.model.x.ravel() / (body.source.model.x.ravel() @ body.source.model.x.ravel())
+        # Mass-normalised shapes of the same motion.
+        mass = model.m.sum() / body.source.model.m.sum()
+        nodes = bodies.Nodes(model, factor * nodes.origin, nodes.axes, nodes.psi / np.sqrt(mass), None)
+    return checks.Coordinates(nodes)
+
+
+def coordinates(target, bench):
+    """The entries of Chrono and Simscape."""
+
+    def results(body, model, units=None):
+        matrices, oracle = body.read(target, units), reference(bench, body, model)
+        first, second = slice(0, 3), slice(3, 6)
+        return {
+            "points": checks.points(matrices, oracle),
+            "accelerations": checks.small_motion(matrices, oracle, False),
+            "gravity": max(checks.weight(matrices, oracle), checks.sag(matrices, oracle)),
+            "force": checks.small_motion(matrices, oracle, False, first),
+            "moment": checks.small_motion(matrices, oracle, False, second),
+            "deflection": checks.static(matrices, oracle),
+            "damping": checks.small_motion(matrices, oracle, True),
+        }
+
+    # Receptances near a resonance and static solutions: digits of K.
+    def entry(results, columns, marks=""):
+        if not results:
+            return Cell()
+        return Cell(max(result[column] for result in results for column in columns), STIFFNESS, marks)
+
+    own = [results(bench.solid, bench.solid.source.model)]
+    cells = {column: entry(own, [column]) for column in COLUMNS[2:7]}
+    cells["shapes"] = NOT_HELD
+    cells["accelerations"] = entry(own, ["points", "accelerations"], "5")
+    every = ["points", *PHYSICS, "damping"]
+    cells["units"] = entry([results(bench.solid, bench.other, "m,kg,s")], every)
+    each = lambda some: [results(body, body.source.model) for body in some]
+    cells["frames"], cells["carried frames"], cells["rotations"] = (entry(each(some), every) for some in (bench.frames, bench.carried, bench.turning))
+    return cells
+
+
+def drawn(target, bench):
+    """The entries of pictures: shapes and places, also of other frames; of nodes that turn those of vtk, which has rotations."""
+    single = target.to == "gltf"
+
+    def entry(some, model=None, units=None):
+        if not some:
+            return Cell()
+        found = max(checks.drawn(body.read(target, units), model or body.source.model, single) for body in some)
+        return Cell(found, SINGLE if single else ROUNDING, "8" if single else "")
+
+    cells = {column: NOT_HELD for column in COLUMNS}
+    cells["shapes"] = entry([bench.solid])
+    cells["frames"] = entry([body for body in bench.frames if not (single and body.general)])
+    if not single:
+        cells["units"] = entry([bench.solid], bench.other, "m,kg,s")
+        cells["rotations"] = entry(bench.turning)
+    return cells
+
+
+def run(flexbody, folder, quick=False):
+    """Entries of all formats by name and column, and notes of what was not run."""
+    bench, found, absent = Bench(flexbody, folder, quick), {}, []
+    for target in bodies.targets(bench.dialects):
+        try:
+            found[target.name] = flexible(target, bench)
+        except Absent as missing:
+            absent.append(f"{target.name}: {missing}")
+    for target in [bodies.CHRONO, *bodies.SIMSCAPE]:
+        found[target.name] = coordinates(target, bench)
+    for target in [bodies.VTK, bodies.GLTF]:
+        found[target.name] = drawn(target, bench)
+    if not bench.carried:
+        for cells in found.values():
+            del cells["carried frames"]
+    if quick:
+        for cells in found.values():
+            del cells["frames"]
+    return found, absent
+
+
+def columns_of(found):
+    return [column for column in COLUMNS if all(column in cells for cells in found.values())]
+
+
+def rows(found):
+    """Rows of the suite: one for each entry that has a number."""
+    return [Row("all nodes", name, f"equations of the target: {column}", cells[column].found, cells[column].limit)
+            for name, cells in found.items() for column in columns_of(found) if cells[column].found is not None]
+
+
+def text(found, absent):
+    columns = columns_of(found)
+    lines = ["| format | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
+    lines += [f"| {name} | " + " | ".join(cells[column].text() for column in columns) + " |" for name, cells in found.items()]
+    used = sorted({mark for cells in found.values() for column in columns for mark in cells[column].marks})
+    notes = "".join(f"\n<sup>{mark}</sup> {NOTES[mark]}\n" for mark in used)
+    missing = f"\nNot at hand when this was written: {'; '.join(absent)}.\n" if absent else ""
+    return "\n".join(lines) + "\n" + notes + missing
