@@ -61,7 +61,7 @@ class Adams(Equations):
 
 
 class AdamsText(Adams):
-    """The dialect `text`: a line with name and extents, then the numbers."""
+    """The dialect `text` has a line with name and extents before the numbers of each quantity."""
 
     def __init__(self, path):
         get, places, nodes, target = {}, {}, [], None

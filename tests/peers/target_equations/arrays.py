@@ -10,7 +10,7 @@ SPIN = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "yz": (1, 2), "x
 
 
 class Arrays(Equations):
-    """`get` maps a path to an array; `names` are all paths."""
+    """`arrays` maps paths to arrays, `attributes` groups to their attributes."""
 
     ARRAYS = {"m": "m", "c": "mL", "i0": "mL2", "c1": "s", "c2": "sL", "w1": "sL", "w2": "1", "w3": "1", "mff": "1", "kff": "own", "d": "own"}
 

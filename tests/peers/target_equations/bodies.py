@@ -17,10 +17,10 @@ ALPHA, BETA = 30.0, 1e-7
 
 
 class Source:
-    """A fixture with couplings and reference points for its interfaces, converted with the Craig-Bampton basis: static deflections at interfaces are then those of all nodes."""
+    """A fixture with couplings and reference points for its interfaces. Its bodies have a Craig-Bampton basis, so that static deflections at interfaces are those of all nodes."""
 
     def __init__(self, folder, fixture, interfaces, fixed_modes, damped=False):
-        """`interfaces`: name, coupling, reference point or None for the only node, nodes or None for those of the fixture."""
+        """`interfaces` has tuples of name, coupling, reference point (None: the only node) and nodes (None: those of the fixture)."""
         self.folder, self.fixed_modes = folder / fixture, fixed_modes
         shutil.copytree(ROOT / "fixtures/models" / fixture, self.folder)
         path = self.folder / "model.toml"
@@ -45,12 +45,12 @@ class Source:
         self.model = Model(self.folder, self.interfaces, Damping(ALPHA, BETA) if damped else Damping())
 
     def alone(self, node):
-        """The interface that this node is by itself, or None."""
+        """Returns the name of the interface that consists of this node alone, or None."""
         return next((i.name for i in self.interfaces if i.nodes == [node]), None)
 
 
 class Body:
-    """A source in a frame: the flex-body file and the files of all formats, made when they are asked for."""
+    """A source in a frame, with the files of all formats, which are written on first use."""
 
     def __init__(self, flexbody, source, frame, folder):
         self.flexbody, self.source, self.frame = flexbody, source, frame
@@ -62,11 +62,11 @@ class Body:
             self.general = file["source"].attrs["mass_structure"] == "general"
             self.modes = len(file["modes/eigenvalue"])
             rotation = file["modes/rotation"][()] if "rotation" in file["modes"] else None
-            # Of formats that have no rotations of nodes: shapes of the same modes.
+            # Rotations of the nodes in the modes, for formats that have none.
             self.rotation = None if rotation is None else rotation.transpose(1, 2, 0)
 
     def file(self, target, units=None):
-        """Path of the export; `units`: of length, mass and time."""
+        """Returns the path of the exported file. `units` are those of length, mass and time, by default those of the body."""
         to, dialect, suffix, options = target.to, target.dialect, target.suffix, []
         path = self.folder / f"{to} {dialect or 'usual'} {'other' if units else 'own'}" / f"body{suffix}"
         if not path.exists():
@@ -80,23 +80,24 @@ class Body:
         return path
 
     def read(self, target, units=None):
+        """Returns the equations of the file as the reader of the format forms them."""
         return target.reader(self.file(target, units), self)
 
 
 class Target:
-    """A row of the table: a format, a dialect, and what reads its file. `places`: the format takes `--points`."""
+    """A row of the table: a format and dialect with the reader of its files. `places` is true if the format has the option `--points`."""
 
     def __init__(self, name, to, reader, suffix="", dialect=None, places=True, general="undeformed"):
         self.name, self.to, self.dialect, self.suffix, self.places = name, to, dialect, suffix, places
         self.reader = reader
-        # How far the equations hold for nodes that turn.
+        # Order to which the equations hold for nodes that turn.
         self.general = general
-        # True if the format shows some of the modes unless it is told to show all.
+        # True if the format shows some of the modes unless `--modes` asks for all.
         self.all_modes = False
 
 
 def targets(dialects):
-    """Every format and dialect; `dialects` of sid are those that the program has."""
+    """Returns all formats with equations of the floating frame. `dialects` are those of sid that the program has."""
     found = [Target("exudyn", "exudyn", lambda path, body: exudyn.Exudyn(path), ".hdf5")]
     for dialect in dialects:
         found.append(Target(f"sid, {dialect}", "sid", lambda path, body, dialect=dialect: sid.Sid(path, dialect), ".SID_FEM", dialect, general="first"))
@@ -123,7 +124,7 @@ GLTF.all_modes = True
 
 
 def fit(positions, places):
-    """Origin and axes of the frame in which the nodes have `positions`, `places` being those in the model: x_model = origin + axes x."""
+    """Returns origin and axes of the frame in which points with the given `places` in the model have `positions`, and the relative error: x_model = origin + axes x."""
     centre, other = positions.mean(0), places.mean(0)
     u, _, v = np.linalg.svd((places - other).T @ (positions - centre))
     axes = u @ np.diag([1, 1, np.linalg.det(u @ v)]) @ v
@@ -133,7 +134,7 @@ def fit(positions, places):
 
 
 def nodes_of(equations, body, model):
-    """The oracle with the shapes and the frame of the file, and by how much the places of its nodes are off, relative to the extent."""
+    """Returns the oracle with the shapes and the frame of the file, and the largest error of the places of its nodes relative to the extent."""
     source = body.source
     names = {source.alone(node): node for node in model.ids if source.alone(node)}
     # Labels of mbdyn: an interface that is a node by itself has its name, reference points are no nodes.

@@ -1,4 +1,4 @@
-"""Embedded: the C99 header of the body, compiled and called. It evaluates the equations of docs/formats/embedded.md from the numbers beside it.
+"""Embedded: this module compiles and calls the C99 header of the body, which evaluates the equations of docs/formats/embedded.md from the numbers beside it.
 
 The header takes velocities of the origin along body axes: it is called with a velocity of flight, of which the accelerations may not depend.
 """
@@ -48,7 +48,6 @@ class Embedded(Equations):
         subprocess.run([compiler, "-std=c99", "-O2", "-shared", "-fPIC", source.name, "-o", library.name], cwd=path.parent, check=True, capture_output=True)
         self.library = ctypes.CDLL(str(library))
         self.type = np.float64 if define("PRECISION") == 8 else np.float32
-        self.rounding = 0.0 if self.type == np.float64 else 6e-8
         # A multiple of 64, as the header wants it.
         data = np.fromfile(path, np.uint8)
         room = np.zeros(len(data) + 64, np.uint8)
@@ -63,7 +62,7 @@ class Embedded(Equations):
         self.places = self.frames(define("FRAMES"), data)
 
     def frames(self, count, data):
-        """Places by the functions of the header at q = 0 and with one mode at a time; their numbers from the table of docs/formats/embedded.md."""
+        """Returns the places by the functions of the header, one mode at a time. Numbers come from the table of docs/formats/embedded.md."""
         nf = self.modes
         start = lambda entry: int.from_bytes(bytes(data[entry : entry + 4]), "little")
         at = start(232)

@@ -1,4 +1,4 @@
-"""What every reader of this folder makes of a file: equations of motion along body axes, with the acceleration of the frame's origin, the angular acceleration and q'' as unknowns."""
+"""Interface of all readers: equations of motion along body axes with the acceleration a of the frame's origin, the angular acceleration alpha and q'' as unknowns."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from .oracle import skew
 
 @dataclass
 class Place:
-    """A place of the file: position, and translation and rotation in every mode (3 x modes); no rotation where the file has none."""
+    """A place of the body in a file: its position, and its translation and rotation in every mode (3 x modes). `rotation` is None where the file has none."""
 
     position: np.ndarray
     translation: np.ndarray
@@ -17,59 +17,60 @@ class Place:
 
 
 class Equations:
-    """The equations that a program forms from its file. `places` are all places of the file by their number or name."""
+    """The equations that a program forms from its file. `places` maps numbers or names to the places of the file."""
 
-    # How far the equations of the program go: "exact"; "first" order in q, q', q''; "undeformed": at q = 0, linear in q' and q''; "rest": at q = q' = 0, linear in q'';
-    # "small": without angular velocity, linear in q, q', q''.
+    # Order to which the equations of the program hold: "exact"; "first": linear in q, q', q''; "undeformed": at q = 0, linear in q' and q''; "rest": at q = q' = 0,
+    # linear in q''; "small": linear in q, q', q'' without angular velocity.
     order = "exact"
-    # The same of gravity, where it is another.
+    # Order to which gravity holds, where it differs from `order`.
     gravity_order = None
     has_damping = True
     has_gravity = True
-    # True if a moment acts on the axes exp(theta~) of a place, and not on small rotations.
+    # True if a moment does work on the axes exp(theta~) of a place instead of on small rotations.
     finite_moments = False
-    # Significant digits of the numbers of the file, as a relative rounding.
-    rounding = 0.0
-    # What a reader keeps of the arrays of its file, and the kind of each: see selftest.py.
+    # Attributes of a reader that are arrays of its file, with the kind of each (selftest.py).
     ARRAYS = {}
 
     def mass(self, q):
-        """Mass matrix of (a, alpha, q'')."""
+        """Returns the mass matrix of (a, alpha, q'')."""
         raise NotImplementedError
 
     def velocity_forces(self, q, w, qd):
-        """Forces that the velocities take, on the left side."""
+        """Returns the terms of the velocities on the left side."""
         raise NotImplementedError
 
     def elastic(self, q, qd):
-        """Stiffness and damping on the left side, modal forces only."""
+        """Returns the modal forces of stiffness and damping on the left side."""
         raise NotImplementedError
 
     def gravity(self, q, g):
+        """Returns the generalised forces of gravity g, given along body axes."""
         raise NotImplementedError
 
     def force(self, place, q, force):
-        """Generalised forces of a force at a place, body axes."""
+        """Returns the generalised forces of a force at a place, in body axes."""
         return np.concatenate([force, np.cross(place.position + place.translation @ q, force), place.translation.T @ force])
 
     def moment(self, place, q, moment):
-        """Generalised forces of a moment at a place; None where the file has no rotation of it."""
+        """Returns the generalised forces of a moment at a place, or None where the file has no rotation of the place."""
         if place.rotation is None:
             return None
         return np.concatenate([np.zeros(3), moment, place.rotation.T @ moment])
 
     def balance(self, q, w, qd, a, alpha, qdd):
+        """Returns the left side: force, moment about the origin and modal forces that a motion takes."""
         out = self.mass(q) @ np.concatenate([a, alpha, qdd]) + self.velocity_forces(q, w, qd)
         out[6:] += self.elastic(q, qd)
         return out
 
     def accelerations(self, q, w, qd, applied):
+        """Returns (a, alpha, q'') under applied generalised forces."""
         out = applied - self.velocity_forces(q, w, qd)
         out[6:] -= self.elastic(q, qd)
         return np.linalg.solve(self.mass(q), out)
 
     def at(self, position, extent):
-        """The place nearest to a position, which must be there."""
+        """Returns the place at a position. Raises LookupError if no place lies there."""
         place = min(self.places.values(), key=lambda place: np.linalg.norm(place.position - position))
         distance = np.linalg.norm(place.position - position)
         if distance > 1e-6 * extent:
@@ -78,9 +79,9 @@ class Equations:
 
 
 def lagrange(mass, q, w, qd, step):
-    """Forces that the velocities take, of the kinetic energy with the mass matrix mass(q) of (V, w, q'), by the equations of Kirchhoff at V = 0.
+    """Returns the terms of the velocities for a kinetic energy with the mass matrix mass(q) of (V, w, q'), by the equations of Kirchhoff at V = 0.
 
-    The mass matrix is quadratic in q, so that central differences with any `step` are its derivatives.
+    The mass matrix must be quadratic in q: its derivatives are central differences with `step`.
     """
     nf = len(q)
     nu = np.concatenate([np.zeros(3), w, qd])
@@ -94,6 +95,6 @@ def lagrange(mass, q, w, qd, step):
 
 
 def assemble(mass, first_moment, c1, inertia, coupling, modal):
-    """Mass matrix of its blocks."""
+    """Returns the mass matrix put together from its blocks."""
     lever = skew(first_moment)
     return np.block([[mass * np.eye(3), -lever, c1], [lever, inertia, coupling], [c1.T, coupling.T, modal]])

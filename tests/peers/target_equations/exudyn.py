@@ -45,7 +45,7 @@ class Exudyn(Equations):
         self.order = "undeformed" if self.general else "exact"
 
     def whole_nodes(self, interfaces):
-        """A node that is an interface by itself has six nodes around it in the file: their mean is the node."""
+        """Adds the nodes that are interfaces by themselves: the file has six nodes around each, and their mean is the node."""
         for key, nodes in interfaces.items():
             number = set(self.ids[nodes])
             if len(nodes) > 1 and len(number) == 1:

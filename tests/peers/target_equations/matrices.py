@@ -20,14 +20,14 @@ from .oracle import skew
 
 
 class Matrices:
-    """`points`: reference points of the interfaces in the body frame, six coordinates each at the head of the matrices."""
+    """K, M and damping. The first coordinates are six for each interface, whose reference points in the body frame are `points`."""
 
     def __init__(self, k, m, d, points):
         self.k, self.m, self.d, self.points = k, m, d, points
         self.boundary = 6 * len(points)
 
     def rigid(self):
-        """Six rigid motions about the origin of the body frame in the coordinates of the interfaces."""
+        """Returns the six rigid motions about the origin of the body frame in the coordinates of the interfaces."""
         out = np.zeros((self.boundary, 6))
         for i, point in enumerate(self.points):
             out[6 * i : 6 * i + 3, :3] = np.eye(3)
@@ -36,17 +36,18 @@ class Matrices:
         return out
 
     def gravity_rigid(self, g):
-        """Force and moment about the origin of gravity: on rigid motion of the boundary, which takes everything else along."""
+        """Returns force and moment of gravity about the origin: its generalised forces on rigid motions of the interfaces."""
         return self.rigid().T @ self.gravity(g)[: self.boundary]
 
     def static(self, held, load):
-        """Motion of the boundary under a load on all coordinates while the interface number `held` stays."""
+        """Returns the motion of all interfaces under a load on all coordinates with interface number `held` fixed."""
         free = [i for i in range(len(self.k)) if not 6 * held <= i < 6 * held + 6]
         out = np.zeros_like(load)
         out[free] = np.linalg.solve(self.k[np.ix_(free, free)], load[free])
         return out[: self.boundary]
 
     def compliance(self, held, loaded):
+        """Returns the motion of interface `loaded` under unit loads there with interface `held` fixed."""
         load = np.zeros((len(self.k), 6))
         load[6 * loaded : 6 * loaded + 6] = np.eye(6)
         return self.static(held, load)[6 * loaded : 6 * loaded + 6]
@@ -67,7 +68,7 @@ class Chrono(Matrices):
         self.assemble()
 
     def assemble(self):
-        """The reduction of Chrono."""
+        """Reduces the matrices as Chrono does."""
         b = 6 * len(self.points)
         k, m = self.file_k, self.file_m
         follow = -np.linalg.solve(k[b:, b:], k[b:, :b])
@@ -79,7 +80,7 @@ class Chrono(Matrices):
         super().__init__(reduced(k), reduced(m), reduced(self.file_d), self.points)
 
     def gravity(self, g):
-        """Generalised forces on the boundary coordinates and the modes, as IntLoadResidual_F collects them."""
+        """Returns the generalised forces of gravity on boundary coordinates and modes, as IntLoadResidual_F collects them."""
         size = len(self.file_m)
         moved = np.where(np.arange(size) % 6 < 3, np.tile(np.concatenate([g, np.zeros(3)]), size // 6), 0.0)
         whole = self.file_m @ moved
@@ -101,7 +102,7 @@ class Simscape(Matrices):
         super().__init__(get["K"], get["M"], get.get("C"), get["P0"])
 
     def gravity(self, g):
-        """M times a rigid translation: internal modes follow the frames only through M."""
+        """Returns M times the rigid translation by g."""
         motion = np.zeros(len(self.m))
         for i in range(len(self.points)):
             motion[6 * i : 6 * i + 3] = g

@@ -13,7 +13,7 @@ SQUARES = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)]
 
 
 def groups(text):
-    """Words of every record group; group 8 without the titles of its modes."""
+    """Returns the words of every record group without comment lines."""
     found, number = {}, None
     for line in text.splitlines():
         if line.startswith("** RECORD GROUP"):
@@ -70,7 +70,7 @@ class Mbdyn(Equations):
         return self.inv2 + self.inv3 @ q, inertia, self.inv4 + np.einsum("ajk,j->ak", self.inv5, q)
 
     def softening(self, indices, q):
-        """Matrices of group 19 with the given indices, times q."""
+        """Returns the matrices of group 19 with the given indices, times q."""
         zero = np.zeros(self.modes)
         return np.array([self.stiffening[i] @ q if i in self.stiffening else zero for i in indices])
 

@@ -13,7 +13,7 @@ from .equations import Equations, Place
 
 
 def numbers(lines):
-    """Fields of 16 columns, exponents with or without their letter."""
+    """Returns the numbers of fields of 16 columns. Exponents may lack their letter."""
     found = []
     for line in lines:
         for at in range(0, len(line.rstrip("\n")), 16):
@@ -26,8 +26,6 @@ def numbers(lines):
 class OpenRadioss(Equations):
     order = "rest"
     has_gravity = False
-    # Fields of 16 columns.
-    rounding = 5e-11
 
     ARRAYS = {"axes": "1", "alpha": "own", "beta": "own", "lm": "1", "ls": "own", "glm": "m", "cpm": "s", "cps": "own"}
 
@@ -69,7 +67,7 @@ class OpenRadioss(Equations):
         self.places = {number: Place(self.positions[i], self.shape[i], turn(i)) for i, number in enumerate(self.ids)}
 
     def tie(self):
-        """Accelerations of the rigid modes, axes of the model, of (a, alpha) along body axes at rest."""
+        """Returns the accelerations of the rigid modes, along axes of the model, for (a, alpha) along body axes."""
         out = np.zeros((self.nme, 6))
         for i in range(3):
             out[3 * i : 3 * i + 3, :3] = self.axes
@@ -97,7 +95,7 @@ class OpenRadioss(Equations):
         return self.ls * q + (self.alpha * self.lm + self.beta * self.ls) * qd
 
     def force(self, place, q, force):
-        """`MFEXT`: forces of the deck on the rows of the rigid and the local modes of the node, at the undeformed place."""
+        """Returns `MFEXT`: the force times the rows of the rigid and local modes of the node, at its undeformed place."""
         rows = next(self.rigid[:, i] for i, number in enumerate(self.ids) if self.places[number] is place)
         return np.concatenate([self.tie().T @ (rows[:, :3] @ (self.axes @ force)), place.translation.T @ force])
 

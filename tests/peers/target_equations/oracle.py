@@ -1,13 +1,13 @@
 """Equations of motion of all nodes of an FE model, from K, M and the positions of the nodes.
 
-Nothing here comes from flexbody or from a format. A node with rotations is a point and three directors, vectors that turn with it (docs/theory.md, section 6); a node
+This module shares no code with flexbody or with a reader of a format. A node with rotations is a point and three directors, vectors that turn with it (docs/theory.md, section 6); a node
 without rotations is a point. Points and directors have a constant mass `E`, one number for each pair. With the places z(q) of points and directors in the body frame, the
 acceleration of each along body axes is
 
-    gamma = a + alpha x z + w x (w x z) + 2 w x z' + z''        (no a for directors)
+    gamma = a + alpha x z + w x (w x z) + 2 w x z' + z''        (without a for directors)
 
-and the forces that a motion (a, alpha, q'') takes are the projections of E gamma on what the motion may do: sum of the points, moments z x E gamma, z_q' E gamma. For a
-solid z = x + Psi q, so that these equations are exact at any q. Directors are taken to the second order of their rotation.
+and the forces that a motion (a, alpha, q'') takes are the projections of E gamma: the sum over the points, the moments z x E gamma, and z_q' E gamma. For a
+solid z = x + Psi q, and these equations are exact at any q. Directors are taken to the second order of their rotation.
 
 What a consistent mass matrix of beams and shells holds beside E (`rest`) does not turn: it is multiplied by the velocities of the rows along body axes, (6.1) of the theory.
 Arrays are about the origin and along the axes of the body frame. `a` is the acceleration of its origin: no velocity of translation enters.
@@ -24,7 +24,7 @@ import scipy.sparse.linalg as spl
 
 
 def skew(v):
-    """Matrix of the cross product with v; of several vectors a stack of matrices."""
+    """Returns the matrix of the cross product with v, or a stack of them for a stack of vectors."""
     v = np.asarray(v, float)
     zero = np.zeros(v.shape[:-1])
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
@@ -32,7 +32,7 @@ def skew(v):
 
 
 def matrix(path):
-    """Sparse matrix of a Matrix Market file, compressed or not."""
+    """Reads a sparse matrix from a Matrix Market file, compressed or not."""
     if path.suffix == ".gz":
         with gzip.open(path) as file:
             return scipy.io.mmread(file).tocsr()
@@ -41,7 +41,7 @@ def matrix(path):
 
 @dataclass
 class Interface:
-    """Nodes that follow a reference point (`rigid`), or whose mean motion it follows (`averaging`); the point in model axes."""
+    """An interface: its nodes follow the reference point (`rigid`), or the reference point follows their mean motion (`averaging`). The point is in model axes."""
 
     name: str
     coupling: str
@@ -51,14 +51,14 @@ class Interface:
 
 @dataclass
 class Damping:
-    """Rayleigh damping: alpha in 1/time, beta in time."""
+    """Coefficients of Rayleigh damping, alpha M + beta K."""
 
     alpha: float = 0.0
     beta: float = 0.0
 
 
 class Model:
-    """K, M, nodes and interfaces of an FE model in model axes, in units of the model or in others (`scaled`)."""
+    """The FE model: K, M, nodes, interfaces and damping, in model axes."""
 
     def __init__(self, folder, interfaces, damping):
         self.k, self.m = matrix(folder / "K.mtx.gz"), matrix(folder / "M.mtx.gz")
@@ -74,7 +74,7 @@ class Model:
         self.split()
 
     def scaled(self, length, mass):
-        """The model of a solid in other units of length and mass: one unit of the model is `length` and `mass` of the new ones."""
+        """Returns the model of a solid in other units: one unit of length and mass of this model is `length` and `mass` units of the new one."""
         assert not self.turning, "rows of rotations would need units of their own"
         other = object.__new__(Model)
         other.__dict__.update(self.__dict__)
@@ -85,7 +85,7 @@ class Model:
         return other
 
     def split(self):
-        """E of points and directors, and `rest`, what the mass matrix holds beside: symmetric parts of the blocks of displacements and rotations, differences of axes."""
+        """Splits M into the mass `e` of points and directors and the `rest`: symmetric parts of the blocks that couple displacements and rotations, and parts of mass blocks that differ by direction."""
         n = len(self.ids)
         self.turning = sorted({i for i, axis in self.row if axis > 2})
         director = {i: n + 3 * k for k, i in enumerate(self.turning)}
@@ -128,7 +128,7 @@ class Model:
         self.rest = {at: block for at, block in rest.items() if np.abs(block).max() > 1e-11 * largest}
 
     def rest_matrix(self):
-        """`rest` with the rows (3 i + a) of displacements of all nodes, then those of rotations."""
+        """Returns `rest` as a matrix whose rows are the displacements of all nodes (3 i + a), then their rotations."""
         n = len(self.ids)
         at = lambda i, rotation: 3 * i + (3 * n if rotation else 0)
         rows, columns, values = [], [], []
@@ -138,10 +138,7 @@ class Model:
         return sp.csr_matrix((values, (rows, columns)), (6 * n, 6 * n))
 
     def fit(self, interface):
-        """Weights A of (5.3) of an interface: the translation and rotation of its reference point are A' u, with u the rows of its nodes in model axes.
-
-        Returns row numbers and A (rows x 6). A single node with rotations is the point itself, moved by its lever.
-        """
+        """Returns the matrix rows of an interface and their displacements under the six motions of its reference point (R of theory 5.3)."""
         rows, motions = [], []
         for node in interface.nodes:
             i = self.index[node]
@@ -157,22 +154,23 @@ class Model:
         return np.array(rows), r
 
     def weights(self, interface):
+        """Returns the matrix rows of an interface and the weights A = R (R'R)^-1: the motion of its reference point is A' u (theory 5.3)."""
         rows, r = self.fit(interface)
         return rows, r @ np.linalg.inv(r.T @ r)
 
     def compliance(self, held, loaded):
-        """Motion of the reference point of `loaded` (model axes) under unit forces and moments there, 6 x 6, while that of `held` stays: of all nodes, without modes."""
+        """Returns the motion (6 x 6, model axes) of the reference point of `loaded` under unit forces and moments there with the point of `held` fixed. No modes are involved."""
         key = held.name, loaded.name
         if key not in self.solved:
             self.solved[key] = self.static(held, loaded, np.eye(6), None)
         return self.solved[key]
 
     def sag(self, held, watched, gravity):
-        """Motion of the reference point of `watched` under gravity (model axes), while that of `held` stays: of all nodes, without modes."""
+        """Returns the motion (6, model axes) of the reference point of `watched` under gravity with the point of `held` fixed. No modes are involved."""
         return self.static(held, watched, np.zeros((6, 1)), gravity)
 
     def static(self, held, loaded, forces, gravity):
-        """Static solution with the coupling of every interface: rigid ones by elimination, averaging ones by multipliers."""
+        """Solves the static equations of all nodes. Rigid interfaces are eliminated; the held one, where it is averaging, is fixed by multipliers."""
         n = self.k.shape[0]
         taken, columns = set(), []
         for interface in self.interfaces:
@@ -190,7 +188,7 @@ class Model:
             for row, motion in zip(rows, r):
                 t[row, len(free) + 6 * k : len(free) + 6 * k + 6] = motion
         t = t.tocsr()
-        # One row for each condition: what picks the motion of an interface out of the unknowns.
+        # Rows that pick the motion of a reference point out of the unknowns.
         pick = {}
         for interface in (held, loaded):
             if interface.coupling == "rigid":
@@ -210,7 +208,7 @@ class Model:
         return pick[loaded.name] @ solved[: t.shape[1]]
 
     def rigid(self, origin):
-        """The six rigid motions about a point, by rows of the matrices, model axes."""
+        """Returns the six rigid motions about a point at all matrix rows, in model axes."""
         r = np.zeros((self.k.shape[0], 6))
         for (i, axis), row in self.row.items():
             if axis < 3:
@@ -222,17 +220,17 @@ class Model:
 
 
 class Nodes:
-    """The model in a body frame with shapes of all nodes: restricted equations of motion."""
+    """The model in a body frame, restricted to rigid motion and modes given at all nodes: its equations of motion."""
 
     def __init__(self, model, origin, axes, translations, rotations=None):
-        """`axes`: columns are the body axes in model axes. `translations`, `rotations` (nodes x 3 x modes) along body axes, in the order of the nodes of the model."""
+        """`axes` has the body axes in model axes as columns. `translations` and `rotations` (nodes x 3 x modes) are along body axes, in the node order of the model."""
         self.model, self.origin, self.axes = model, np.asarray(origin), np.asarray(axes)
         n, nf = len(model.ids), translations.shape[2]
         self.nf = nf
         self.x = (model.x - self.origin) @ self.axes
         self.psi = translations
         self.theta = np.zeros((n, 3, nf)) if rotations is None else rotations
-        # Directors are the axes of the model seen from the body: the rows of `axes`.
+        # The directors at rest are the axes of the model along body axes: the rows of `axes`.
         self.point = np.zeros(model.size)
         self.point[:n] = 1
         rows = np.zeros((model.k.shape[0], nf))
@@ -245,17 +243,24 @@ class Nodes:
         if model.rest:
             turn = sp.kron(sp.eye(2 * n), sp.csr_matrix(self.axes))
             self.rest = (turn.T @ model.rest_matrix() @ turn).tocsr()
+            # First moment of `rest` at rest, and of each mode.
+            whole = self.rest[:, : 3 * n] @ np.tile(np.eye(3), (n, 1))
+            self.rest_modes = whole[: 3 * n].T @ translations.reshape(3 * n, nf) + whole[3 * n :].T @ self.theta.reshape(3 * n, nf)
+            block = whole[: 3 * n].T @ -skew(self.x).reshape(3 * n, 3) + whole[3 * n :].T @ np.tile(np.eye(3), (n, 1))
+            self.rest_first = np.array([block[1, 2] - block[2, 1], block[2, 0] - block[0, 2], block[0, 1] - block[1, 0]]) / 2
+            row_sums = model.e @ self.point
+            self.centre = (row_sums @ self.places(np.zeros(nf)) + self.rest_first) / row_sums[:n].sum()
         else:
             self.rest = None
 
     def undamped(self):
-        """The same without damping, for formats that have no place for it."""
+        """Returns a copy without damping, for formats that have no place for damping."""
         other = copy.copy(self)
         other.damping = 0 * self.damping
         return other
 
     def shapes(self, q):
-        """z_q: motion of points and directors for each mode; of directors to first order in q."""
+        """Returns z_q, the motion of points and directors in each mode. Directors are exact to first order in q."""
         turns = self.theta[self.model.turning]
         if not len(turns):
             return self.psi
@@ -268,24 +273,24 @@ class Nodes:
         return np.concatenate([self.psi, moved.reshape(-1, 3, self.nf)])
 
     def places(self, q):
-        """z: places of points and directors; directors turn to second order in q."""
+        """Returns z, the places of points and directors. Directors are exact to second order in q."""
         now = skew(self.theta[self.model.turning] @ q)
         turned = np.einsum("nxy,ay->nax", np.eye(3) + now + now @ now / 2, self.axes)
         return np.vstack([self.x + self.psi @ q, turned.reshape(-1, 3)])
 
     def bent(self, qd):
-        """z_qq [q', q']: of directors only."""
+        """Returns z_qq [q', q'], which is zero at points."""
         rate = skew(self.theta[self.model.turning] @ qd)
         return np.vstack([np.zeros_like(self.x), np.einsum("nxy,ay->nax", rate @ rate, self.axes).reshape(-1, 3)])
 
     def balance(self, q, w, qd, a, alpha, qdd):
-        """Force, moment about the origin and modal forces that a motion takes: inertia, stiffness and damping."""
+        """Returns force, moment about the origin and modal forces that a motion takes: inertia, stiffness and damping."""
         out = self.inertia(q, w, qd, a, alpha, qdd)
         out[6:] += self.stiffness @ q + self.damping @ qd
         return out
 
     def inertia(self, q, w, qd, a, alpha, qdd):
-        """Forces of inertia alone."""
+        """Returns force, moment about the origin and modal forces of inertia."""
         z, zq = self.places(q), self.shapes(q)
         zd = zq @ qd
         gamma = np.outer(self.point, a) + np.cross(alpha, z) + np.cross(w, np.cross(w, z)) + 2 * np.cross(w, zd) + zq @ qdd + self.bent(qd)
@@ -296,47 +301,56 @@ class Nodes:
         return out
 
     def inertia_of_rest(self, q, w, qd, a, alpha, qdd):
-        """The same of `rest`: T = v' N v / 2 with v = (v_i, w + theta_i'), by the equations of Boltzmann and Hamel at V = 0."""
+        """Returns the forces of inertia of `rest`: T = v' N v / 2 with the rows v = (v_i, w + theta_i') along body axes, by the equations of Boltzmann and Hamel, about the centre of mass (theory, section 6).
+
+        The momentum of translation is that of the first moment s, w x s + s', so that the body does not feel its speed of flight.
+        """
+        about = self.x - self.centre
+        a = a + np.cross(alpha, self.centre) + np.cross(w, np.cross(w, self.centre))
         n = 3 * len(self.x)
-        points, turning = np.tile(np.eye(3), (n // 3, 1)), np.zeros((n, 3))
         lever = lambda u: -skew(u).reshape(n, 3)
-        now, theta = lever(self.x + self.psi @ q), self.theta.reshape(n, -1)
-        psi, rate = self.psi.reshape(n, -1), lever(self.psi @ qd)
-        b = np.vstack([np.hstack([points, now, psi]), np.hstack([turning, points, theta])])
-        momentum = self.rest @ (b @ np.concatenate([np.zeros(3), w, qd]))
-        moved = b @ np.concatenate([a, alpha, qdd])
+        psi, theta, rate = self.psi.reshape(n, -1), self.theta.reshape(n, -1), lever(self.psi @ qd)
+        b = np.vstack([np.hstack([lever(about + self.psi @ q), psi]), np.hstack([np.tile(np.eye(3), (n // 3, 1)), theta])])
+        momentum = self.rest @ (b @ np.concatenate([w, qd]))
+        moved = b @ np.concatenate([alpha, qdd])
         moved[:n] += rate @ w
-        out = b.T @ (self.rest @ moved)
-        out[:3] += np.cross(w, b[:, :3].T @ momentum)
-        out[3:6] += rate.T @ momentum[:n] + np.cross(w, b[:, 3:6].T @ momentum)
+        s, sd, sdd = self.rest_first + self.rest_modes @ q, self.rest_modes @ qd, self.rest_modes @ qdd
+        force = np.cross(alpha, s) + sdd + 2 * np.cross(w, sd) + np.cross(w, np.cross(w, s))
+        out = np.concatenate([force, b.T @ (self.rest @ moved)])
+        out[3:6] += rate.T @ momentum[:n] + np.cross(w, b[:, :3].T @ momentum) + np.cross(s, a)
         # dT/dq_j: the mode carried round by w, at displacements.
         turned = np.cross(w, self.psi, axisb=1, axisc=1).reshape(n, -1)
-        out[6:] -= turned.T @ momentum[:n]
+        out[6:] += self.rest_modes.T @ a - turned.T @ momentum[:n]
+        out[3:6] += np.cross(self.centre, out[:3])
         return out
 
     def mass_matrix(self, q):
+        """Returns the mass matrix of (a, alpha, q'')."""
         zero = np.zeros(self.nf)
         return np.stack([self.inertia(q, np.zeros(3), zero, e[:3], e[3:6], e[6:]) for e in np.eye(6 + self.nf)], 1)
 
     def accelerations(self, q, w, qd, applied):
-        """(a, alpha, q'') under applied generalised forces."""
+        """Returns (a, alpha, q'') under applied generalised forces."""
         still = self.balance(q, w, qd, np.zeros(3), np.zeros(3), np.zeros(self.nf))
         return np.linalg.solve(self.mass_matrix(q), applied - still)
 
     def gravity(self, q, g):
-        """Generalised forces of gravity g along body axes."""
+        """Returns the generalised forces of gravity g, given along body axes."""
         z, zq = self.places(q), self.shapes(q)
         f = self.model.e @ np.outer(self.point, g)
-        return np.concatenate([f[: len(self.x)].sum(0), np.cross(z, f).sum(0), np.einsum("iaj,ia->j", zq, f)])
+        out = np.concatenate([f[: len(self.x)].sum(0), np.cross(z, f).sum(0), np.einsum("iaj,ia->j", zq, f)])
+        if self.rest is not None:
+            out[3:] += np.concatenate([np.cross(self.rest_first + self.rest_modes @ q, g), self.rest_modes.T @ g])
+        return out
 
     def nodal(self, q, accelerations, w, qd):
-        """Accelerations of all nodes along body axes, relative to nothing."""
+        """Returns the absolute accelerations of all nodes along body axes."""
         a, alpha, qdd = accelerations[:3], accelerations[3:6], accelerations[6:]
         r, rd = self.x + self.psi @ q, self.psi @ qd
         return a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2 * np.cross(w, rd) + self.psi @ qdd
 
     def interface(self, name):
-        """Reference point of an interface and its translation and rotation in the modes, body axes, by the least squares of its nodes."""
+        """Returns the reference point of an interface and its translation and rotation in each mode, in body axes, from the displacements of its nodes."""
         interface = next(i for i in self.model.interfaces if i.name == name)
         rows, weights = self.model.weights(interface)
         motion = weights.T @ self.rows[rows]
@@ -344,12 +358,12 @@ class Nodes:
         return (interface.reference - self.origin) @ self.axes, turn @ motion[:3], turn @ motion[3:]
 
     def force(self, name, q, force):
-        """Generalised forces of a force at an interface, body axes."""
+        """Returns the generalised forces of a force at an interface, in body axes."""
         place, translation, _ = self.interface(name)
         return np.concatenate([force, np.cross(place + translation @ q, force), translation.T @ force])
 
     def moment(self, name, q, moment, finite=False):
-        """Generalised forces of a moment at an interface, body axes. `finite`: by the power on the axes exp(theta~), differentiated; else on small rotations."""
+        """Returns the generalised forces of a moment at an interface, in body axes. The moment does work on small rotations or, with `finite`, on the axes exp(theta~)."""
         _, _, rotation = self.interface(name)
         if not finite:
             return np.concatenate([np.zeros(3), moment, rotation.T @ moment])
@@ -364,7 +378,7 @@ class Nodes:
 
 
 def exponential(theta):
-    """Rotation matrix of a rotation vector."""
+    """Returns the rotation matrix of a rotation vector."""
     angle = np.linalg.norm(theta)
     k = skew(theta)
     if angle < 1e-8:

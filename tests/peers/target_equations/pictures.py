@@ -1,4 +1,4 @@
-"""vtk and gltf: places of the nodes and shapes of the modes, which is all that these pictures hold."""
+"""vtk and gltf: these pictures hold places of the nodes and shapes of the modes, and no equations."""
 
 import json
 import re
@@ -13,13 +13,13 @@ VTK_TYPES = {"Float64": "<f8", "Float32": "<f4", "Int64": "<i8", "Int32": "<i4",
 
 
 class Picture:
-    """`positions` and `shape` (points x 3 x modes) along axes of the model; `ids`: numbers of the nodes, None where the file has none; `frequency`: of each mode."""
+    """`positions` and `shape` (points x 3 x modes) are along axes of the model. `ids` has the numbers of the nodes, or is None where the file has none."""
 
-    # Metres, or 0 where lengths are those of the model.
+    # Metres in a unit of length of the model if the file has metres, or 0 if it has the units of the model.
     metre = 0.0
 
     def nodes(self, model):
-        """The oracle with the shapes of the picture, and by how much its places are off, relative to the extent."""
+        """Returns the oracle with the shapes of the picture, and the largest error of its places relative to the extent."""
         extent = np.ptp(model.x, 0).max()
         places = self.positions / self.metre if self.metre else self.positions
         if self.ids is None:
@@ -33,7 +33,6 @@ class Picture:
 
 
 class Vtk(Picture):
-    rounding = 0.0
 
     def __init__(self, path):
         data = path.read_bytes()
@@ -59,8 +58,6 @@ class Vtk(Picture):
 
 
 class Gltf(Picture):
-    # Single precision.
-    rounding = 6e-8
 
     def __init__(self, path, metre):
         data = path.read_bytes()
@@ -87,6 +84,7 @@ class Gltf(Picture):
 
 
 def quaternion(xyzw):
+    """Returns the rotation matrix of a unit quaternion in the order of glTF."""
     x, y, z, w = xyzw
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])

@@ -1,9 +1,9 @@
 """SID_FEM: the equations of Wallrapp (Schwertassek, Wallrapp, *Dynamik flexibler Mehrkörpersysteme*), as Modelica's EMBSlib has them in Components.mo (`EMBS_Body`).
 
 EMBSlib leaves out 2 w~ Ct' q' ("the derivation of the center of gravity is neglected"), which is zero for modes of the free body, and adds m w~ v although its acceleration is that of
-the frame in space: here the first stands and the second does not. mdCM, J and the coupling Cr are of first order in q, and with them the equations.
+the frame in space. The equations here have the first term and not the second. mdCM, J and the coupling Cr are of first order in q, and with them the equations.
 
-What a dialect says of the order of numbers is written here again (docs/formats/sid.md); of `embs` it is what the reader in C (`matrix3Index` of ReadSID_C.h: modes, rows, columns) and the
+The order of numbers in each dialect is that of docs/formats/sid.md; that of `embs` is what the reader in C (`matrix3Index` of ReadSID_C.h: modes, rows, columns) and the
 declaration `Real[nr, nq, nc]` of Modelica (by rows) make of m1(i, j, k).
 """
 
@@ -24,7 +24,7 @@ ENTRY = re.compile(r"(m[01])\s*\(\s*(\d+)\s*,\s*(\d+)\s*(?:,\s*(\d+)\s*)?\)\s*=\
 
 
 class Taylor:
-    """An object of the file: `m0` (rows x columns), `m1` (rows x columns x modes)."""
+    """An object of the file with its arrays `m0` (rows x columns) and `m1` (rows x columns x modes)."""
 
     def __init__(self, header, entries, modes, third):
         rows, columns = header["nrow"], header["ncol"]
@@ -54,7 +54,7 @@ class Taylor:
 
 
 def objects(text, third):
-    """Mass, number of modes, objects of the body, and those of each frame by its number."""
+    """Returns mass, number of modes, the objects of the body by name, and those of each frame by its number."""
     mass = modes = None
     body, frames, current, header, entries, target = {}, {}, None, {}, [], None
     for line in text.splitlines():
