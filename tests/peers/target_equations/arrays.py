@@ -33,13 +33,14 @@ class Arrays(Equations):
         for name in sorted({path.split("/")[1] for path in get if path.startswith("interfaces/")}):
             at = lambda what: get.get(f"interfaces/{name}/{what}")
             self.places[name] = Place(at("reference"), at("translation"), at("rotation"))
-        self.stiffening = {path.split("/")[1]: get[path] for path in get if path.startswith("inertia_stiffness/")}
+        # Matrices of inertia and of stress act alike: (6.2b) and (7.4).
+        self.stiffening = [(path.split("/")[1], get[path]) for path in get if path.startswith(("inertia_stiffness/", "geometric_stiffness/"))]
         self.order = "first" if self.general else "exact"
 
     def blocks(self, q):
         s, inertia, coupling = self.c + self.c1 @ q, self.i0 + self.w1 @ q + np.einsum("i,abij,j->ab", q, self.w2, q), self.c2 + np.einsum("i,aij->aj", q, self.w3)
         inertia, c1 = (inertia + inertia.T) / 2, self.c1.copy()
-        for name, k in self.stiffening.items():
+        for name, k in self.stiffening:
             kind, axis = name.rsplit("_", 1)
             if kind == "acceleration":
                 s["xyz".index(axis)] += q @ k @ q / 2
@@ -57,7 +58,7 @@ class Arrays(Equations):
         return assemble(self.m, s, c1, inertia, coupling, self.mff)
 
     def velocity_forces(self, q, w, qd):
-        if self.general:
+        if self.general or self.stiffening:
             return lagrange(self.mass, q, w, qd, np.sqrt(np.trace(self.i0)))
         s, _, inertia, coupling = self.blocks(q)
         cross = np.cross

@@ -39,10 +39,15 @@ class Source:
             self.interfaces.append(Interface(name, coupling, nodes, place))
         if damped:
             lines.append(f"[damping]\nrayleigh = {{ alpha = {ALPHA}, beta = {BETA} }}")
+        stresses = []
+        for one in manifest.get("geometric_stiffness", []):
+            kind = next(kind for kind in ("acceleration", "angular_acceleration", "spin") if kind in one)
+            lines.append(f'[[geometric_stiffness]]\nfile = "{one["file"]}"\n{kind} = "{one[kind]}"')
+            stresses.append((kind, one[kind], one["file"]))
         path.write_text(text + "\n".join(lines) + "\n")
         # Size of the unit of length of the model in metres.
         self.metre = {"mm": 1e-3, "m": 1.0}[manifest["model"]["units"]["length"]]
-        self.model = Model(self.folder, self.interfaces, Damping(ALPHA, BETA) if damped else Damping())
+        self.model = Model(self.folder, self.interfaces, Damping(ALPHA, BETA) if damped else Damping(), stresses)
 
     def alone(self, node):
         """Returns the name of the interface that consists of this node alone, or None."""

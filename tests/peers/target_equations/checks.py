@@ -110,6 +110,12 @@ def gravity(equations, nodes, scale, order):
     return largest
 
 
+def stress(equations, nodes, scale):
+    """Compares forces with geometric stiffness, and generalised forces of gravity, to first order in q."""
+    found = [difference for state in states(scale, nodes.nf) for difference in series(equations, nodes, scale, state, "first")]
+    return max(*found, gravity(equations, nodes, scale, "first"))
+
+
 def force(equations, nodes, scale, order):
     """Compares generalised forces of a force along each axis at every interface, at a random q or, for order "rest", at q = 0."""
     return at_interfaces(equations, nodes, scale, 0 if order == "rest" else 1, "force")

@@ -60,7 +60,9 @@ class Damping:
 class Model:
     """The FE model: K, M, nodes, interfaces and damping, in model axes."""
 
-    def __init__(self, folder, interfaces, damping):
+    def __init__(self, folder, interfaces, damping, stresses=()):
+        """`stresses` has the geometric stiffness: tuples of the kind of load ("acceleration", "angular_acceleration" or "spin"), its axis and the matrix, model axes, about the centre of mass."""
+        self.stresses = [(kind, axis, matrix(folder / name)) for kind, axis, name in stresses]
         self.k, self.m = matrix(folder / "K.mtx.gz"), matrix(folder / "M.mtx.gz")
         table = np.genfromtxt(folder / "nodes.csv", delimiter=",", names=True)
         self.ids = table["node"].astype(int)
@@ -248,10 +250,11 @@ class Nodes:
             self.rest_modes = whole[: 3 * n].T @ translations.reshape(3 * n, nf) + whole[3 * n :].T @ self.theta.reshape(3 * n, nf)
             block = whole[: 3 * n].T @ -skew(self.x).reshape(3 * n, 3) + whole[3 * n :].T @ np.tile(np.eye(3), (n, 1))
             self.rest_first = np.array([block[1, 2] - block[2, 1], block[2, 0] - block[0, 2], block[0, 1] - block[1, 0]]) / 2
-            row_sums = model.e @ self.point
-            self.centre = (row_sums @ self.places(np.zeros(nf)) + self.rest_first) / row_sums[:n].sum()
         else:
-            self.rest = None
+            self.rest, self.rest_first = None, np.zeros(3)
+        row_sums = model.e @ self.point
+        self.centre = (row_sums @ self.places(np.zeros(nf)) + self.rest_first) / row_sums[:n].sum()
+        self.stresses = [(kind, axis, rows.T @ (stress @ rows)) for kind, axis, stress in model.stresses]
 
     def undamped(self):
         """Returns a copy without damping, for formats that have no place for damping."""
@@ -286,7 +289,17 @@ class Nodes:
     def balance(self, q, w, qd, a, alpha, qdd):
         """Returns force, moment about the origin and modal forces that a motion takes: inertia, stiffness and damping."""
         out = self.inertia(q, w, qd, a, alpha, qdd)
-        out[6:] += self.stiffness @ q + self.damping @ qd
+        out[6:] += self.stiffness @ q + self.damping @ qd + self.stiffening(w, a, alpha) @ q
+        return out
+
+    def stiffening(self, w, a, alpha):
+        """Returns the geometric stiffness at a motion of the frame. Loads are accelerations of the centre of mass, angular accelerations and products of angular velocities, model axes."""
+        a = a + np.cross(alpha, self.centre) + np.cross(w, np.cross(w, self.centre))
+        w, a, alpha = self.axes @ w, self.axes @ a, self.axes @ alpha
+        out = np.zeros((self.nf, self.nf))
+        for kind, axis, stress in self.stresses:
+            at = ["xyz".index(letter) for letter in axis]
+            out += stress * {"acceleration": a[at[0]], "angular_acceleration": alpha[at[0]], "spin": w[at[0]] * w[at[-1]]}[kind]
         return out
 
     def inertia(self, q, w, qd, a, alpha, qdd):
@@ -341,6 +354,8 @@ class Nodes:
         out = np.concatenate([f[: len(self.x)].sum(0), np.cross(z, f).sum(0), np.einsum("iaj,ia->j", zq, f)])
         if self.rest is not None:
             out[3:] += np.concatenate([np.cross(self.rest_first + self.rest_modes @ q, g), self.rest_modes.T @ g])
+        # Gravity is an acceleration of the frame in the other direction.
+        out[6:] -= self.stiffening(np.zeros(3), -g, np.zeros(3)) @ q
         return out
 
     def nodal(self, q, accelerations, w, qd):

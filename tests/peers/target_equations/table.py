@@ -11,7 +11,7 @@ from common import Absent, Row
 
 from . import bodies, checks
 
-COLUMNS = ["shapes", "accelerations", "gravity", "force", "moment", "deflection", "damping", "units", "frames", "carried frames", "rotations"]
+COLUMNS = ["shapes", "accelerations", "gravity", "force", "moment", "deflection", "damping", "units", "frames", "carried frames", "rotations", "geometric stiffness"]
 # Limits and their reasons. Numbers of a file have 15 to 17 digits; forces and accelerations are sums of some thousands of products of them.
 ROUNDING = 1e-10
 # Static solutions, and K of the modes: rigid motion strains the matrices of the fixtures, which have 14 digits, by 1e-10 of the first mode.
@@ -25,6 +25,7 @@ SINGLE_SOLVED = 1e-4
 
 SOLID = [("bolt_base", "rigid", [42.0, 24.0, 10.0], None), ("bolt_wall", "averaging", [6.0, 24.0, 38.0], None)]
 BEAMS = [(name, "rigid", None, None) for name in ("front_left", "front_right", "rear_left", "rear_right")]
+BLADE = [("root", "rigid", [0.0, 0.0, 5.0], None), ("tip", "averaging", [0.0, 2.0, 170.0], None)]
 SHELLS = [("corner", "rigid", None, [1]), ("fold", "averaging", [0.15, 0.1, 0.0], [9, 10, 11, 20, 21])]
 REGION = [("weight", "rigid", None, [500]), ("end", "averaging", [-0.01, 0.08, 0.05], list(range(1, 12)))]
 
@@ -80,15 +81,18 @@ class Bench:
         self.dialects = [name for name in bodies.sid.DIALECTS if self.has_dialect(name)]
         # One unit of the model in m and kg.
         self.other = solid.model.scaled(1e-3, 1e3)
-        self.frames, self.carried, self.turning = [], [], [self.region]
+        self.frames, self.carried, self.turning, self.stressed = [], [], [self.region], []
         if not quick:
             self.frames = [make(solid, "principal"), make(solid, "model"), make(region, "model")]
             beams = bodies.Source(folder, "car_frame", BEAMS, 3, damped=True)
             shells = bodies.Source(folder, "shell_folded", SHELLS, 6, damped=True)
+            blade = bodies.Source(folder, "turbine_blade", BLADE, 4, damped=True)
+            self.stressed = [make(blade, "com"), make(blade, "principal")]
             self.turning += [make(beams, "com"), make(beams, "principal"), make(shells, "model")]
         if "interface=" in self.told:
             self.carried = [make(solid, "interface=bolt_base")]
             if not quick:
+                self.stressed += [make(blade, "interface=root")]
                 self.carried += [make(solid, "interface=bolt_wall"), make(region, "interface=weight"), make(beams, "interface=front_left"), make(shells, "interface=fold")]
 
     def has_dialect(self, name):
@@ -188,7 +192,20 @@ def flexible(target, bench):
     cells["frames"] = whole(target, each(bench.frames))
     cells["carried frames"] = Cell(marks="k") if target.dialect == "level13" else whole(target, each(bench.carried))
     cells["rotations"] = whole(target, each(bench.turning))
+    cells["geometric stiffness"] = stressed(target, bench)
     return cells
+
+
+def stressed(target, bench):
+    """Returns the entry of bodies with geometric stiffness, for formats that hold it."""
+    if target.general != "first":
+        return NOT_HELD
+    found = [0.0]
+    for body in bench.stressed:
+        equations = body.read(target)
+        nodes, _ = bodies.nodes_of(equations, body, body.source.model)
+        found.append(checks.stress(equations, nodes, checks.Scale(nodes)))
+    return Cell(max(found), SINGLE_SOLVED if target.dialect == "float" else STIFFNESS, "a")
 
 
 def reference(bench, body, model):
@@ -228,7 +245,7 @@ def coordinates(target, bench):
 
     own = [results(bench.solid, bench.solid.source.model)]
     cells = {column: entry(own, [column]) for column in COLUMNS[2:7]}
-    cells["shapes"] = NOT_HELD
+    cells["shapes"] = cells["geometric stiffness"] = NOT_HELD
     cells["accelerations"] = entry(own, ["points", "accelerations"], "e")
     every = ["points", *PHYSICS, "damping"]
     cells["units"] = entry([results(bench.solid, bench.other, "m,kg,s")], every)
@@ -281,7 +298,7 @@ def run(flexbody, folder, quick=False):
             del cells["carried frames"]
     if quick:
         for cells in found.values():
-            del cells["frames"]
+            del cells["frames"], cells["geometric stiffness"]
     return found, absent
 
 
