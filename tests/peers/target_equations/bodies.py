@@ -62,7 +62,8 @@ class Body:
         self.folder = folder / f"{source.folder.name} {frame.replace('=', ' ')}"
         self.folder.mkdir()
         self.path = self.folder / "body.flex.h5"
-        common.run(flexbody, "convert", source.folder / "model.toml", "--basis", "craig-bampton", "--modes", source.fixed_modes, "--frame", frame, "--lumped", "none", "--quiet", "-o", self.path)
+        basis = ["--basis", "craig-bampton", "--modes", source.fixed_modes, "--frame", frame]
+        common.run(flexbody, "convert", source.folder / "model.toml", *basis, "--lumped", "none", "--quiet", "-o", self.path)
         with h5py.File(self.path) as file:
             self.general = file["source"].attrs["mass_structure"] == "general"
             self.modes = len(file["modes/eigenvalue"])

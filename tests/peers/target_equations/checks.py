@@ -22,7 +22,10 @@ class Scale:
 
 
 class State:
-    """A random state in which no term of the equations is negligible: deflections of about 2 % of the radius of gyration in the first mode, less in stiffer ones, and a spin of about 0.3 of the first frequency."""
+    """A random state in which no term of the equations is negligible.
+
+    Deflections are about 2 % of the radius of gyration in the first mode and less in stiffer ones, the spin is about 0.3 of the first frequency.
+    """
 
     def __init__(self, random, scale, nf):
         soft = scale.first / np.sqrt(scale.stiffness)
@@ -42,16 +45,15 @@ def states(scale, nf):
     return [State(random, scale, nf) for _ in range(STATES)]
 
 
-def difference(computed, expected, scale):
-    """Returns the largest difference of generalised forces relative to the largest expected one, each in its unit of `Scale.forces`."""
-    scale = scale.forces
-    return float(np.abs((computed - expected) / scale).max() / np.abs(expected / scale).max())
+def difference(computed, expected, units):
+    """Returns the largest difference of generalised forces relative to the largest expected one, each in its unit."""
+    return float(np.abs((computed - expected) / units).max() / np.abs(expected / units).max())
 
 
 def accelerations(equations, nodes, scale, order, damped=True):
     """Compares accelerations of all nodes and modes at random states (order "exact"), or the forces that a motion takes as series in the amplitude of the modes (other orders).
 
-    Equations of order "rest" are also compared at small motions without angular velocity.
+    Equations of order "rest" are also compared at small motions without angular velocity, and modal forces that are exact (`exact_modal_forces`) at the random states.
     """
     largest = 0.0
     nodes = nodes if damped else nodes.undamped()
@@ -65,6 +67,10 @@ def accelerations(equations, nodes, scale, order, damped=True):
             largest = max(largest, float(np.abs(computed[6:] - expected[6:]).max() / np.abs(expected[6:]).max()))
         else:
             largest = max(largest, *series(equations, nodes, scale, state, order))
+            if equations.exact_modal_forces and not nodes.model.turning:
+                motion = state.q, state.w, state.qd, state.a, state.alpha, state.qdd
+                computed, expected = equations.balance(*motion), nodes.balance(*motion)
+                largest = max(largest, difference(computed[6:], expected[6:], scale.forces[6:]))
             if order == "rest":
                 largest = max(largest, *series(equations, nodes, scale, state, "small"))
     return largest
@@ -85,9 +91,9 @@ def series(equations, nodes, scale, state, order):
         return (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
 
     if order == "small":
-        return (difference(slope(equations), slope(nodes), scale),)
+        return (difference(slope(equations), slope(nodes), scale.forces),)
     still = lambda one: one.balance(zero, w, zero, state.a, state.alpha, zero)
-    return difference(still(equations), still(nodes), scale), difference(slope(equations), slope(nodes), scale)
+    return difference(still(equations), still(nodes), scale.forces), difference(slope(equations), slope(nodes), scale.forces)
 
 
 def gravity(equations, nodes, scale, order):
@@ -112,7 +118,7 @@ def gravity(equations, nodes, scale, order):
 
 def stress(equations, nodes, scale):
     """Compares forces with geometric stiffness, and generalised forces of gravity, to first order in q."""
-    found = [difference for state in states(scale, nodes.nf) for difference in series(equations, nodes, scale, state, "first")]
+    found = [one for state in states(scale, nodes.nf) for one in series(equations, nodes, scale, state, "first")]
     return max(*found, gravity(equations, nodes, scale, "first"))
 
 
@@ -139,12 +145,15 @@ def at_interfaces(equations, nodes, scale, amplitude, what):
                 computed, expected = equations.moment(place, q, axis), nodes.moment(interface.name, q, axis, equations.finite_moments)
             if computed is None:
                 return None
-            largest = max(largest, difference(computed, expected, scale))
+            largest = max(largest, difference(computed, expected, scale.forces))
     return largest
 
 
 def deflection(equations, nodes, scale):
-    """Compares the motion of an interface under loads on it, another interface held, with the static solution of all nodes without modes. Returns None where the file has no rotation of an interface."""
+    """Compares the motion of an interface under loads on it, another interface held, with the static solution of all nodes without modes.
+
+    Returns None where the file has no rotation of an interface.
+    """
     largest = 0.0
     zero = np.zeros(nodes.nf)
     stiffness = np.stack([equations.elastic(e, zero) for e in np.eye(nodes.nf)], 1)
@@ -283,7 +292,10 @@ def points(matrices, oracle):
 
 
 def drawn(picture, model, single):
-    """Checks the places of the nodes of a picture, and that its modes are orthogonal by M and K. Unless it is in single precision they must be mass-normalised, with the frequencies of the file."""
+    """Checks the places of the nodes of a picture, and that its modes are orthogonal by M and K.
+
+    Unless the picture is in single precision its modes must be mass-normalised and have the frequencies of the file.
+    """
     nodes, wrong = picture.nodes(model)
     mass, stiffness = nodes.mass, nodes.stiffness
     unit = np.eye(nodes.nf)

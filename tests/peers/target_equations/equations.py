@@ -22,6 +22,8 @@ class Equations:
     # Order to which the equations of the program hold: "exact"; "first": linear in q, q', q''; "undeformed": at q = 0, linear in q' and q''; "rest": at q = q' = 0,
     # linear in q''; "small": linear in q, q', q'' without angular velocity.
     order = "exact"
+    # True if the modal forces of solids are exact at any q although the other equations are of first order.
+    exact_modal_forces = False
     # Order to which gravity holds, where it differs from `order`.
     gravity_order = None
     has_damping = True

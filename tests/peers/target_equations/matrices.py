@@ -1,8 +1,9 @@
 """Chrono and Simscape: K, M and damping in the motions of the interfaces and the amplitudes of internal coordinates. Both are equations of small motions.
 
-Chrono: `ChModalAssembly` (src/chrono_modal/ChModalAssembly.cpp) reduces boundary and internal nodes once more (`ApplyModeAccelerationTransformation`, CRAIG_BAMPTON without static correction):
-Psi_S = -K_II^-1 K_IB and the lowest modes of the internal nodes, as many as are requested. It has gravity of its own (`IntLoadResidual_F`, step 4, `m_modal_automatic_gravity`, on by default): g on the
-first three coordinates of every node of six, internal ones too; of M g the first three rows of every node; those of internal nodes go to the boundary by Psi_S and to the modes by Psi_D (step 5).
+Chrono: `ChModalAssembly` (src/chrono_modal/ChModalAssembly.cpp) reduces boundary and internal nodes once more (`ApplyModeAccelerationTransformation`, CRAIG_BAMPTON without static
+correction): Psi_S = -K_II^-1 K_IB, and the lowest modes Psi_D of the internal nodes, as many as are requested. Its automatic gravity (`IntLoadResidual_F`, step 4, on by default) puts g on the
+first three coordinates of every node of six, internal ones too, and keeps the first three rows of M g for every node. Forces on internal nodes act on the boundary through Psi_S and on the
+modes through Psi_D (step 5).
 
 Simscape: *Reduced Order Flexible Solid*, K, M, C in the six coordinates of each interface frame and the modes. Gravity acts as an acceleration of the frames: M times the rigid translation.
 """

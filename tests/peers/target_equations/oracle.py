@@ -61,7 +61,10 @@ class Model:
     """The FE model: K, M, nodes, interfaces and damping, in model axes."""
 
     def __init__(self, folder, interfaces, damping, stresses=()):
-        """`stresses` has the geometric stiffness: tuples of the kind of load ("acceleration", "angular_acceleration" or "spin"), its axis and the matrix, model axes, about the centre of mass."""
+        """`stresses` has the geometric stiffness: tuples of the kind of load ("acceleration", "angular_acceleration" or "spin"), its axis and the name of the matrix.
+
+        Loads are along model axes and about the centre of mass.
+        """
         self.stresses = [(kind, axis, matrix(folder / name)) for kind, axis, name in stresses]
         self.k, self.m = matrix(folder / "K.mtx.gz"), matrix(folder / "M.mtx.gz")
         table = np.genfromtxt(folder / "nodes.csv", delimiter=",", names=True)
@@ -87,7 +90,10 @@ class Model:
         return other
 
     def split(self):
-        """Splits M into the mass `e` of points and directors and the `rest`: symmetric parts of the blocks that couple displacements and rotations, and parts of mass blocks that differ by direction."""
+        """Splits M into the mass `e` of points and directors and the `rest`.
+
+        The `rest` has the symmetric parts of blocks that couple displacements and rotations, and the parts of mass blocks that differ by direction.
+        """
         n = len(self.ids)
         self.turning = sorted({i for i, axis in self.row if axis > 2})
         director = {i: n + 3 * k for k, i in enumerate(self.turning)}
@@ -314,8 +320,9 @@ class Nodes:
         return out
 
     def inertia_of_rest(self, q, w, qd, a, alpha, qdd):
-        """Returns the forces of inertia of `rest`: T = v' N v / 2 with the rows v = (v_i, w + theta_i') along body axes, by the equations of Boltzmann and Hamel, about the centre of mass (theory, section 6).
+        """Returns the forces of inertia of `rest`: T = v' N v / 2 with the rows v = (v_i, w + theta_i') along body axes (theory, section 6).
 
+        The equations are those of Boltzmann and Hamel about the centre of mass.
         The momentum of translation is that of the first moment s, w x s + s', so that the body does not feel its speed of flight.
         """
         about = self.x - self.centre

@@ -85,7 +85,7 @@ def objects(text, third):
 
 class Sid(Equations):
     order = "first"
-
+    exact_modal_forces = True
     ARRAYS = {"m": "m", "md.m0": "mL", "md.m1": "s", "j.m0": "mL2", "j.m1": "sL", "ct.m0": "s", "cr.m0": "sL", "cr.m1": "1", "me": "1", "gr": "sL", "ge": "1", "oe.m0": "sL", "oe.m1": "1",
               "ke": "own", "de": "own"}
 

@@ -31,7 +31,7 @@ REGION = [("weight", "rigid", None, [500]), ("end", "averaging", [-0.01, 0.08, 0
 
 MARKS = {"first": "a", "undeformed": "b", "rest": "c", "small": "d"}
 NOTES = {
-    "a": "To first order in q, q' and q'', at any angular velocity: SID has mdCM, J and Cr to first order, and the kinetic energy of nodes that turn is of second order in q and q' ([6.2a](theory.md)).",
+    "a": "To first order in q, q' and q'', at any angular velocity: SID has mdCM, J and Cr to first order (modal forces of solids are exact, and compared at the random states), and the kinetic energy of nodes that turn is of second order in q and q' ([6.2a](theory.md)).",
     "b": "At q = 0, to first order in q' and q'': the format has no stiffness of inertia of nodes that turn. mbdyn has it, and is held so for beams only: their mass has a symmetric part of W3, which it has not.",
     "c": "At q = q' = 0 at any angular velocity, and without angular velocity to first order: the engine has no terms of angular velocity with q and q'.",
     "d": "To first order without angular velocity: the file has no groups 14 to 18.",
