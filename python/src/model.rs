@@ -122,10 +122,14 @@ fn convert_options(
     let accuracies =
         [("fast", Accuracy::Fast), ("standard", Accuracy::Standard), ("certified", Accuracy::Certified)];
     let frames = [("principal", Frame::Principal), ("com", Frame::CentreOfMass), ("model", Frame::Model)];
+    let frame = match frame.strip_prefix("interface=") {
+        Some(name) => Frame::Interface(name.to_owned()),
+        None => one_of("frame", frame, frames)?,
+    };
     Ok(options
         .basis(one_of("basis", basis, bases)?)
         .accuracy(one_of("accuracy", accuracy, accuracies)?)
-        .frame(one_of("frame", frame, frames)?))
+        .frame(frame))
 }
 
 impl Model {

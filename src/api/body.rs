@@ -7,6 +7,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
+use crate::body::convert::interface_compliance;
 use crate::body::flex_body;
 use crate::body::verification::own_identities;
 use crate::formats::export::ExportOptions;
@@ -85,7 +86,9 @@ impl FlexBody {
 
     fn export_as(&self, format: &str, path: &Path, options: ExportOptions) -> Result<Vec<Diagnostic>> {
         let options = ExportOptions { name: Some(path.to_owned()), ..options };
-        let (exported, told) = export(&self.0, find_format(format)?, &options, true)?;
+        let format = find_format(format)?;
+        let (exported, mut told) = export(&self.0, format, &options, true)?;
+        told.extend(interface_compliance(&self.0).filter(|_| !format.is_picture()));
         OutputSlot::commit_all(exported.fill(OutputSlot::prepare(path)?)?)?;
         Ok(told)
     }

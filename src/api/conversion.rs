@@ -42,7 +42,7 @@ pub enum Accuracy {
 }
 
 /// Where the body frame is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Frame {
     /// At the centre of mass, along the axes of the model.
@@ -52,6 +52,9 @@ pub enum Frame {
     Principal,
     /// That of the model.
     Model,
+    /// On the reference point of the interface of this name, along the axes of the model. The interface rests in every
+    /// mode: the modes are those of the body that is held there.
+    Interface(String),
 }
 
 /// Settings of a conversion. The default: 20 free-surface modes, proved complete, about the centre of mass along the
@@ -137,7 +140,11 @@ impl ConvertOptions {
             frame: match self.frame {
                 Frame::Principal => BodyFrame::Principal,
                 Frame::CentreOfMass => BodyFrame::Com,
-                Frame::Model => BodyFrame::Model,
+                Frame::Model | Frame::Interface(_) => BodyFrame::Model,
+            },
+            interface_frame: match &self.frame {
+                Frame::Interface(name) => Some(name.clone()),
+                _ => None,
             },
             mesh: self.mesh,
             ..ConvertSettings::default()

@@ -195,6 +195,7 @@ codes! {
     ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
     LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
     FreeFrequencies = "FB525", Note, Done, "frequencies of a Craig-Bampton body beside those of the free body", "take more fixed-interface modes (--modes, --max-frequency) where higher frequencies count";
+    InterfaceCompliance = "FB526", Note, Done, "modes lack a part of the static compliance at the interfaces", "convert with --basis craig-bampton or --residual-vectors interfaces, which have all of it";
     GeometricStiffnessNone = "FB530", Warning, Done, "centrifugal loads without geometric stiffness: the body softens where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to rates far below the one that is named";
     GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act along the others";
     SimulationStopped = "FB540", Error, Untrustworthy, "simulation cannot go on", "look at spin, loads and dropped terms: the motion leaves the range of the model";
@@ -242,7 +243,7 @@ codes! {
     ExportPicture = "FB723", Note, Done, "file is a picture of the body", "give multibody programs another format: docs/export.md lists them";
     ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
     ForeignIncomplete = "FB731", Error, BadInput, "file lacks what a body is made of", "write the file anew with the missing part";
-    ForeignChanged = "FB732", Note, Done, "modes of the file are no free-surface modes: rigid motion was taken out of them", "nothing to do: the body is the same, its coordinates are others";
+    ForeignChanged = "FB732", Note, Done, "modes of the file are not normalised or contain rigid motions: combinations of them were taken", "nothing to do: nodes move as before, modal coordinates are others";
     ForeignDropped = "FB733", Warning, Done, "file lacks terms of the kinetic energy: the body does without them", "take a format that holds them";
     MotionUnreadable = "FB734", Error, BadInput, "not the motion of a simulation, or a damaged one", "give the file that flexbody simulate -o writes";
     MotionForeign = "FB735", Error, BadInput, "motion of another body", "simulate this body, or give the body that was simulated";

@@ -3,7 +3,7 @@
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::body::convert::{BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, rigid_mass};
-use crate::body::flex_body::{FlexBody, Guarantee, Storage};
+use crate::body::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage};
 use crate::body::invariants::{
     BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
 };
@@ -12,6 +12,7 @@ use crate::numerics::eigen::{relative_residual, residual_scale, rounding_residua
 use crate::numerics::linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
 use faer::Mat;
 use interfaces::interface_checks;
+use nalgebra::Vector3;
 use recounts::recounts;
 
 mod interfaces;
@@ -379,7 +380,12 @@ fn damping_check(
 /// Stored geometric stiffness against that of the model; `None` when neither has any.
 fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
     let nf = shapes.ncols();
-    let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes)?;
+    let shift = match body.conditions() {
+        // Given about the centre of mass.
+        ReferenceConditions::Interface(_) => -body.invariants().first_moment() / body.invariants().mass(),
+        _ => Vector3::zeros(),
+    };
+    let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes, &shift)?;
     let stored = body.geometric_stiffness();
     let matrix_of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
         let one = list.iter().find(|one| one.load == *load);

@@ -4,6 +4,7 @@ mod cluster;
 mod guidance;
 mod response;
 
+use crate::body::invariants::BodyFrame;
 use crate::formats::FORMATS;
 use crate::formats::IMPORT_FORMATS;
 use crate::formats::export::ExportFormat;
@@ -360,7 +361,7 @@ pub struct ConvertArguments {
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "frame", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split", "format", "matrices", "dimension", "interface"])]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split", "format", "matrices", "dimension", "interface"])]
     pub from: Option<String>,
     /// The job of an FE program.
     #[command(flatten)]
@@ -420,9 +421,11 @@ pub struct ConvertArguments {
     /// Do work that is estimated to take more than half an hour for its number of modes
     #[arg(long)]
     pub allow_long: bool,
-    /// Frame of the body
-    #[arg(long, value_enum, default_value_t = FrameName::Com)]
-    pub frame: FrameName,
+    /// Frame of the body: com (centre of mass, axes of the model), principal (there, principal axes), model (that of the
+    /// model), or interface=NAME: on the reference point of an interface, which then rests in every mode
+    /// [default: com; with --from: that of the file]
+    #[arg(long, value_name = "FRAME", value_parser = frame_name)]
+    pub frame: Option<FrameName>,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,
@@ -622,15 +625,32 @@ fn memory_size(text: &str) -> Result<u64, String> {
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("not a size of memory".to_owned()) }
 }
 
-/// Names of the frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+/// Frames that `--frame` names.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FrameName {
-    /// Origin at the centre of mass, axes of the model
-    Com,
-    /// Origin at the centre of mass, principal axes
-    Principal,
-    /// The model's own frame
-    Model,
+    /// A frame in mean axes.
+    Mean(BodyFrame),
+    /// A frame on the reference point of the interface of this name.
+    Interface(String),
+}
+
+impl FrameName {
+    /// The frame of a body in mean axes, and the interface that the frame stands on instead.
+    pub fn settings(named: Option<&Self>) -> (BodyFrame, Option<String>) {
+        match named {
+            None => (BodyFrame::default(), None),
+            Some(Self::Mean(frame)) => (*frame, None),
+            Some(Self::Interface(name)) => (BodyFrame::Model, Some(name.clone())),
+        }
+    }
+}
+
+fn frame_name(text: &str) -> Result<FrameName, String> {
+    if let Some(name) = text.strip_prefix("interface=").filter(|name| !name.is_empty()) {
+        return Ok(FrameName::Interface(name.to_owned()));
+    }
+    let known = BodyFrame::ALL.into_iter().find(|frame| frame.name() == text);
+    known.map(FrameName::Mean).ok_or_else(|| "expected com, principal, model or interface=NAME".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -53,7 +53,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         storage: arguments.storage,
         memory_limit: arguments.memory_limit,
         allow_long: true,
-        frame: arguments.frame,
+        frame: arguments.frame.clone(),
         lumped: arguments.lumped.clone(),
         lumped_modes: false,
         mesh_triangles: None,

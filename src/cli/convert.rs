@@ -19,7 +19,6 @@ use crate::base::progress::Event;
 use crate::base::units::UnitSystem;
 use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, ModeSettings};
 use crate::body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert_resuming};
-use crate::body::invariants::BodyFrame;
 use crate::body::verification::accept;
 use crate::formats::flex_body_file;
 use crate::input::{
@@ -237,6 +236,7 @@ impl Job<'_> {
 
     fn settings(&self, model: &FeModel, basis: BasisChoice) -> ConvertSettings {
         let Self { arguments, .. } = *self;
+        let (frame, interface_frame) = FrameName::settings(arguments.frame.as_ref());
         ConvertSettings {
             modes: ModeSettings {
                 wanted: wanted(arguments, model.units()),
@@ -256,11 +256,8 @@ impl Job<'_> {
                 ..ModeSettings::default()
             },
             basis,
-            frame: match arguments.frame {
-                FrameName::Principal => BodyFrame::Principal,
-                FrameName::Com => BodyFrame::Com,
-                FrameName::Model => BodyFrame::Model,
-            },
+            frame,
+            interface_frame,
             lumped: self.lumped.to_vec(),
             lumped_modes: arguments.lumped_modes,
             mesh: match (arguments.no_mesh, arguments.mesh_triangles) {

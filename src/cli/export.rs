@@ -7,6 +7,7 @@ use super::resources::memory_left;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::output::OutputSlot;
+use crate::body::convert::interface_compliance;
 use crate::body::flex_body::FlexBody;
 use crate::formats::export::{ExportOptions, Exported, InertiaInScene, Points};
 use crate::formats::flex_body_file::{self, read_simulation};
@@ -42,6 +43,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let (exported, losses) = export(&body, format, &options, arguments.allow_loss)
         .map_err(|error| error.in_file(arguments.simulation.as_ref().unwrap_or(&arguments.body)))?;
     diagnostics.extend(losses);
+    diagnostics.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
     refuse_warnings(arguments.printing, &diagnostics)?;
     let place_and_size = |(ending, bytes): &(Cow<'_, str>, Vec<u8>)| {
         (Exported::place_beside(&arguments.output, ending), bytes.len())

@@ -1,6 +1,6 @@
 //! `flexbody convert --from`: a body of another program's file.
 
-use super::arguments::{ConvertArguments, StorageName};
+use super::arguments::{ConvertArguments, FrameName, StorageName};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::terminal::body_text;
@@ -10,7 +10,7 @@ use crate::base::output::OutputSlot;
 use crate::base::provenance::SourceFile;
 use crate::formats::find_import_format;
 use crate::formats::flex_body_file;
-use crate::formats::import::{accept_imported, import_body};
+use crate::formats::import::{ImportFrame, accept_imported, import_body};
 use crate::input::{InputFile, parse_units};
 use crate::report::{Facts, Format, RunData, render};
 
@@ -29,8 +29,13 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
 
     let file = InputFile::open(path)?;
     let source = SourceFile::new("body", path, file.sha256());
+    let frame = match &arguments.frame {
+        None => ImportFrame::Kept,
+        Some(FrameName::Mean(at)) => ImportFrame::Mean(*at),
+        Some(FrameName::Interface(name)) => ImportFrame::Interface(name.clone()),
+    };
     let mut imported =
-        import_body(&format.read(&file)?, source, units).map_err(|error| error.in_file(path))?;
+        import_body(&format.read(&file)?, source, units, &frame).map_err(|error| error.in_file(path))?;
     if arguments.storage == StorageName::F32 {
         imported.body = imported.body.rounded_to_f32()?;
     }

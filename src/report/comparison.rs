@@ -7,7 +7,7 @@ use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com}
 use super::numbers::{plain, significant};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::body::flex_body::{FlexBody, Frame, Group};
+use crate::body::flex_body::{FlexBody, Frame, Group, ReferenceConditions};
 use crate::body::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use crate::numerics::linalg::larger;
 use faer::linalg::matmul::matmul;
@@ -189,6 +189,14 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
             )));
         }
     }
+    if !have_the_same_modes(a.conditions(), b.conditions()) {
+        let (a, b) = (a.conditions(), b.conditions());
+        let message = format!(
+            "the modes are those of other reference conditions: in the first body {a}, in the second {b}"
+        );
+        let help = "convert both with the same --frame";
+        problems.push(incomparable(message).with_help(help));
+    }
     if a.dimension() != b.dimension() {
         let (a, b) = (a.dimension(), b.dimension());
         problems.push(incomparable(format!("the first body has dimension {a}, the second {b}")));
@@ -199,6 +207,16 @@ fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
         problems.push(incomparable(message).with_help(help));
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
+}
+
+/// True if reference conditions may be the same: a file of another program does not state its own.
+fn have_the_same_modes(a: &ReferenceConditions, b: &ReferenceConditions) -> bool {
+    use ReferenceConditions::{MeanAxes, Unstated};
+    match (a, b) {
+        (Unstated, MeanAxes) | (MeanAxes, Unstated) => false,
+        (Unstated, _) | (_, Unstated) => true,
+        _ => a == b,
+    }
 }
 
 /// Two bodies brought together.

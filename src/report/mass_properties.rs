@@ -1,7 +1,7 @@
 //! Mass, centre of mass and principal inertia of a body, whatever its frame.
 
 use super::numbers::significant;
-use crate::body::flex_body::FlexBody;
+use crate::body::flex_body::{FlexBody, ReferenceConditions};
 use crate::body::invariants::Invariants;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
@@ -29,6 +29,9 @@ pub(super) struct MassProperties {
     pub frame_axes: [[f64; 3]; 3],
     /// Where the frame lies, in words.
     pub frame: String,
+    /// True if the frame follows the mean motion of the body.
+    #[serde(skip)]
+    pub in_mean_axes: bool,
 }
 
 impl MassProperties {
@@ -50,6 +53,7 @@ impl MassProperties {
             frame_origin: frame.origin.into(),
             frame_axes: std::array::from_fn(|k| std::array::from_fn(|l| frame.axes[(k, l)])),
             frame: describe(body, &inertia),
+            in_mean_axes: body.conditions().is_mean(),
         }
     }
 }
@@ -58,6 +62,10 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
     let (invariants, frame) = (body.invariants(), body.frame());
     let centred = centre_of_mass(invariants).norm() <= CENTRED * gyration_radius(invariants);
     let at_model = frame.origin == Vector3::zeros();
+    let conditions = match body.conditions() {
+        ReferenceConditions::MeanAxes => String::new(),
+        other => format!("{other}: "),
+    };
     let origin = match (centred, at_model) {
         (true, _) => "origin at the centre of mass",
         (false, true) => "origin of the model",
@@ -71,9 +79,12 @@ fn describe(body: &FlexBody, inertia: &Matrix3<f64>) -> String {
     };
     let turned = turned_degrees(&frame.axes);
     if body.source().n_dofs == 0 || turned < 1e-9 {
-        return format!("{origin}, {axes}");
+        return format!("{conditions}{origin}, {axes}");
     }
-    format!("{origin}, {axes}, turned by {} degrees from those of the model", significant(turned, 4))
+    format!(
+        "{conditions}{origin}, {axes}, turned by {} degrees from those of the model",
+        significant(turned, 4)
+    )
 }
 
 /// The angle between the body axes and those of the model, degrees.

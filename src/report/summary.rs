@@ -180,6 +180,9 @@ fn mass_properties(summary: &mut Summary, facts: &Facts<'_>) {
     let mass = format!("{} {} at {centre} (model axes)", significant(body.mass, 6), units.mass());
     summary.entry(Tone::Plain, "mass", &mass, 2);
     summary.entry(Tone::Plain, "inertia", &format!("{inertia} (principal)"), 2);
+    if !body.in_mean_axes {
+        summary.entry(Tone::Plain, "frame", &body.frame, 3);
+    }
 }
 
 fn modes(summary: &mut Summary, facts: &Facts<'_>) {

@@ -271,6 +271,11 @@ pub fn convert_for_cases(
 
 /// Refuses what a basis that is made of a motion cannot serve.
 fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
+    if tailoring.settings.interface_frame.is_some() {
+        let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
+        let help = "leave --scene out, or use --frame com";
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    }
     if !tailoring.of_motion {
         return Ok(());
     }

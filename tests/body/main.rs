@@ -12,6 +12,7 @@ mod damping;
 mod first_shift;
 mod geometric_stiffness;
 mod imported_shapes;
+mod interface_frame;
 mod invariants;
 mod lumped_modes;
 mod partial_bodies;

@@ -116,8 +116,21 @@ impl Arrays {
     }
 
     fn m1(&self, name: &'static str, i: usize, j: usize, k: usize) -> f64 {
-        let (middle, last) = if self.dialect == "fembeam" { (j, k) } else { (k, j) };
-        self.entry(name, &format!("m1({},{},{})", i + 1, middle + 1, last + 1)).unwrap_or(0.0)
+        let [first, middle, last] = match self.dialect {
+            "fembeam" => [i, j, k],
+            // Numbers as the reader of EMBSlib stores them, which its Modelica takes row by row.
+            "embs" => {
+                let (rows, at) = (self.rows(name), i * self.nq + k);
+                [at % rows, at / rows, j]
+            }
+            _ => [i, k, j],
+        };
+        self.entry(name, &format!("m1({},{},{})", first + 1, middle + 1, last + 1)).unwrap_or(0.0)
+    }
+
+    fn rows(&self, name: &'static str) -> usize {
+        let stated = self.section(name).iter().find_map(|line| line.strip_prefix("nrow="));
+        stated.expect("a size").parse().expect("a number")
     }
 
     /// A symmetric matrix, of which some dialects list one triangle.
@@ -148,7 +161,8 @@ impl Arrays {
 
     /// Gr(qd) (3 x 3) or Ge(qd) (nq x 3), by the order of columns that the dialect has.
     fn gyroscopic(&self, name: &'static str, nrow: usize, qd: &[f64]) -> DMatrix<f64> {
-        let by_modes = self.dialect == "fembeam" || (self.dialect == "py-sid" && name == "Gr");
+        let by_modes =
+            ["fembeam", "embs"].contains(&self.dialect) || (self.dialect == "py-sid" && name == "Gr");
         DMatrix::from_fn(nrow, 3, |i, a| {
             let column = |k: usize| if by_modes { 3 * k + a } else { a * self.nq + k };
             qd.iter().enumerate().map(|(k, qd)| self.m0(name, i, column(k)) * qd).sum()
@@ -448,12 +462,12 @@ fn the_part_has_a_name_in_the_dialects_that_have_one() {
         parts.source.name = name.to_owned();
         let body = FlexBody::new(parts.clone()).expect("valid parts");
         for (dialect_name, named) in
-            [("fembs", true), ("py-sid", true), ("morembs", false), ("fembeam", false)]
+            [("fembs", word), ("py-sid", word), ("morembs", ""), ("fembeam", ""), ("embs", "= body")]
         {
             let text = text(&body, &dialect(dialect_name));
             let line = text.lines().nth(2).expect("a third line").trim();
             let rest = line.strip_prefix("new modal").expect("the part").trim();
-            assert_eq!(rest, if named { word } else { "" }, "{dialect_name}");
+            assert_eq!(rest, named, "{dialect_name}");
         }
     }
 }
@@ -472,4 +486,111 @@ fn what_cannot_be_held_is_told() {
     assert!(refused.to_string().contains("FB720") && refused.to_string().contains("bolts"), "{refused}");
     let (_, warnings) = export(&body, sid(), &ExportOptions::default(), true).expect("with the loss");
     assert_eq!(warnings.len(), 1);
+}
+
+/// Names of arrays that the reader of EMBSlib looks for anywhere in a line.
+const KEYWORDS: [&str; 13] =
+    ["refmod", "frame", "mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De"];
+
+#[test]
+fn embs_has_keywords_in_the_heads_of_its_arrays_alone_and_lines_that_its_reader_holds() {
+    let mut parts = fixture("bracket_hex20", 12, BodyFrame::Model).into_parts();
+    let long = "Kurbel größer ".repeat(90);
+    for name in ["Crank", "Gear", "Joint_A", "frame refmod mass Me De", "", "Größe 日本 mdCM", &long] {
+        parts.source.name = name.to_owned();
+        let body = FlexBody::new(parts.clone()).expect("valid parts");
+        let text = text(&body, &dialect("embs"));
+        let mut inside: Vec<&str> = Vec::new();
+        for (number, line) in text.lines().enumerate().skip(2) {
+            assert!(line.len() < 100, "{line}");
+            let words = line.trim();
+            if let Some(ended) = words.strip_prefix("end ") {
+                inside.retain(|one| *one != ended);
+            } else if inside.is_empty() {
+                let found = KEYWORDS.iter().find(|keyword| words.contains(**keyword));
+                assert!(found.is_none_or(|keyword| *keyword == words), "{name}, line {number}: {line}");
+                inside.extend(found.copied().filter(|keyword| *keyword == words));
+            }
+            // Counts of five digits, numbers of 19 characters before the exponent.
+            if let Some((key, value)) = words.split_once("= ") {
+                let digits = |text: &str| text.split(|c: char| !c.is_ascii_digit()).map(str::len).max();
+                assert!(digits(key).is_none_or(|most| most <= 5), "{line}");
+                let number =
+                    key.starts_with('m') && value.trim().starts_with(|c: char| "-0123456789".contains(c));
+                assert!(
+                    !number || value.trim().split('D').next().is_some_and(|base| base.len() <= 19),
+                    "{line}"
+                );
+                assert!(!number || value.contains('D'), "{line}");
+            }
+        }
+        assert_eq!(
+            text.lines().filter(|line| line.contains(" mass ")).count(),
+            if name.contains(" mass ") { 2 } else { 1 }
+        );
+        let first = text.lines().next().expect("a line");
+        assert!(first.len() < 511 && first.contains("dialect embs"), "{}", first.len());
+        let start: String = name.trim().chars().take(9).collect();
+        assert!(read(&text).body.name.starts_with(&start), "{name}");
+    }
+}
+
+#[test]
+fn embs_counts_its_frames_and_says_beside_which_is_which() {
+    let mut parts = fixture("turbine_blade", MODES, BodyFrame::Model).into_parts();
+    parts.nodes.ids.iter_mut().for_each(|id| *id += 3_000_000);
+    let body = FlexBody::new(parts).expect("valid parts");
+    let some = body.nodes().ids[3];
+    for (name, counted) in [("embs", true), ("morembs", true), ("fembs", false)] {
+        let options = ExportOptions { points: Points::InterfacesAnd(vec![some]), ..dialect(name) };
+        let (exported, told) = export(&body, sid(), &options, true).expect("exports");
+        let places = flexbody::formats::export::frames(&body, &options.points);
+        let imported = read(&String::from_utf8(exported.file).expect("text")).body;
+        let labels: Vec<String> = imported.frames.iter().map(|frame| frame.label.clone()).collect();
+        let ids: Vec<i64> = places.iter().map(|place| place.id).collect();
+        if !counted {
+            assert_eq!(labels, ids.iter().map(i64::to_string).collect::<Vec<_>>());
+            assert!(exported.beside.is_empty());
+            continue;
+        }
+        assert_eq!(labels, ["1", "2", "3"]);
+        let [(ending, table)] = &exported.beside[..] else { panic!("a table") };
+        assert_eq!(ending, "frames.csv");
+        let table = String::from_utf8(table.clone()).expect("text");
+        let rows: Vec<String> =
+            table.lines().map(|line| line.split(',').take(3).collect::<Vec<_>>().join(",")).collect();
+        let row = |(i, place): (usize, &flexbody::formats::export::ExportFrame)| {
+            format!("{},{},\"{}\"", i + 1, place.id, place.name.as_deref().unwrap_or(""))
+        };
+        let expected: Vec<String> = places.iter().enumerate().map(row).collect();
+        assert_eq!(rows[1..], expected);
+        let noted = |part: &str| told.iter().any(|told| told.message().contains(part));
+        assert!(noted("table beside the file"), "{told:?}");
+        assert_eq!(noted("numNodes = 3 and numModes = 5"), name == "embs", "{told:?}");
+    }
+}
+
+#[test]
+fn what_embslib_leaves_out_is_told() {
+    let body = fixture("turbine_blade", MODES, BodyFrame::Model);
+    let body = stressed(body, &[LoadKind::Force("tip".to_owned())], 1e-3, &mut Random(1));
+    assert!(sid().losses(&body, &ExportOptions::default()).is_empty());
+    let told = sid().losses(&body, &dialect("embs"));
+    assert!(matches!(&told[..], [loss] if loss.starts_with("the geometric stiffness for ")), "{told:?}");
+    // Modes that move the centre of mass.
+    let body = crate::support::file_bodies::body(2, 4, 3, 1, 0);
+    let coriolis =
+        |name: &str| sid().losses(&body, &dialect(name)).iter().any(|loss| loss.contains("Coriolis"));
+    assert!(coriolis("embs") && !coriolis("fembeam"));
+}
+
+#[test]
+fn more_frames_than_the_reader_of_embslib_counts_are_refused() {
+    let body = crate::support::file_bodies::body(1, 100_000, 1, 0, 0);
+    let options = ExportOptions { points: Points::Nodes, ..dialect("embs") };
+    let refused = export(&body, sid(), &options, true).expect_err("100000 frames");
+    let said = refused.to_string();
+    assert!(said.contains("FB720") && said.contains("100000 frames") && said.contains("--points"), "{said}");
+    let options = ExportOptions { points: Points::Some(vec![body.nodes().ids[7]]), ..options };
+    assert!(export(&body, sid(), &options, true).is_ok());
 }

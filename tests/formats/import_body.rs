@@ -8,10 +8,11 @@ use faer::Mat;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::provenance::SourceFile;
 use flexbody::base::units::UnitSystem;
-use flexbody::body::flex_body::FlexBody;
+use flexbody::body::flex_body::{FlexBody, LoadKind, ReferenceConditions, UnitLoad};
 use flexbody::body::invariants::{BodyFrame, Invariants, condense, primary_differences};
 use flexbody::formats::import::{
-    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, accept_imported, audit, import_body,
+    Audit, ImportFrame, Imported, ImportedBody, ImportedFile, ImportedFrame, accept_imported, audit,
+    import_body,
 };
 use flexbody::model::{FeModel, GeometricStiffness};
 use flexbody::report::{Tolerances, compare};
@@ -44,6 +45,7 @@ fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Impo
         checks: Vec::new(),
         unsound: Vec::new(),
         body: ImportedBody {
+            mesh: None,
             name: "block".to_owned(),
             units: None,
             inertia: invariants.numbered(),
@@ -57,8 +59,12 @@ fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Impo
 }
 
 fn imported(file: &ImportedFile) -> Result<Imported, flexbody::base::error::Error> {
+    imported_in(file, &ImportFrame::Kept)
+}
+
+fn imported_in(file: &ImportedFile, frame: &ImportFrame) -> Result<Imported, flexbody::base::error::Error> {
     let source = SourceFile::new("body", Path::new("block.file"), "0".repeat(64));
-    import_body(file, source, UnitSystem::default())
+    import_body(file, source, UnitSystem::default(), frame)
 }
 
 fn random(random: &mut Random, rows: usize, columns: usize) -> Mat<f64> {
@@ -115,12 +121,11 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     // A damping that is not diagonal, and what it is in the modes of the body.
     let damping = Mat::from_fn(nf, nf, |i, j| 0.01 * (1 + i.min(j)) as f64);
     told.body.modal_damping = Some(mix.transpose() * &damping * &mix);
-    let load = flexbody::model::UnitLoad { kind: flexbody::model::LoadKind::Spin, component: 1 };
-    told.body.geometric_stiffness =
-        vec![GeometricStiffness { load: load.clone(), matrix: mix.transpose() * &damping * &mix }];
 
-    let Imported { body: taken, diagnostics } = imported(&told).expect("a body");
+    let Imported { body: taken, diagnostics } =
+        imported_in(&told, &ImportFrame::Mean(BodyFrame::Model)).expect("a body");
     assert_eq!(diagnostics.iter().map(|d| d.code()).collect::<Vec<_>>(), [Code::ForeignChanged]);
+    assert_eq!(*taken.conditions(), ReferenceConditions::MeanAxes);
     let failed: Vec<_> = taken.identities(BodyFrame::Model).into_iter().filter(|c| !c.passed).collect();
     assert!(failed.is_empty(), "{failed:?}");
     let mut in_frame = body.clone().into_parts();
@@ -128,7 +133,6 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     in_frame.units = taken.units().clone();
     let omega: Vec<f64> = in_frame.modes.eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     in_frame.modes.damping_ratio = (0..nf).map(|j| damping[(j, j)] / (2.0 * omega[j])).collect();
-    in_frame.geometric_stiffness = vec![GeometricStiffness { load: load.clone(), matrix: damping.clone() }];
     in_frame.modes.modal_damping = Some(damping.clone());
     let in_frame = FlexBody::new(in_frame).expect("a body");
     let strict = Tolerances { frequency: 1e-11, invariants: 1e-9, ..Tolerances::default() };
@@ -139,13 +143,104 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
         let products = (0..3 * body.n_nodes()).map(|row| own[(row, j)] * taken.modes().shape[(row, j)]);
         products.sum::<f64>().signum()
     };
-    for found in [taken.modes().modal_damping.as_ref().expect("told"), &taken.geometric_stiffness()[0].matrix]
-    {
-        let apart = (0..nf * nf)
-            .map(|at| (at / nf, at % nf))
-            .map(|(i, j)| (found[(i, j)] * sign(i) * sign(j) - damping[(i, j)]).abs())
-            .fold(0.0, f64::max);
-        assert!(apart < 1e-9 * damping.norm_max(), "{apart:e}");
+    let found = taken.modes().modal_damping.as_ref().expect("told");
+    let apart = (0..nf * nf)
+        .map(|at| (at / nf, at % nf))
+        .map(|(i, j)| (found[(i, j)] * sign(i) * sign(j) - damping[(i, j)]).abs())
+        .fold(0.0, f64::max);
+    assert!(apart < 1e-9 * damping.norm_max(), "{apart:e}");
+}
+
+/// The frame of a file is kept: the displacements of the nodes for the elastic forces of the modes are those of the file,
+/// with the frame held, and so is everything that is linear in the modes.
+#[test]
+fn a_frame_that_the_modes_tie_to_the_body_is_kept() {
+    let (model, body) = block(7);
+    let mut numbers = Random(11);
+    let (nf, mass) = (body.n_modes(), model.scalar_mass().expect("a solid"));
+    let mix = random(&mut numbers, nf, nf) + Mat::<f64>::identity(nf, nf);
+    let own = &body.modes().shape;
+    let shape = own * &mix + rigid(&body) * (random(&mut numbers, 6, nf) * faer::Scale(own.norm_max()));
+    let stiffness = mix.transpose() * body.invariants().modal_stiffness() * &mix;
+    let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness.clone());
+    let mut told = file_with(&body, &shape, &invariants);
+    let load = UnitLoad { kind: LoadKind::Spin, component: 1 };
+    let stressed = Mat::from_fn(nf, nf, |i, j| 0.01 * (1 + i.min(j)) as f64);
+    told.body.geometric_stiffness = vec![GeometricStiffness { load, matrix: stressed.clone() }];
+
+    let Imported { body: taken, diagnostics } = imported(&told).expect("a body");
+    assert_eq!(diagnostics.iter().map(|d| d.code()).collect::<Vec<_>>(), [Code::ForeignChanged]);
+    assert_eq!(*taken.conditions(), ReferenceConditions::Unstated);
+    let failed: Vec<_> = taken.identities(BodyFrame::Model).into_iter().filter(|c| !c.passed).collect();
+    assert!(failed.is_empty(), "{failed:?}");
+    // Compliance of the nodes with the frame held: Phi K^-1 Phi' before and after.
+    let solve = |a: &Mat<f64>, b: &Mat<f64>| {
+        let a = nalgebra::DMatrix::from_fn(nf, nf, |i, j| a[(i, j)]);
+        let b = nalgebra::DMatrix::from_fn(nf, b.ncols(), |i, j| b[(i, j)]);
+        let x = a.lu().solve(&b).expect("regular");
+        Mat::from_fn(nf, x.ncols(), |i, j| x[(i, j)])
+    };
+    let compliance = |shape: &Mat<f64>, a: &Mat<f64>| shape * solve(a, &shape.transpose().to_owned());
+    let close = |a: &Mat<f64>, b: &Mat<f64>, what: &str| {
+        let apart = (a - b).norm_max() / b.norm_max();
+        assert!(apart < 1e-9, "{what}: {apart:e}");
+    };
+    let new = &taken.modes().shape;
+    close(&compliance(new, taken.invariants().modal_stiffness()), &compliance(&shape, &stiffness), "K");
+    close(
+        &compliance(new, &taken.invariants().modal_mass()),
+        &compliance(&shape, &invariants.modal_mass()),
+        "m",
+    );
+    // C1' = X'C1' and K_geo' = X'K_geo X with Psi' = Psi X, in quantities of the nodes.
+    let inverse = |a: &Mat<f64>, shape: &Mat<f64>, m: &Mat<f64>| {
+        let moved = solve(m, &shape.transpose().to_owned());
+        moved.transpose() * a * &moved
+    };
+    let taken_k = &taken.geometric_stiffness()[0].matrix;
+    let m = invariants.modal_mass();
+    close(&inverse(taken_k, new, &taken.invariants().modal_mass()), &inverse(&stressed, &shape, &m), "K_geo");
+    let momentum =
+        |c1: &Mat<f64>, shape: &Mat<f64>, m: &Mat<f64>| c1 * solve(m, &shape.transpose().to_owned());
+    close(
+        &momentum(taken.invariants().c1(), new, &taken.invariants().modal_mass()),
+        &momentum(invariants.c1(), &shape, &m),
+        "C1",
+    );
+    // Mean axes need the geometric stiffness of the rigid motions, which the file does not have.
+    let refused = imported_in(&told, &ImportFrame::Mean(BodyFrame::Com)).expect_err("geometric stiffness");
+    assert!(refused.has(Code::CarrierImpossible), "{refused}");
+}
+
+/// Six rigid motions mixed into the modes are found as a span, and taken out.
+#[test]
+fn rigid_motions_mixed_into_the_modes_are_named_and_left_out() {
+    let (model, body) = block(5);
+    let mass = model.scalar_mass().expect("a solid");
+    let mut numbers = Random(3);
+    let all = Mat::from_fn(3 * body.n_nodes(), 11, |row, j| match j.checked_sub(5) {
+        None => body.modes().shape[(row, j)],
+        Some(_) => 0.0,
+    });
+    let rigid = rigid(&body);
+    let all = Mat::from_fn(all.nrows(), 11, |row, j| if j < 5 { all[(row, j)] } else { rigid[(row, j - 5)] });
+    let mix = random(&mut numbers, 11, 11) + Mat::<f64>::identity(11, 11);
+    let lambda = &body.modes().eigenvalue;
+    let own = Mat::from_fn(11, 11, |i, j| if i == j && i < 5 { lambda[i] } else { 0.0 });
+    let (shape, stiffness) = (all * &mix, mix.transpose() * own * &mix);
+    let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
+    let file = file_with(&body, &shape, &invariants);
+    let found = audit(&file, 1e-6);
+    let messages: Vec<String> = found.findings().iter().map(ToString::to_string).collect();
+    assert_eq!(codes(&found), [Code::AuditImplausible], "{messages:?}");
+    assert!(messages[0].contains("6 combinations of the modes are rigid motions"), "{messages:?}");
+    let Imported { body: taken, diagnostics } = imported(&file).expect("a body");
+    assert!(diagnostics[0].message().contains("6 combinations"), "{}", diagnostics[0]);
+    // What is left is M-orthogonal to all rigid motions: mean axes.
+    assert_eq!(*taken.conditions(), ReferenceConditions::MeanAxes);
+    assert_eq!(taken.n_modes(), 5);
+    for (own, told) in taken.modes().eigenvalue.iter().zip(lambda) {
+        assert!((own / told - 1.0).abs() < 1e-9, "{own} {told}");
     }
 }
 
@@ -169,7 +264,7 @@ fn a_rigid_motion_among_the_modes_is_left_out() {
     let invariants = condense(mass, &body.nodes().positions, shape.as_ref(), stiffness);
     let Imported { body: taken, diagnostics } =
         imported(&file_with(&body, &shape, &invariants)).expect("a body");
-    assert!(diagnostics[0].message().ends_with("rigid motions left out: 2"), "{}", diagnostics[0]);
+    assert!(diagnostics[0].message().starts_with("mode 2 is a rigid motion: left out"), "{}", diagnostics[0]);
     assert_eq!(taken.n_modes(), 4);
     assert!(worst_difference(body.invariants(), taken.invariants()) < 1e-10);
 }

@@ -11,7 +11,7 @@ use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::FlexBody;
 use flexbody::body::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
 use flexbody::formats::export::ExportOptions;
-use flexbody::formats::import::{ImportedFile, audit, import_body};
+use flexbody::formats::import::{ImportFrame, ImportedFile, audit, import_body};
 use flexbody::formats::{export, find_format};
 use flexbody::formats::{find_import_format, recognise};
 use flexbody::input::InputFile;
@@ -216,7 +216,8 @@ fn what_mbdyn_skips_is_a_finding() {
     assert!(found.contains(&surplus) && unsound.len() > 3, "{found:?} {unsound:?}");
     let imported = read(text.replacen("REV0 18 3", "REV0 18 2", 1).as_bytes(), "mbdyn").expect("readable");
     let source = SourceFile::new("body", Path::new("body.fem"), "0".repeat(64));
-    let error = import_body(&imported, source, UnitSystem::default()).expect_err("another body");
+    let error =
+        import_body(&imported, source, UnitSystem::default(), &ImportFrame::Kept).expect_err("another body");
     assert!(error.has(Code::ForeignUnsound), "{error}");
 }
 
@@ -496,7 +497,7 @@ proptest! {
                 prop_assert!(found.body.frames.iter().all(|frame| frame.translation.ncols() == found.body.n_modes()));
                 let _ = audit(&found, 1e-6);
                 let source = SourceFile::new("body", &path, "0".repeat(64));
-                let _ = import_body(&found, source, UnitSystem::default());
+                let _ = import_body(&found, source, UnitSystem::default(), &ImportFrame::Kept);
             }
             Err(error) => {
                 let about = [Code::ForeignUnreadable, Code::ForeignIncomplete, Code::FileUnreadable];
@@ -504,4 +505,44 @@ proptest! {
             }
         }
     }
+}
+
+/// A public body whose frame stands on its clamped end keeps it: with the frame held its end yields as the file says,
+/// read and written again.
+#[test]
+fn a_clamped_public_body_keeps_its_frame() {
+    let shared =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/cases/targets/mbsim/modal_reduced_beam.h5");
+    if !shared.exists() {
+        return;
+    }
+    let read = |path: &Path| {
+        let file = InputFile::open(path).expect("readable");
+        find_import_format("mbsim").expect("a format").read(&file).expect("a body")
+    };
+    let compliance = |told: &ImportedFile| {
+        let k = &told.body.modal_stiffness;
+        let n = k.ncols();
+        let inverse = nalgebra::DMatrix::from_fn(n, n, |i, j| k[(i, j)]).try_inverse().expect("regular");
+        let of_frame = |frame: &flexbody::formats::import::ImportedFrame| {
+            let phi = nalgebra::DMatrix::from_fn(3, n, |i, j| frame.translation[(i, j)]);
+            (&phi * &inverse * phi.transpose()).amax()
+        };
+        told.body.frames.iter().map(of_frame).fold(0.0, f64::max)
+    };
+    let given = read(&shared);
+    let source = SourceFile::new("body", &shared, "0".repeat(64));
+    let taken = import_body(&given, source, UnitSystem::default(), &ImportFrame::Kept).expect("a body");
+    // Surface lines are kept, stresses are told to be lost.
+    assert!(taken.body.mesh().is_some_and(|mesh| mesh.edges().len() == 20));
+    assert!(taken.diagnostics.iter().any(|d| d.message().contains("nodal stress matrix")));
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("again.h5");
+    let format = find_format("mbsim").expect("a format");
+    let (written, _) = export(&taken.body, format, &ExportOptions::default(), false).expect("written");
+    std::fs::write(&path, written.file).expect("a place");
+    let again = read(&path);
+    let (own, told) = (compliance(&again), compliance(&given));
+    assert!((own / told - 1.0).abs() < 1e-9 && (told - 1.30e-5).abs() < 0.01e-5, "{own:e} {told:e}");
+    assert_eq!(again.body.mesh, given.body.mesh);
 }

@@ -51,7 +51,8 @@ fn every_required_entry_is_missed_when_it_is_not_there() {
                 .contains(&key.as_str())
             || ["body_number", "bodies", "modal_damping"].contains(&key.as_str())
             || ["rotation", "internal", "internal_dof", "W0", "approximation"].contains(&key.as_str())
-            || ["digests", "sha256", "eigenvalue_rounding", "inertia_rounding"].contains(&key.as_str())
+            || ["reference_conditions", "digests", "sha256", "eigenvalue_rounding", "inertia_rounding"]
+                .contains(&key.as_str())
             || key.starts_with("fixed_interface_")
             || ["interface_motions", "free_eigenvalue", "free_eigenvalue_lower"].contains(&key.as_str())
             || ["coupling", "reference"].contains(&key.as_str())

@@ -71,6 +71,40 @@ def check_frames(k, m, origins, own):
     assert strained.max() < 1e-6, strained
 
 
+def check_chrono(k, m, origins, own):
+    """Reduced as ChModalAssembly does (Craig-Bampton), K and M are those of the body; M times g on all translations, of which it keeps the rows of
+    translations, is the load of gravity."""
+    wanted = {name: own[f"interface_coordinates/{name}"] for name in ("stiffness", "mass")}
+    nb, size = 6 * len(origins), len(wanted["mass"])
+    modes = size - nb
+    assert len(k) == len(m) == -(-(size + 3) // 6) * 6
+    of_interfaces = -np.linalg.solve(k[nb:, nb:], k[nb:, :nb])
+    half = np.linalg.inv(np.linalg.cholesky(k[nb:, nb:]))
+    flexibility, shapes = np.linalg.eigh(half @ m[nb:, nb:] @ half.T)
+    shapes = half.T @ shapes[:, ::-1][:, :modes] / np.sqrt(flexibility[::-1][:modes])
+    basis = np.block([[np.eye(nb), np.zeros((nb, modes))], [of_interfaces, shapes]])
+    # Amplitudes of the modes of the body in the internal nodes: those in translations stand on the centre of mass.
+    total = own["invariants/mass"][0]
+    to_body = np.zeros((size, len(m)))
+    to_body[:nb, :nb] = np.eye(nb)
+    for i in range(modes):
+        to_body[nb + i, nb + 3 + i] = np.sqrt(total)
+        if (3 + i) % 6 < 3:
+            to_body[nb + i, nb + (3 + i) % 6] = -np.sqrt(total)
+    back = np.linalg.inv(to_body @ basis)
+    for name, matrix in (("stiffness", k), ("mass", m)):
+        found = back.T @ (basis.T @ matrix @ basis) @ back
+        scale = np.sqrt(np.outer(np.diag(wanted[name]), np.diag(wanted[name])))
+        assert (np.abs(found - wanted[name]) / scale).max() < 1e-9, name
+    for g in np.eye(3):
+        load = m @ np.tile(np.append(g, [0, 0, 0]), len(m) // 6)
+        load[np.arange(len(m)) % 6 >= 3] = 0
+        rigid = np.append(np.tile(np.append(g, [0, 0, 0]), len(origins)), np.zeros(modes))
+        own_load = wanted["mass"] @ rigid
+        scale = np.sqrt(np.diag(wanted["mass"]) * total)
+        assert (np.abs(back.T @ (basis.T @ load) - own_load) / scale).max() < 1e-9, g
+
+
 def main(program, body):
     own = entries(body)
     with tempfile.TemporaryDirectory() as folder:
@@ -101,10 +135,10 @@ def main(program, body):
             assert frames == [str(name).rstrip() for name in mat["frames"]], (frames, mat["frames"])
         table = export("chrono", "body.csv")
         k, m = (scipy.io.mmread(table.with_suffix(f".{name}.mtx")).toarray() for name in "KM")
-        size, origins = len(mat["K"]), [line.split(",")[-3:] for line in table.read_text().splitlines()[2:]]
-        assert len(k) == len(m) == -(-size // 6) * 6
-        check_frames(k[:size, :size], m[:size, :size], np.array(origins, float), own[0])
-        print(f"simscape (MAT, HDF5) and chrono: K and M at {', '.join(frames)} are those of the body")
+        origins = [line.split(",")[-3:] for line in table.read_text().splitlines()[2:]]
+        assert np.array_equal(np.array(origins, float), mat["P0"])
+        check_chrono(k, m, origins, own[0])
+        print(f"simscape (MAT, HDF5) and chrono: K and M at {', '.join(frames)} are those of the body, gravity in Chrono too")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@
 installs Exudyn, welib, open FE codes, h5py, scipy and readers of pictures by pip and npm into target/peers, Octave, GetFEM, FEniCSx, CalculiX, SLEPc and an ARM compiler by apt-get (as root; else it says the command), runs every
 peer with target/release/flexbody and writes the table of docs/export.md and that of docs/formats/embedded.md. Some minutes. Without options it runs what is
 installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
-FEMBEAM (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
+FEMBEAM, EMBSLIB (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
 
 `--small` takes those peers that need seconds (CI runs it); `--only equations` those with this word in their name: the equations of each target, evaluated from its file, beside those of
 all nodes (target_equations/). `--all` also runs craig_bampton.py and mechanisms.py, which write files of their own.
@@ -96,6 +96,7 @@ PEERS = [
     ("Octave", "octave.simscape", True),
     ("FEMBeam in Octave", "octave.fembeam", True),
     ("pymbs", "pymbs_sid.rows", True),
+    ("EMBSlib", "embs.rows", True),
     ("welib", "sid.rows", True),
     ("h5py, numpy, scipy", "suite.other_libraries", True),
     ("equations of the targets", "suite.equations", True),

@@ -6,7 +6,8 @@ use faer::Mat;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::{
     FixedInterface, FlexBody, GeometricStiffness, Group, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadKind, LumpedBody, MassStructure, Parts, Storage, SurfaceMesh, TermDecision, UnitLoad,
+    InternalRows, LoadKind, LumpedBody, MassStructure, Parts, ReferenceConditions, Storage, SurfaceMesh,
+    TermDecision, UnitLoad,
 };
 use flexbody::body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody::formats::flex_body_file::contents;
@@ -96,6 +97,7 @@ fn complete() -> FlexBody {
         bound: 0.1,
         limit: 0.2,
     }];
+    parts.conditions = ReferenceConditions::Interface("left".to_owned());
     parts.mesh = Some(SurfaceMesh::new(vec![[0, 1, 4]], vec![[0, 1]], n).expect("a triangle"));
     FlexBody::new(parts).unwrap_or_else(|e| panic!("{e}"))
 }
@@ -111,6 +113,7 @@ const CHANGES: &[Change] = &[
     ("/@units_time", |p| p.units = UnitSystem::parse("m", "kg", "ms").expect("units")),
     ("/@units_stated", |p| p.units.stated = !p.units.stated),
     ("/@storage", |p| p.storage = Storage::F32),
+    ("/frame@reference_conditions", |p| p.conditions = ReferenceConditions::MeanAxes),
     ("/frame/origin", |p| p.frame.origin.y += 1e-3),
     ("/frame/axes", |p| p.frame.axes *= Rotation3::from_euler_angles(1e-3, 2e-3, 0.0).matrix()),
     ("/nodes/id", |p| p.nodes.ids.swap(0, 7)),

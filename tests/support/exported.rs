@@ -86,6 +86,7 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
             "frame_beams, Rayleigh, not at its centre".to_owned(),
             body_of(damped, BasisChoice::default(), BodyFrame::Model),
         ));
+        all.extend(on_interfaces());
         all.push(("a plane solid".to_owned(), free(rectangle(5, 2, 0.7, [1.0, 2.0]))));
         let (solid, general) = (soft_block(5), all[6].1.clone());
         all.push(("soft block in short floats".to_owned(), solid.rounded_to_f32().expect("a body")));
@@ -95,6 +96,23 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
         }
         all
     })
+}
+
+/// Bodies whose frame stands on an interface: of solids, and of beams and shells with rotations, with damping.
+pub fn on_interfaces() -> Vec<(String, FlexBody)> {
+    let made = |name: &str| {
+        let mut raw =
+            RawModel { damping: Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }), ..raw_fixture(name) };
+        raw.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(Coupling::Rigid));
+        let interface_frame = Some(raw.interfaces[0].name.clone());
+        let model = FeModel::from_raw(raw).expect("a body").model;
+        let basis = BasisChoice::CraigBampton(CraigBampton);
+        let mut settings = ConvertSettings { basis, interface_frame, ..ConvertSettings::default() };
+        settings.modes.wanted = Wanted::Lowest(4);
+        let body = convert(&model, &settings, SILENT).expect("converts").body;
+        (format!("{name}, frame on an interface"), body)
+    };
+    ["bracket_hex20", "robot_link", "satellite", "car_frame"].map(made).to_vec()
 }
 
 /// What an export writes, told or not.

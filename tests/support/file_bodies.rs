@@ -6,8 +6,8 @@ use flexbody::base::provenance::{SourceFile, sha256_hex};
 use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::{
     Certificate, FixedInterface, FlexBody, Frame, GeometricStiffness, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
-    SurfaceMesh, Truncation, UnitLoad,
+    InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts,
+    ReferenceConditions, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
 };
 use flexbody::body::invariants::{DIGITS, GeneralTerms, Groups, InertiaStiffness, Invariants, PrimaryData};
 use flexbody::model::{BodyNumber, Coupling, NodeMoments, Nodes};
@@ -214,6 +214,7 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         dimension: 3,
         units: units[r.below(3)].clone(),
         frame: Frame { origin: Vector3::from_fn(|_, _| r.value()), axes: *axes.matrix() },
+        conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes {
             ids: (0..n as i64).map(|i| (i * 7 + 3) * if i % 2 == 0 { 1 } else { -1 }).collect(),
             positions: (0..n).map(|_| [(); 3].map(|()| r.value())).collect(),

@@ -11,7 +11,9 @@ use flexbody::base::progress::SILENT;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::basis::ModeSettings;
 use flexbody::body::convert::{ConvertSettings, convert};
-use flexbody::body::flex_body::{Certificate, FlexBody, Frame, MassStructure, Modes, Parts, Source, Storage};
+use flexbody::body::flex_body::{
+    Certificate, FlexBody, Frame, MassStructure, Modes, Parts, ReferenceConditions, Source, Storage,
+};
 use flexbody::body::invariants::{BodyFrame, GeneralTerms, Groups, Invariants, PrimaryData};
 use flexbody::input::{read_manifest, read_model};
 use flexbody::model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
@@ -111,6 +113,7 @@ pub fn made_of(
         dimension: 3,
         units: UnitSystem::default(),
         frame: Frame::model(),
+        conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes { ids: (1..=positions.len() as i64).collect(), positions },
         modes: Modes {
             eigenvalue: (1..=nf).map(|j| j as f64).collect(),

@@ -9,7 +9,8 @@ use flexbody::base::diagnostic::{Code, Diagnostic};
 use flexbody::base::provenance::SourceFile;
 use flexbody::base::units::UnitSystem;
 use flexbody::body::flex_body::{
-    Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, Source, Storage,
+    Certificate, FlexBody, Interface, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
+    Storage,
 };
 use flexbody::body::invariants::{
     BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, PrimaryData, choose_frame, condense,
@@ -88,6 +89,7 @@ pub fn engine_mount() -> FlexBody {
         dimension: 3,
         units: UnitSystem::parse("m", "kg", "s").unwrap(),
         frame: Frame { origin: Vector3::new(0.125, 0.0, -0.0625), axes: Matrix3::identity() },
+        conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes {
             ids: (1..=8).collect(),
             positions: (0..8)
@@ -247,6 +249,7 @@ pub fn condensed(
         dimension: 3,
         units: UnitSystem::default(),
         frame,
+        conditions: ReferenceConditions::MeanAxes,
         nodes: Nodes { ids, positions },
         modes: Modes {
             eigenvalue: EIGENVALUES.to_vec(),

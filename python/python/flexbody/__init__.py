@@ -206,7 +206,8 @@ def convert(
         "fast"; "standard" proves that no mode is missing; "certified" guarantees bounds.
     frame
         Body frame: "com" (at the centre of mass, along the axes of the model), "principal" (there, along the
-        principal axes of inertia), "model".
+        principal axes of inertia), "model", or "interface=NAME" (on the reference point of an interface, which
+        then rests in every mode).
     comparators
         Whether to compute what lumped masses would have given.
     scene

@@ -2,7 +2,7 @@
 
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
-use super::residual_vectors::{NamedLoads, with_residual_vectors};
+use super::residual_vectors::{NamedLoads, interface_truncation, with_residual_vectors};
 use super::rigid_modes::rigid_modes;
 use super::{Loads, ModeSettings};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -38,7 +38,9 @@ impl Basis for FreeSurface {
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         if self.residual_vectors.is_empty() {
             let Task { model, settings, resume, watch } = *task;
-            return free_surface_resumed(model, settings, resume, watch);
+            let mut free = free_surface_resumed(model, settings, resume, watch)?;
+            free.truncation = interface_truncation(model, &free.solution, watch);
+            return Ok(free);
         }
         free_modes_with(&self.residual_vectors, "residual vector", task)
     }

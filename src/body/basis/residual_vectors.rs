@@ -6,8 +6,9 @@ use super::coupled_model::CoupledModel;
 use super::failure::explain;
 use super::interface_rows::{AXES, CoupledInterface, coupled_interfaces};
 use super::massless::on_mass;
-use super::modal_basis::ModalBasis;
+use super::modal_basis::{ModalBasis, problem_of_span};
 use super::pseudo_free_surface::{independent, part_in_words};
+use super::rigid_modes::rigid_modes;
 use super::{ModeSettings, Truncation};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -15,8 +16,8 @@ use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
 use crate::model::{Coupling, FeModel, InertialRows, RawShapes};
 use crate::numerics::eigen::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Precision, ResponseAccuracy, Wanted,
-    dynamic_responses, modes_of_span, static_responses, static_responses_twice,
+    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Multigrid, Precision, ResponseAccuracy,
+    Resume, Wanted, dynamic_responses, modes_of_span, static_responses, static_responses_twice,
 };
 use crate::numerics::linalg::{add_combination, column_products, gram, side_by_side};
 use faer::{Mat, MatRef};
@@ -231,6 +232,14 @@ impl NamedLoads {
             let message = format!("{what}s are no eigenvectors and cannot be certified");
             return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
         }
+        Self::of(model, loads, what)
+    }
+
+    /// The loads of a model, whatever accuracy the modes have.
+    ///
+    /// # Errors
+    /// [`InterfaceNode`](Code::InterfaceNode) without interfaces.
+    fn of(model: &FeModel, loads: &[Loads], what: &str) -> Result<Self> {
         let (mut names, mut forces, mut frequencies) = (Vec::new(), Vec::new(), Vec::new());
         for loads in loads {
             let frequency = (loads.hertz(), model.units().eigenvalue_of(loads.hertz()));
@@ -272,7 +281,7 @@ pub(super) fn with_residual_vectors(
     let failed = |failure: EigenFailure| explain(model, failure);
     let modes = &free.solution.vectors;
     let mut counters = free.solution.counters;
-    let beside = beside_modes(model, problem, &free.solution, loads, &mut counters)?;
+    let beside = beside_modes(model, problem, &free.solution, loads, ResponseAccuracy::FULL, &mut counters)?;
     let responses = Responses::new(problem, &free.solution, loads, beside);
     let added =
         responses.added(problem, modes.as_ref()).ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
@@ -300,12 +309,36 @@ pub(super) fn with_residual_vectors(
     Ok(basis)
 }
 
+/// Part of the static response to every load at an interface that the `free` modes lack. Empty without interfaces,
+/// and if the responses cannot be computed in the memory that there is: they need a factor of K - sigma M.
+pub(super) fn interface_truncation(
+    model: &FeModel,
+    free: &EigenSolution,
+    watch: Watch<'_>,
+) -> Vec<Truncation> {
+    let has_levels = free.plan.is_some_and(|plan| plan.multigrid == Multigrid::Used);
+    if model.interfaces().is_empty() || has_levels || free.vectors.ncols() == 0 {
+        return Vec::new();
+    }
+    watch(Event::Phase("compliance of the interfaces"));
+    let found = || -> Result<Vec<Truncation>> {
+        let rigid = rigid_modes(model, &model.pencil())?;
+        let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+        let loads = NamedLoads::of(model, &[Loads::Interfaces], "interface load")?;
+        let counters = &mut Counters::default();
+        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, counters)?;
+        Ok(Responses::new(&problem, free, &loads, beside).lacking())
+    };
+    found().unwrap_or_default()
+}
+
 /// What free modes do not have of the responses to loads (N x m).
 fn beside_modes(
     model: &FeModel,
     problem: &EigenProblem<'_>,
     free: &EigenSolution,
     loads: &NamedLoads,
+    accuracy: ResponseAccuracy,
     counters: &mut Counters,
 ) -> Result<Mat<f64>> {
     let (modes, first) = (free.vectors.as_ref(), free.eigenvalues[0]);
@@ -314,7 +347,7 @@ fn beside_modes(
     for ((hertz, square), columns) in loads.by_frequency() {
         let forces = Mat::from_fn(beside.nrows(), columns.len(), |i, c| loads.forces[(i, columns[c])]);
         let responses = if square == 0.0 {
-            static_responses(problem, modes, forces, first, precision, ResponseAccuracy::FULL, counters)
+            static_responses(problem, modes, forces, first, precision, accuracy, counters)
                 .map_err(|failure| explain(model, failure))?
         } else {
             dynamic_responses(problem, modes, forces, square, counters)
@@ -410,6 +443,15 @@ impl<'a> Responses<'a> {
         dropped.extend(found.rigid.iter().map(|&j| format!("{} (below 1e-5)", name(j))));
         let kept = found.kept.iter().map(|&j| used[j]).collect();
         Some(Added { vectors: found.vectors, kept, dropped })
+    }
+
+    /// What the free modes alone lack of each static response.
+    fn lacking(&self) -> Vec<Truncation> {
+        let error = |j: usize| {
+            if self.deforms[j] { (self.energy_beside[j].max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
+        };
+        let names = self.loads.names.iter().enumerate();
+        names.map(|(j, load)| Truncation { load: load.clone(), before: error(j), after: error(j) }).collect()
     }
 
     /// What the free modes lack of each static response, and what the modes of the whole span do.

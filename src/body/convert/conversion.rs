@@ -2,14 +2,15 @@
 //! know.
 
 use super::geometric_stiffness::softening_warning;
-use super::remarks::{free_frequencies, poor_fits};
+use super::remarks::{free_frequencies, interface_compliance, poor_fits};
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
 use crate::base::diagnostic::Diagnostic;
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
 use crate::body::basis;
 use crate::body::flex_body::{
-    FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, Source, Storage, Truncation,
+    FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
+    Storage, Truncation,
 };
 use crate::body::invariants::{Invariants, MassProperties};
 use crate::model::FeModel;
@@ -109,6 +110,10 @@ impl ModalModel<'_> {
             dimension: self.model.dimension(),
             units: self.model.units().clone(),
             frame: self.place.frame,
+            conditions: match &self.settings.interface_frame {
+                Some(name) => ReferenceConditions::Interface(name.clone()),
+                None => ReferenceConditions::MeanAxes,
+            },
             interfaces: self.interfaces.clone(),
             coordinates: self.coordinates(),
             nodes: self.nodes.clone(),
@@ -197,6 +202,7 @@ impl ModalModel<'_> {
             .chain(softening)
             .chain(poor_fits(body))
             .chain(free_frequencies(body))
+            .chain(interface_compliance(body))
             .collect()
     }
 }

@@ -5,10 +5,10 @@ use super::body_modes::reduced;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::basis::{BasisChoice, Loads};
-use crate::body::flex_body::{FlexBody, SOFTENING, axis_in_words};
+use crate::body::flex_body::{FlexBody, SOFTENING, axis_in_words, stiffness_about};
 use crate::model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
 use faer::{Mat, MatRef, Scale};
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Direction cosines up to this are rounding.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -21,12 +21,16 @@ const LARGEST: f64 = 1e290;
 /// in all axes; what nothing given contributes to is left out. Kinds in the order of the model, components in
 /// theirs.
 ///
+/// * `shift`: origin of the frame from the point that spin and angular acceleration were given about, frame axes;
+///   zero but for a frame on an interface. Unit: length.
+///
 /// # Errors
 /// [`MatrixNotFinite`](Code::MatrixNotFinite) when the products overflow.
 pub(crate) fn modal_geometric_stiffness(
     model: &FeModel,
     vectors: MatRef<'_, f64>,
     axes: &Matrix3<f64>,
+    shift: &Vector3<f64>,
 ) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
     let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
     for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
@@ -45,6 +49,7 @@ pub(crate) fn modal_geometric_stiffness(
             }
         }
     }
+    let mut out = stiffness_about(&out, shift, model.dimension());
     let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
     out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
     Ok(out)

@@ -1,7 +1,9 @@
 //! A model with its modes, in the frame of its body: the first stage of a conversion.
 
 use super::body_modes::{reduced, reduced_in_twice_the_precision};
-use super::{BodyModes, ConvertSettings, NodesInFrame, modal_geometric_stiffness, rigid_mass};
+use super::{
+    BodyModes, ConvertSettings, NodesInFrame, interface_frame, modal_geometric_stiffness, rigid_mass,
+};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::progress::{Event, Watch};
@@ -14,6 +16,7 @@ use crate::body::invariants::{
 use crate::model::{FeModel, GeometricStiffness, Nodes};
 use crate::numerics::eigen::{Accuracy, Resume};
 use faer::Mat;
+use nalgebra::Vector3;
 use std::collections::HashMap;
 
 /// A checked model and its modes in body axes; of the mass nothing is condensed yet.
@@ -54,20 +57,30 @@ impl<'m> ModalModel<'m> {
         refuse_uncertifiable(model, settings.modes.accuracy)?;
         let schemes =
             settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
+        let own_frame = own_frame(model, settings)?;
         let task = Task { model, settings: &settings.modes, resume, watch };
         let mut found = settings.basis.basis().modes(&task)?;
         watch(Event::Phase("invariants"));
         let (frame, mass_properties) = body_frame(model, settings.frame)?;
+        let frame = own_frame.unwrap_or(frame);
         let place = NodesInFrame::new(model, frame);
+        let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+        if let Some(name) = &settings.interface_frame {
+            interface_frame::constrain(model, &place, name, coupled, &mut found)?;
+        }
         let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
         // `certified` makes its own.
         let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
-        let geometric_stiffness = modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes)?;
+        let shift = match own_frame {
+            Some(own) => own.origin - mass_properties.centre_of_mass,
+            None => Vector3::zeros(),
+        };
+        let geometric_stiffness =
+            modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes, &shift)?;
         let inertia_stiffness = modes.inertia_stiffness(model, &frame);
         let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
-        let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
         let interfaces = interfaces_in_frame(model, &frame, coupled);
         Ok(Self {
             model,
@@ -108,6 +121,27 @@ fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
         return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
     }
     Ok(())
+}
+
+/// The frame on an interface, if one is asked for.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) beside settings that are about free modes; those of
+/// [`frame_of_interface`](interface_frame::frame_of_interface).
+fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
+    let Some(name) = &settings.interface_frame else { return Ok(None) };
+    let refuse = |message: &str, help: &str| {
+        Err(Diagnostic::new(Code::Usage, message.to_owned()).with_help(help.to_owned()).into())
+    };
+    if settings.modes.accuracy == Accuracy::Certified {
+        let message = "accuracy certified bounds the modes of the free body, not those of a body whose frame stands on an interface";
+        return refuse(message, "use --accuracy standard, or a frame at the centre of mass");
+    }
+    if settings.lumped_modes {
+        let message = "--lumped-modes compares modes of the free body, not those of a body whose frame stands on an interface";
+        return refuse(message, "leave --lumped-modes out, or use a frame at the centre of mass");
+    }
+    interface_frame::frame_of_interface(model, name).map(Some)
 }
 
 /// The body frame that is wanted, and the mass properties in model axes.

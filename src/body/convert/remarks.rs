@@ -35,6 +35,34 @@ pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::FreeFrequencies, message))
 }
 
+/// Part of the static compliance at an interface below which nothing is said.
+const COMPLIANCE: f64 = 0.01;
+
+/// A note about the part of the static compliance that the modes lack at each interface, if that is known and more
+/// than one percent. Compliance is f'K^+ f of a unit force or moment f, the square of the norm in [`Truncation`].
+///
+/// [`Truncation`]: crate::body::flex_body::Truncation
+pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
+    let worst = |interface: &Interface| {
+        let of_interface = body.modes().truncation.iter().filter_map(|one| {
+            let direction = one.load.strip_prefix(interface.name.as_str())?.strip_prefix(' ')?;
+            Some((one.after.powi(2), direction))
+        });
+        let (lacking, direction) = of_interface.reduce(|a, b| if b.0 > a.0 { b } else { a })?;
+        let named = || format!("`{}` {:.0} % ({direction})", interface.name, 100.0 * lacking);
+        (lacking > COMPLIANCE).then(named)
+    };
+    let found: Vec<String> = body.interfaces().iter().filter_map(worst).collect();
+    (!found.is_empty()).then(|| {
+        let message = format!(
+            "of the static compliance at the interfaces the {} modes lack {}",
+            body.n_modes(),
+            found.join(", ")
+        );
+        Diagnostic::new(Code::InterfaceCompliance, message)
+    })
+}
+
 /// Part of the motion of an interface that is rounding.
 const RIGID_FIT: f64 = 1e-8;
 

@@ -45,8 +45,10 @@ pub struct ConvertSettings {
     pub modes: ModeSettings,
     /// Which basis.
     pub basis: BasisChoice,
-    /// Body frame.
+    /// Body frame of a body in mean axes.
     pub frame: BodyFrame,
+    /// Interface that the frame stands on instead: at its reference point, along the axes of the model.
+    pub interface_frame: Option<String>,
     /// Comparators.
     pub lumped: Vec<Lumping>,
     /// Also compute the modes of each lumped mass.
@@ -62,6 +64,7 @@ impl Default for ConvertSettings {
             modes: ModeSettings::default(),
             basis: BasisChoice::default(),
             frame: BodyFrame::default(),
+            interface_frame: None,
             lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
             lumped_modes: false,
             mesh: MeshChoice::default(),
@@ -81,7 +84,10 @@ impl ConvertSettings {
         let mut described = serde_json::json!({
             "accuracy": self.modes.accuracy.name(),
             "basis": self.basis.basis().name(),
-            "frame": self.frame.name(),
+            "frame": self.interface_frame.as_ref().map_or_else(
+                || self.frame.name().to_owned(),
+                |name| format!("interface {name}"),
+            ),
             "lumped": schemes,
             "max_eigenvalue": below,
             "modes": modes,

@@ -2,8 +2,8 @@
 
 use super::validate::problems;
 use super::{
-    Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, Source, Storage,
-    TermDecision,
+    Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, ReferenceConditions,
+    Source, Storage, TermDecision,
 };
 use crate::base::error::{Error, Result};
 use crate::base::numbers::significant;
@@ -84,6 +84,11 @@ impl FlexBody {
         &self.parts
     }
 
+    /// All parts, for changes after which everything still holds that [`FlexBody::new`] checks.
+    pub(super) fn parts_mut(&mut self) -> &mut Parts {
+        &mut self.parts
+    }
+
     /// Gives the parts away, to change them and build a new body.
     pub fn into_parts(self) -> Parts {
         self.parts
@@ -117,6 +122,11 @@ impl FlexBody {
     /// Body frame in model coordinates.
     pub fn frame(&self) -> &Frame {
         &self.parts.frame
+    }
+
+    /// Reference conditions: what ties the body frame to the deformed body.
+    pub fn conditions(&self) -> &ReferenceConditions {
+        &self.parts.conditions
     }
 
     /// Node numbers and positions in the body frame.
@@ -261,7 +271,7 @@ impl FlexBody {
     pub fn identities(&self, frame: BodyFrame) -> Vec<IdentityCheck> {
         let expected = Expected {
             mass_normalised: true,
-            free_surface: true,
+            free_surface: self.parts.conditions.is_mean(),
             frame,
             origin: self.parts.frame.origin,
             eigenvalues: Some(&self.parts.modes.eigenvalue),
@@ -277,6 +287,7 @@ impl FlexBody {
         // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.
         let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
         let mut checks = relaxed(checks, rounding + self.parts.certificate.inertia_rounding);
+        checks.extend(self.parts.frame_at_rest());
         checks.extend(self.parts.interface_identities());
         checks.extend(self.parts.cross_checks());
         checks

@@ -11,7 +11,7 @@
 //! interface: no constraint is left to solve. The body that hangs from the interface has the eigenpairs of
 //! (K_ff, m_ff), with m_ff of the new modes.
 
-use super::{FlexBody, Groups, LoadKind};
+use super::{FlexBody, Groups, LoadKind, ReferenceConditions};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::model::{Coupling, DampingRatios};
@@ -70,7 +70,7 @@ impl FlexBody {
     /// model, and the modes are those of the head of this module. A body that is carried already is returned
     /// as it is.
     ///
-    /// Geometric stiffness is left out: what stresses the carried body are the loads together with the
+    /// Geometric stiffness is left out, whatever frame the body has: what stresses the carried body are the loads together with the
     /// reaction at the interface. The stiffness of inertia follows from the moments of the nodes and their
     /// rotations relative to the carrier.
     ///
@@ -88,11 +88,17 @@ impl FlexBody {
         let at = self.place_of(carrier)?;
         let along_model = self.frame().axes == nalgebra::Matrix3::identity();
         if along_model && at.reference == Vector3::zeros() && self.rests(&at.motion) {
-            return Ok(self.clone());
+            let mut parts = self.clone().into_parts();
+            parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
+            return Self::new(parts);
         }
         let body = self.in_model_axes(at.reference)?;
         let CarriedPoint { motion, .. } = body.place_of(carrier)?;
         let mut parts = body.into_parts();
+        parts.conditions = match carrier {
+            Carrier::Interface(name) => ReferenceConditions::Interface(name.clone()),
+            Carrier::Node(_) => ReferenceConditions::Unstated,
+        };
         let taken = |node: usize, k: usize, j: usize| {
             let x = parts.nodes.positions[node];
             let (l, m) = ((k + 1) % 3, (k + 2) % 3);
@@ -217,6 +223,7 @@ impl FlexBody {
         complete
             || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
             || modes.truncation.iter().any(|one| named(&one.load))
+                && modes.truncation.iter().all(|one| !named(&one.load) || one.after < RESOLVED)
             || modes.provenance.iter().any(|one| made_for(one))
     }
 

@@ -17,6 +17,10 @@ pub struct Interface {
     pub reference: Option<[f64; 3]>,
 }
 
+/// Displacement relative to the largest of the modes below which an interface is at rest, as one that the frame of the
+/// body stands on: rounding is not its deformation.
+const AT_REST: f64 = 1e-6;
+
 /// What the modes do at the reference point of an interface, in body axes: the rigid motion that fits that of
 /// the nodes best.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +32,7 @@ pub struct InterfaceRows {
     /// Root mean square over the nodes of what the fit leaves of the displacement (nf): zero where they move
     /// as a rigid body.
     pub misfit: Vec<f64>,
-    /// Root mean square over the nodes of their largest displacement in any mode.
+    /// Root mean square over the nodes of their largest displacement in any mode, at least that of an interface at rest.
     largest: f64,
 }
 
@@ -71,7 +75,8 @@ impl Interface {
         let left = &u - combine(motion.rigid().subrows(0, d * k), q.as_ref());
         let root_mean_square = |a: &Mat<f64>, j: usize| a.col(j).norm_l2() / (k as f64).sqrt();
         let misfit: Vec<f64> = (0..nf).map(|j| root_mean_square(&left, j)).collect();
-        let largest = (0..nf).map(|j| root_mean_square(&u, j)).fold(0.0, f64::max);
+        let at_rest = AT_REST * shape.norm_max();
+        let largest = (0..nf).map(|j| root_mean_square(&u, j)).fold(at_rest, f64::max);
         let translation = Mat::from_fn(3, nf, |i, j| if i < d { q[(i, j)] } else { 0.0 });
         let rotation = Mat::from_fn(3, nf, |i, j| match (d, i) {
             (2, 0 | 1) => 0.0,

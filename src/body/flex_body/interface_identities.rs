@@ -1,8 +1,8 @@
 //! What must hold for a body in the coordinates of its interfaces.
 
-use super::{InterfaceCoordinates, Parts};
+use super::{InterfaceCoordinates, Parts, ReferenceConditions};
 use crate::body::invariants::IdentityCheck;
-use crate::model::{rigid_count, rigid_fields};
+use crate::model::{rigid_count, rigid_fields, span};
 use crate::numerics::linalg::{combine, gram, largest};
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -16,7 +16,36 @@ const ENERGY: f64 = 1e-9;
 /// fixed-interface modes.
 const SUMMANDS: f64 = 4.0 * f64::EPSILON;
 
+/// Motion that rounding leaves an interface on which the frame stands, relative to the largest displacement of the mode.
+const AT_REST: f64 = 1e-9;
+
 impl Parts {
+    /// The identity of a frame that stands on an interface: its reference point is the origin and moves in no mode.
+    pub(super) fn frame_at_rest(&self) -> Option<IdentityCheck> {
+        let ReferenceConditions::Interface(name) = &self.conditions else { return None };
+        let interface = self.interfaces.iter().find(|interface| interface.name == *name)?;
+        let reference = interface.reference?;
+        let rotation = self.modes.rotation.as_ref().map(Mat::as_ref);
+        let rows = interface.rows(&self.nodes, self.modes.shape.as_ref(), rotation, self.dimension)?;
+        // A rotation displaces the nodes of the interface by their distances; a single node has none.
+        let places: Vec<[f64; 3]> = interface.nodes.iter().map(|&i| self.nodes.positions[i]).collect();
+        let (extent, own) = (span(&self.nodes.positions), span(&places));
+        let arm = if own > 0.0 { own } else { extent };
+        let moved = |j: usize| {
+            let turned =
+                rows.rotation.as_ref().map_or(f64::INFINITY, |rotation| arm * rotation.col(j).norm_max());
+            rows.translation.col(j).norm_max().max(turned) / self.modes.shape.col(j).norm_max()
+        };
+        let modes = (0..self.modes.shape.ncols()).map(moved);
+        let displaced = reference.iter().map(|x| x.abs() / extent);
+        Some(IdentityCheck::new(
+            "frame_on_interface",
+            "the reference point is the origin and rests in every mode",
+            largest(modes.chain(displaced)),
+            AT_REST + 4.0 * self.storage.rounding(),
+        ))
+    }
+
     /// What must hold for the interface coordinates: they carry the energies of the modes and the mass of the
     /// rigid body.
     pub fn interface_identities(&self) -> Vec<IdentityCheck> {

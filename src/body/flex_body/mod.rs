@@ -4,13 +4,16 @@ mod body;
 mod carried;
 mod cross_checks;
 mod fixed_interface;
+mod frames;
 mod in_units;
 mod interface;
 mod interface_identities;
+mod modal_change;
 mod model_axes;
 mod model_rows;
 mod parts;
 mod reduced;
+mod reference_conditions;
 mod rounded;
 mod softening;
 mod storage;
@@ -23,10 +26,13 @@ pub use body::FlexBody;
 pub use carried::Carrier;
 pub use fixed_interface::FixedInterface;
 pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
+pub(crate) use modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals, rigid_motions};
+pub(crate) use model_axes::stiffness_about;
 pub use parts::{
     Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
     is_static,
 };
+pub use reference_conditions::ReferenceConditions;
 pub(crate) use softening::{SOFTENING, axis_in_words};
 pub use storage::Storage;
 pub use terms::TermDecision;

@@ -1,6 +1,6 @@
 //! A body in a frame along the axes of its model.
 
-use super::{FlexBody, GeometricStiffness, InternalRows, LumpedBody, UnitLoad};
+use super::{FlexBody, GeometricStiffness, InternalRows, LumpedBody, ReferenceConditions, UnitLoad};
 use crate::base::error::Result;
 use crate::body::invariants::InertiaStiffness;
 use crate::model::LoadKind;
@@ -22,18 +22,34 @@ impl FlexBody {
     /// # Errors
     /// Those of [`FlexBody::new`], when numbers overflow.
     pub fn in_model_axes(&self, origin: Vector3<f64>) -> Result<Self> {
-        let (to_model, to_body) = (self.frame().axes, self.frame().axes.transpose());
+        let mut body = self.in_frame(origin, self.frame().axes.transpose())?;
+        // Without the rounding of a product of axes with their transpose.
+        body.parts_mut().frame.axes = Matrix3::identity();
+        Ok(body)
+    }
+
+    /// The same body in a frame at `origin` with the columns of `axes` as axes, both in the body frame: as
+    /// [`FlexBody::in_model_axes`].
+    ///
+    /// # Errors
+    /// Those of [`FlexBody::new`], when numbers overflow.
+    pub fn in_frame(&self, origin: Vector3<f64>, axes: Matrix3<f64>) -> Result<Self> {
+        let (to_new, to_body) = (axes.transpose(), axes);
         let mut parts = self.parts().clone();
-        parts.frame.origin += to_model * origin;
-        parts.frame.axes = Matrix3::identity();
-        let moved = |x: &[f64; 3]| (to_model * (Vector3::from(*x) - origin)).into();
+        if !parts.conditions.is_mean() && origin != Vector3::zeros() {
+            // The frame is tied to the interface as before, but its origin is elsewhere.
+            parts.conditions = ReferenceConditions::Unstated;
+        }
+        parts.frame.origin += parts.frame.axes * origin;
+        parts.frame.axes *= axes;
+        let moved = |x: &[f64; 3]| (to_new * (Vector3::from(*x) - origin)).into();
         parts.nodes.positions = parts.nodes.positions.iter().map(moved).collect();
         for interface in &mut parts.interfaces {
             interface.reference = interface.reference.as_ref().map(moved);
         }
-        parts.modes.shape = turned(parts.modes.shape.as_ref(), &to_model, usize::MAX);
+        parts.modes.shape = turned(parts.modes.shape.as_ref(), &to_new, usize::MAX);
         parts.modes.rotation =
-            parts.modes.rotation.map(|rotation| turned(rotation.as_ref(), &to_model, usize::MAX));
+            parts.modes.rotation.map(|rotation| turned(rotation.as_ref(), &to_new, usize::MAX));
         parts.modes.internal = parts.modes.internal.map(|internal| internal.in_axes(&to_body));
         parts.invariants = parts.invariants.shifted(origin).rotated(&to_body);
         parts.lumped = parts
@@ -57,7 +73,7 @@ impl FlexBody {
         d: &Vector3<f64>,
         axes: &Matrix3<f64>,
     ) -> Vec<GeometricStiffness<Mat<f64>>> {
-        along(&shifted(self.geometric_stiffness(), d, self.dimension()), axes)
+        along(&stiffness_about(self.geometric_stiffness(), d, self.dimension()), axes)
     }
 
     /// The stiffness of inertia about the point `d` and along the columns of `axes`, both in the body frame; `None`
@@ -100,7 +116,7 @@ fn turned(shape: MatRef<'_, f64>, axes: &Matrix3<f64>, end: usize) -> Mat<f64> {
 }
 
 /// Geometric stiffness for motion of the point `d` instead of the origin.
-fn shifted(
+pub(crate) fn stiffness_about(
     given: &[GeometricStiffness<Mat<f64>>],
     d: &Vector3<f64>,
     dimension: usize,

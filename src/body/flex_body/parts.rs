@@ -1,6 +1,6 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use super::{FixedInterface, Interface, InterfaceCoordinates, Storage, TermDecision};
+use super::{FixedInterface, Interface, InterfaceCoordinates, ReferenceConditions, Storage, TermDecision};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
 use crate::body::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
@@ -58,7 +58,7 @@ pub struct Modes {
     pub residual: Vec<f64>,
     /// Where each mode comes from: `free mode`, `imported shape`, ...; empty when it is not known.
     pub provenance: Vec<String>,
-    /// For each load that residual vectors were made for, what the modes lack.
+    /// Part of the static response that the modes lack, for each load of residual vectors and of the interfaces.
     pub truncation: Vec<Truncation>,
     /// Modal damping ratios, 0 when none was given.
     pub damping_ratio: Vec<f64>,
@@ -166,6 +166,8 @@ pub struct Parts {
     pub units: UnitSystem,
     /// Body frame.
     pub frame: Frame,
+    /// What ties the body frame to the deformed body.
+    pub conditions: ReferenceConditions,
     /// Node numbers and positions in the BODY frame.
     pub nodes: Nodes,
     /// The surface to draw the body by, on some of the nodes; nothing is computed from it.

@@ -56,6 +56,7 @@ impl FlexBody {
             dimension: parts.dimension,
             units: parts.units.clone(),
             frame: parts.frame,
+            conditions: parts.conditions.clone(),
             nodes: parts.nodes.clone(),
             mesh: parts.mesh.clone(),
             modes: parts.modes.some(modes),

@@ -1,6 +1,6 @@
 //! What must hold for the parts of a flexible body, checked once, all violations collected.
 
-use super::{Group, MassStructure, Parts, SurfaceMesh};
+use super::{Group, MassStructure, Parts, ReferenceConditions, SurfaceMesh};
 use crate::base::diagnostic::Diagnostic;
 use crate::body::invariants::{DIGITS, InertiaStiffness};
 use crate::body::problems::{LARGEST, Problems};
@@ -44,6 +44,7 @@ pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
     check.fixed_interface(parts, nf);
     check.terms(parts);
     check.interfaces(parts, n);
+    check.reference_conditions(parts);
     check.coordinates(parts, nf);
     check.text("source.name", &parts.source.name);
     if let Some(number) = parts.source.number.filter(|n| n.number == 0 || n.number > n.of) {
@@ -349,6 +350,20 @@ impl Problems {
             if interface.coupling == Some(Coupling::Free) && interface.reference.is_some() {
                 self.add(format!("interface `{name}` is free, but has a reference point"));
             }
+        }
+    }
+
+    /// The frame stands on an interface of the body that has a reference point.
+    fn reference_conditions(&mut self, parts: &Parts) {
+        let ReferenceConditions::Interface(name) = &parts.conditions else { return };
+        match parts.interfaces.iter().find(|interface| interface.name == *name) {
+            None => {
+                self.add(format!("the frame stands on interface `{name}`, which the body does not have"));
+            }
+            Some(interface) if interface.reference.is_none() => {
+                self.add(format!("the frame stands on interface `{name}`, which has no reference point"));
+            }
+            Some(_) => {}
         }
     }
 

@@ -1,6 +1,8 @@
 //! What can be said on the command line about work on a cluster and about many bodies.
 
-use super::{AccuracyName, FrameName, JobArguments, Printing, StorageName, memory_size, positive};
+use super::{
+    AccuracyName, FrameName, JobArguments, Printing, StorageName, frame_name, memory_size, positive,
+};
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 
@@ -62,9 +64,10 @@ pub struct AssembleArguments {
     /// [default: what the machine and its control groups leave]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
-    /// Frame of the body
-    #[arg(long, value_enum, default_value_t = FrameName::Com)]
-    pub frame: FrameName,
+    /// Frame of the body: com (centre of mass, axes of the model), principal (there, principal axes), model (that of the
+    /// model), or interface=NAME: on the reference point of an interface, which then rests in every mode [default: com]
+    #[arg(long, value_name = "FRAME", value_parser = frame_name)]
+    pub frame: Option<FrameName>,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,

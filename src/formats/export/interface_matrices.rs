@@ -34,6 +34,10 @@ impl<'a> InterfaceMatrices<'a> {
             Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into())
         };
         let Some(coordinates) = body.coordinates() else {
+            if !body.conditions().is_mean() {
+                let help = "export the body that --basis craig-bampton with --frame com gives: the matrices hold the motion of every interface";
+                return refuse(body.conditions().to_string(), help);
+            }
             let what = "the body has free modes only".to_owned();
             return refuse(what, "make it anew: flexbody convert --basis craig-bampton");
         };

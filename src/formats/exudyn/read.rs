@@ -6,8 +6,10 @@ use crate::base::error::Result;
 use crate::body::invariants::{Groups, Numbered};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
 use crate::formats::import::redundant::{ROUNDING, Redundant, in_other_order, lacks_w2, relative};
+use crate::formats::import::surface::surface;
 use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use crate::input::InputFile;
+use crate::model::SurfaceMesh;
 use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -33,6 +35,9 @@ const REQUIRED: [&str; 16] = [
     "mXRefTildePsi",
     "mXRefTildePsiTilde",
 ];
+
+const TRIANGLES: &str = "trigList";
+const STRESSES: &str = "postProcessingModes";
 
 impl ImportFormat for Exudyn {
     fn name(&self) -> &'static str {
@@ -74,6 +79,10 @@ impl ImportFormat for Exudyn {
             notes.push("the mass does not commute with rotations, says the file: modal mass and mPsiTildePsiTilde need not agree".to_owned());
         }
         let mut lacks = Vec::new();
+        let mesh = mesh(&mut arrays, n, &mut lacks)?;
+        if arrays.has_members(STRESSES) {
+            lacks.push(format!("`{STRESSES}`: stresses of the modes are not taken"));
+        }
         let mut inertia = told;
         if lacks_w2(&inertia) {
             inertia.i9 = None;
@@ -93,10 +102,25 @@ impl ImportFormat for Exudyn {
                 modal_damping: None,
                 geometric_stiffness: Vec::new(),
                 frames: (0..n).map(frame).collect(),
+                mesh,
                 lacks,
             },
         })
     }
+}
+
+/// Triangles for drawing and contact: three indices of nodes each (k x 3), or nothing.
+fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
+    if !arrays.has(TRIANGLES) {
+        return Ok(None);
+    }
+    // An empty list is one of floats in files of Exudyn.
+    let corners = match arrays.values::<f64>(TRIANGLES) {
+        Ok(found) if found.values.is_empty() => return Ok(None),
+        _ => arrays.integers(TRIANGLES)?,
+    };
+    let triangles: Vec<Vec<i64>> = corners.chunks(3).map(<[i64]>::to_vec).collect();
+    Ok(surface(TRIANGLES, &triangles, n, lacks))
 }
 
 /// The arrays of the file.

@@ -69,8 +69,7 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     let text = |text: &str| Hdf5Contents::Text(text.to_owned());
     let mut all = vec![
         array("modeBasis", Hdf5Contents::matrix(&mesh.shape)),
-        // Triangles are for pictures; a body knows no elements.
-        array("trigList", Hdf5Contents::Integers(vec![0, 3], Vec::new())),
+        array("trigList", triangles(body, mesh)),
         Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
         modal_mass(body, &told),
         array("stiffnessMatrixReduced", Hdf5Contents::matrix(body.invariants().modal_stiffness())),
@@ -88,6 +87,16 @@ fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
     all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
     all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
     all
+}
+
+/// Triangles of the surface by the indices of mesh nodes (k x 3), for drawing and contact; none if the mesh is not
+/// that of the nodes.
+fn triangles(body: &FlexBody, mesh: &Mesh) -> Hdf5Contents {
+    let own = body.mesh().filter(|_| mesh.numbers == body.nodes().ids);
+    let corners: Vec<i64> = own.map_or(Vec::new(), |own| {
+        own.triangles().as_flattened().iter().map(|&index| i64::from(index)).collect()
+    });
+    Hdf5Contents::Integers(vec![corners.len() / 3, 3], corners)
 }
 
 /// m_ff; for a mass that does not commute with rotations with an attribute that says so, as no array of the

@@ -7,8 +7,8 @@ use super::value::Value;
 use crate::base::units::UnitSystem;
 use crate::body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, Source, SurfaceMesh, TermDecision,
-    UnitLoad,
+    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, ReferenceConditions, Source, SurfaceMesh,
+    TermDecision, UnitLoad,
 };
 use crate::body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
@@ -29,6 +29,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         origin: Vector3::from_column_slice(&take.floats("/frame/origin")),
         axes: Matrix3::from_row_slice(&take.floats("/frame/axes")),
     };
+    let conditions = take.reference_conditions();
     let nodes = Nodes {
         ids: take.ints("/nodes/id"),
         positions: take.floats("/nodes/position").as_chunks().0.to_vec(),
@@ -51,6 +52,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
         dimension,
         units,
         frame,
+        conditions,
         nodes,
         mesh,
         modes,
@@ -180,6 +182,18 @@ impl Take<'_> {
             mass_structure: mass_structure?,
             approximation,
             settings: settings?,
+        })
+    }
+
+    /// Reference conditions; mean axes if the file does not state them.
+    fn reference_conditions(&mut self) -> ReferenceConditions {
+        const PATH: &str = "/frame@reference_conditions";
+        let Some(stated) = self.optional_text(PATH) else { return ReferenceConditions::MeanAxes };
+        ReferenceConditions::from_text(&stated).unwrap_or_else(|| {
+            self.scan.add(format!(
+                "{PATH}: expected `mean axes`, `interface NAME` or `not stated`, found {stated:?}"
+            ));
+            ReferenceConditions::MeanAxes
         })
     }
 

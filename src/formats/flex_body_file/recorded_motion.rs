@@ -59,16 +59,17 @@ impl RecordedMotion {
         if self.body != body.source().name {
             return foreign(format!("motion of `{}`, the body is `{}`", self.body, body.source().name));
         }
-        if self.modes != body.n_modes() {
+        let staged = match &self.carrier {
+            Some(carrier) => body.carried(carrier)?,
+            None => body.in_mean_axes()?.into_owned(),
+        };
+        if self.modes != staged.n_modes() {
             return foreign(format!("motion of {} modes, the body has {}", self.modes, body.n_modes()));
         }
         if self.time.is_empty() {
             return foreign("motion without an instant".to_owned());
         }
-        match &self.carrier {
-            Some(carrier) => body.carried(carrier),
-            None => Ok(body.clone()),
-        }
+        Ok(staged)
     }
 
     /// Indices of at most so many instants at equal steps, with the first and the last.

@@ -7,7 +7,7 @@ use super::item::Origin::{ConstantInt, ConstantText, Primary};
 use super::item::{Get, Group, Item, Kind, Origin, Per};
 use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
 use crate::base::provenance;
-use crate::body::flex_body::{Group as TermGroup, MassStructure, Storage};
+use crate::body::flex_body::{Group as TermGroup, MassStructure, Parts, Storage};
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
 use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
 use interfaces::{COORDINATES, INTERFACES};
@@ -27,8 +27,10 @@ pub(super) const WHOLE: &str = "sha256";
 pub(super) const MAJOR: i64 = 1;
 /// The minor version that has all entries; see [`MAJOR`]. A file states the least version that has those that
 /// it holds.
-pub(super) const MINOR: i64 = 6;
-/// The minor version of files without stiffness of inertia.
+pub(super) const MINOR: i64 = 7;
+/// The minor version of files of bodies in mean axes.
+const MEAN_AXES_ONLY: i64 = 6;
+/// The minor version of files of bodies in mean axes without stiffness of inertia.
 const WITHOUT_INERTIA_STIFFNESS: i64 = 5;
 /// The minor version of files with neither that nor a surface.
 const WITHOUT_MESH: i64 = 4;
@@ -108,10 +110,12 @@ const ROOT: &[Item] = &[
         ONE,
         "additions within the major version; a reader ignores what it does not know",
         |v| {
-            Some(Value::Int(match (&v.body.inertia_stiffness, &v.body.mesh) {
-                (Some(_), _) => MINOR,
-                (None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
-                (None, None) => WITHOUT_MESH,
+            let Parts { conditions, inertia_stiffness, mesh, .. } = v.body;
+            Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
+                (false, _, _) => MINOR,
+                (true, Some(_), _) => MEAN_AXES_ONLY,
+                (true, None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
+                (true, None, None) => WITHOUT_MESH,
             }))
         },
     ),
@@ -210,6 +214,14 @@ const SOURCE: &[Item] = &[
 ];
 
 const FRAME: &[Item] = &[
+    attribute(
+        "reference_conditions",
+        Text,
+        ONE,
+        "what ties the frame to the deformed body: `interface NAME`: its reference point is the origin and rests in every mode; `not stated`: the modes do, as in the file of another program that the body comes from; absent: `mean axes`, C1 = C2 = 0",
+        |v| text((!v.body.conditions.is_mean()).then(|| v.body.conditions.text())?),
+    )
+    .added(7),
     dataset(
         "origin",
         Floats(&[Fixed(3)]),
@@ -298,7 +310,7 @@ const MODES: &[Item] = &[
         "truncation",
         Text,
         ONE,
-        "JSON array with the `load` of every residual vector and what the modes lack of the static response to it, in the norm of K, `before` (free modes alone) and `after`; absent: no residual vectors",
+        "JSON array with the `load` of every residual vector and of every interface, and what the modes lack of the static response to it, in the norm of K, `before` (free modes alone) and `after`; absent: not known",
         |v| {
             let truncation = &v.body.modes.truncation;
             let json = || serde_json::to_string(truncation).expect("finite numbers and strings are valid JSON");

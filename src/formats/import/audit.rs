@@ -1,9 +1,10 @@
 //! The audit of a file: what its format promises, and what every flexible body must fulfil.
 
 use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
-use super::free_surface::is_free_surface;
-use super::{AuditCheck, ImportedBody, ImportedFile};
+use super::kind_of_modes::beside_free_surface;
+use super::{AuditCheck, ImportedBody, ImportedFile, ImportedFrame};
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::body::flex_body::rigid_motions;
 use crate::body::invariants::{IdentityCheck, Invariants, identities};
 use crate::numerics::linalg::{dense_cholesky, symmetric_eigen};
 use faer::Mat;
@@ -66,9 +67,10 @@ pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
         let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
         checks.extend(identities_of_any_body.into_iter().filter(told).map(of_identity));
         checks.push(turns(body));
+        checks.push(deform(&invariants));
         checks.extend(modal_checks(&invariants));
         checks.extend(size(body));
-        notes.push(kind_of_modes(&invariants));
+        notes.push(kind_of_modes(&invariants, &body.frames));
     }
     for check in checks.iter_mut().filter(|check| is_identity(check.code)) {
         check.limit = check.limit.max(tolerance);
@@ -104,6 +106,24 @@ fn turns(body: &ImportedBody) -> AuditCheck {
         limit: 0.0,
         code: Code::AuditImplausible,
         meaning: NO_INERTIA.to_owned(),
+    }
+}
+
+/// No motion of the modes is rigid: frame and modes would move the body in the same way twice, and the mass matrix of
+/// the free body is singular.
+fn deform(invariants: &Invariants) -> AuditCheck {
+    // A mass of no body has findings of its own.
+    let rigid = rigid_motions(invariants).unwrap_or_default();
+    let named = rigid.in_words().unwrap_or_else(|| "modes are rigid motions".to_owned());
+    AuditCheck {
+        name: "modes_deform",
+        formula: "motions of the modes that are rigid",
+        value: rigid.count as f64,
+        limit: 0.0,
+        code: Code::AuditImplausible,
+        meaning: format!(
+            "{named}: the frame makes the same motions, and the mass matrix of the free body is singular; convert --from leaves them out"
+        ),
     }
 }
 
@@ -256,12 +276,41 @@ fn size(body: &ImportedBody) -> Vec<AuditCheck> {
     ]
 }
 
-/// Whether the modes are mass-normalised free-surface modes, in words.
-fn kind_of_modes(invariants: &Invariants) -> String {
-    match is_free_surface(invariants) {
-        None => "modes are mass-normalised free-surface modes".to_owned(),
-        Some(by) => format!(
-            "modes are no mass-normalised free-surface modes (by {by:.1e}): the frame rides on the body in another way"
+/// The kind of the modes and what ties the frame to the body, in words.
+fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
+    let Some(by) = beside_free_surface(invariants) else {
+        return "modes are mass-normalised free-surface modes".to_owned();
+    };
+    let places = match &places_at_rest(frames)[..] {
+        [] => String::new(),
+        [one] => format!("; the frame stands on node {one}, which rests in every mode"),
+        [first, .., last] => format!(
+            "; the frame stands on {} nodes that rest in every mode, {first} to {last}",
+            places_at_rest(frames).len()
         ),
-    }
+    };
+    format!("modes are no mass-normalised free-surface modes (by {by:.1e}){places}")
+}
+
+/// Displacement of a node relative to the largest of the mode up to which the node rests.
+const AT_REST: f64 = 1e-9;
+
+/// Labels of the nodes that neither move nor turn in any mode.
+fn places_at_rest(frames: &[ImportedFrame]) -> Vec<&str> {
+    let modes = frames.first().map_or(0, |frame| frame.translation.ncols());
+    let size = |a: &Mat<f64>, j: usize| a.col(j).norm_max();
+    let largest: Vec<[f64; 2]> = (0..modes)
+        .map(|j| {
+            let most = |of: &dyn Fn(&ImportedFrame) -> f64| frames.iter().map(of).fold(0.0, f64::max);
+            let turned = |frame: &ImportedFrame| frame.rotation.as_ref().map_or(0.0, |a| size(a, j));
+            [most(&|frame| size(&frame.translation, j)), most(&turned)]
+        })
+        .collect();
+    let rests = |frame: &&ImportedFrame| {
+        largest.iter().enumerate().all(|(j, [moved, turned])| {
+            size(&frame.translation, j) <= AT_REST * moved
+                && frame.rotation.as_ref().is_none_or(|rotation| size(rotation, j) <= AT_REST * turned)
+        })
+    };
+    frames.iter().filter(rests).map(|frame| frame.label.as_str()).collect()
 }

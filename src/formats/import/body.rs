@@ -2,7 +2,7 @@
 
 use crate::base::units::UnitSystem;
 use crate::body::invariants::Numbered;
-use crate::model::GeometricStiffness;
+use crate::model::{GeometricStiffness, SurfaceMesh};
 use faer::Mat;
 
 /// A body as a file of another program describes it. Nothing of it is checked beyond its shapes: modes may be
@@ -23,6 +23,8 @@ pub struct ImportedBody {
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
     /// Places of the body.
     pub frames: Vec<ImportedFrame>,
+    /// Surface on the places of the body, if the file has one.
+    pub mesh: Option<SurfaceMesh>,
     /// What the file lacks of a body, or what of it cannot be taken, as fragments of sentences.
     pub lacks: Vec<String>,
 }

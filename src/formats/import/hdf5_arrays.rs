@@ -66,6 +66,12 @@ impl Hdf5Arrays {
         self.missing(&[name]).is_empty()
     }
 
+    /// True if there is a group with this name that holds something.
+    pub(crate) fn has_members(&self, name: &str) -> bool {
+        let group = if self.has(name) { self.root.group(name).ok() } else { None };
+        group.is_some_and(|group| members(&group).is_ok_and(|names| !names.is_empty()))
+    }
+
     /// The error that says what is wrong with a dataset.
     pub(crate) fn refuse(&self, name: &str, what: &str) -> Error {
         Diagnostic::new(Code::ForeignUnreadable, format!("`{name}`: {what}")).in_file(&self.path).into()

@@ -1,16 +1,17 @@
 //! A body of a file of another program as a body of ours.
 
 use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
-use super::free_surface::{FreeSurface, beside_diagonal, is_free_surface};
+use super::kind_of_modes::{beside_diagonal, beside_free_surface, beside_normalised};
 use super::{ImportedBody, ImportedFile, ImportedFrame};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
 use crate::body::flex_body::{
-    Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, Modes, Parts, Source,
-    Storage, TermDecision,
+    Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, ModalChange, Modes,
+    Parts, ReferenceConditions, Source, Storage, TermDecision,
 };
+use crate::body::flex_body::{diagonal_eigenvalues, reduced_residuals, rigid_motions};
 use crate::body::invariants::{BodyFrame, Invariants, identities, symmetric_part};
 use crate::model::Nodes;
 use crate::numerics::linalg::larger;
@@ -30,32 +31,92 @@ pub struct Imported {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Makes a body of `file`, which was read from `source`; `units` count where the file states none.
+/// Body frame of a body that is read from a file of another program.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum ImportFrame {
+    /// The frame of the file, tied to the body as its modes tie it: a model that holds the frame keeps its meaning.
+    #[default]
+    Kept,
+    /// Mean axes: rigid motion is taken out of the modes.
+    Mean(BodyFrame),
+    /// The frame stands on the interface, or on the node with rotations, of this name.
+    Interface(String),
+}
+
+/// Makes a body of `file`, which was read from `source`; `units` count if the file states none.
 ///
-/// Modes that are mass-normalised, free-surface and diagonal in K to 1e-9 are taken as they are, to the last
-/// bit. Others are made so: the rigid part is removed and the small eigenproblem solved, with the products
-/// that the invariants hold (theory 5.2). The body is the same, in other coordinates; its frame is that which
-/// rides on the mean motion.
+/// Modes that are mass-normalised with a diagonal stiffness to 1e-9 are taken as they are, to the last bit, if the
+/// frame is kept or they are free of rigid motion. Others are made so by the small eigenproblem, with the products
+/// that the invariants hold (theory 5.2): the body is the same in other coordinates. Rigid motions among the modes
+/// are left out.
 ///
 /// # Errors
 /// [`ForeignUnsound`](Code::ForeignUnsound) for what the reader says;
-/// [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes are rigid motions
-/// or depend on each other, or the stiffness is not positive; those of [`FlexBody::new`].
-pub fn import_body(file: &ImportedFile, source: SourceFile, units: UnitSystem) -> Result<Imported> {
+/// [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes depend on each other, or
+/// the stiffness is not positive; those of [`FlexBody::new`], [`FlexBody::in_mean_axes_at`] and
+/// [`FlexBody::on_interface`].
+pub fn import_body(
+    file: &ImportedFile,
+    source: SourceFile,
+    units: UnitSystem,
+    frame: &ImportFrame,
+) -> Result<Imported> {
     refuse_unsound(file)?;
     let given = &file.body;
     let lacking = |lack: &String| Diagnostic::new(Code::ForeignDropped, lack.clone());
     let mut diagnostics: Vec<Diagnostic> = given.lacks.iter().map(lacking).collect();
     let mut coordinates = ModalCoordinates::new(given)?;
-    if let Some(missed) = is_free_surface(&coordinates.invariants) {
-        let change = FreeSurface::new(&coordinates.invariants)?;
-        diagnostics.push(change.note(missed));
+    if let Some((change, note)) = normalising(&coordinates.invariants)? {
+        diagnostics.push(note);
         coordinates = coordinates.changed(&change, &given.frames);
     }
-    let body = FlexBody::new(parts(file, coordinates, source, units))?;
+    let conditions = match beside_free_surface(&coordinates.invariants) {
+        None => ReferenceConditions::MeanAxes,
+        Some(_) => ReferenceConditions::Unstated,
+    };
+    let body = FlexBody::new(parts(file, coordinates, conditions, source, units))?;
     let (body, warning) = with_own_rounding(body)?;
     diagnostics.extend(warning);
+    let body = match frame {
+        ImportFrame::Kept => body,
+        ImportFrame::Mean(at) => body.in_mean_axes_at(*at)?,
+        ImportFrame::Interface(name) => with_interface(body, name)?.on_interface(name)?,
+    };
     Ok(Imported { body, diagnostics })
+}
+
+/// The change to normalised modes in the frame of the file, with its note; `None` if the modes stay as they are.
+fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnostic)>> {
+    let refuse = |reason: String| {
+        let help = "flexbody audit says what is wrong with the file; write it again";
+        Diagnostic::new(Code::ForeignIncomplete, reason).with_help(help)
+    };
+    let beside = beside_normalised(invariants);
+    let rigid = rigid_motions(invariants).map_err(refuse)?;
+    if beside.is_none() && rigid.count == 0 {
+        return Ok(None);
+    }
+    let change = ModalChange::in_own_frame(invariants, 3).map_err(refuse)?;
+    let message = match (change.left_out().in_words(), beside) {
+        (Some(rigid), _) => format!("{rigid}: left out, the others are normalised"),
+        (None, by) => format!(
+            "the modes of the file are not mass-normalised with a diagonal stiffness (by {:.1e}): combinations of them that are were taken",
+            by.unwrap_or(0.0)
+        ),
+    };
+    Ok(Some((change, Diagnostic::new(Code::ForeignChanged, message))))
+}
+
+/// The body with an interface `name`: one that it has, or else its node of this number.
+fn with_interface(body: FlexBody, name: &str) -> Result<FlexBody> {
+    let known = body.interfaces().iter().any(|interface| interface.name == name);
+    let node = name.parse().ok().and_then(|id: i64| body.nodes().ids.iter().position(|own| *own == id));
+    let Some(node) = node.filter(|_| !known) else { return Ok(body) };
+    let mut parts = body.into_parts();
+    let reference = Some(parts.nodes.positions[node]);
+    let interface = Interface { name: name.to_owned(), nodes: vec![node], coupling: None, reference };
+    parts.interfaces.push(interface);
+    FlexBody::new(parts)
 }
 
 /// Refuses what the reader found unsound, and a file without places.
@@ -99,8 +160,8 @@ impl ModalCoordinates {
         })
     }
 
-    /// The same body in the coordinates of free-surface modes.
-    fn changed(self, change: &FreeSurface, frames: &[ImportedFrame]) -> Self {
+    /// The same body in other modal coordinates.
+    fn changed(self, change: &ModalChange, frames: &[ImportedFrame]) -> Self {
         let positions: Vec<[f64; 3]> = frames.iter().map(|frame| frame.position).collect();
         let turns: Vec<bool> = frames.iter().map(|frame| frame.rotation.is_some()).collect();
         Self {
@@ -135,16 +196,23 @@ fn sound_invariants(given: &ImportedBody) -> Result<Invariants> {
 }
 
 /// The parts of the body in its final coordinates.
-fn parts(file: &ImportedFile, coordinates: ModalCoordinates, source: SourceFile, units: UnitSystem) -> Parts {
+fn parts(
+    file: &ImportedFile,
+    coordinates: ModalCoordinates,
+    conditions: ReferenceConditions,
+    source: SourceFile,
+    units: UnitSystem,
+) -> Parts {
     let given = &file.body;
     let invariants = &coordinates.invariants;
     Parts {
         source: source_facts(file, invariants, source),
         dimension: 3,
         units: given.units.clone().unwrap_or(units),
-        frame: Frame { origin: nalgebra::Vector3::zeros(), axes: nalgebra::Matrix3::identity() },
+        frame: Frame::model(),
+        conditions,
         nodes: nodes(&given.frames),
-        mesh: None,
+        mesh: given.mesh.clone(),
         lumped: Vec::new(),
         certificate: certificate(file, invariants),
         interfaces: interfaces(given),
@@ -192,7 +260,7 @@ fn modes(
     rotation: Option<Mat<f64>>,
     damping: Option<Mat<f64>>,
 ) -> Modes {
-    let eigenvalue = eigenvalues(invariants);
+    let eigenvalue = diagonal_eigenvalues(invariants);
     let damping_ratio = match &damping {
         Some(d) => {
             eigenvalue.iter().enumerate().map(|(j, l)| (0.5 * d[(j, j)] / l.sqrt()).max(0.0)).collect()
@@ -200,7 +268,7 @@ fn modes(
         None => vec![0.0; eigenvalue.len()],
     };
     Modes {
-        residual: residuals(invariants, &eigenvalue),
+        residual: reduced_residuals(invariants, &eigenvalue),
         provenance: (1..=eigenvalue.len()).map(|j| format!("mode {j} of a {} file", file.format)).collect(),
         truncation: Vec::new(),
         damping_ratio,
@@ -254,23 +322,6 @@ fn stacked<'f>(
 ) -> Mat<f64> {
     let nf = frames.first().map_or(0, |frame| frame.translation.ncols());
     Mat::from_fn(3 * frames.len(), nf, |row, j| rows(&frames[row / 3]).map_or(0.0, |rows| rows[(row % 3, j)]))
-}
-
-/// The diagonal of K_ff, ascending: rounding may have exchanged what is repeated.
-fn eigenvalues(invariants: &Invariants) -> Vec<f64> {
-    let mut largest = 0.0f64;
-    let mut next = |j: usize| {
-        largest = largest.max(invariants.modal_stiffness()[(j, j)]);
-        largest
-    };
-    (0..invariants.n_modes()).map(&mut next).collect()
-}
-
-/// |K x - lambda x| of each unit vector x, relative to lambda.
-fn residuals(invariants: &Invariants, eigenvalue: &[f64]) -> Vec<f64> {
-    let k = invariants.modal_stiffness();
-    let beside = |j: usize| (0..eigenvalue.len()).filter(|i| *i != j).map(|i| k[(i, j)].powi(2)).sum::<f64>();
-    eigenvalue.iter().enumerate().map(|(j, l)| beside(j).sqrt() / (2.0 * l)).collect()
 }
 
 fn not_in_file(group: Group, format: &str) -> TermDecision {

@@ -8,15 +8,17 @@ mod body;
 pub(crate) mod check;
 pub(crate) mod digits;
 mod format;
-mod free_surface;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_arrays;
 mod import_body;
+mod kind_of_modes;
 pub(crate) mod redundant;
+#[cfg(feature = "hdf5")]
+pub(crate) mod surface;
 
 pub use accepted::accept_imported;
 pub use audit::{Audit, audit};
 pub use body::{ImportedBody, ImportedFrame};
 pub use check::AuditCheck;
 pub use format::{ImportFormat, ImportedFile};
-pub use import_body::{Imported, import_body};
+pub use import_body::{ImportFrame, Imported, import_body};

@@ -7,6 +7,7 @@
 //! 16. Group 11, lumped masses, would be added to groups 14 to 18 and is never written. I9_jk(a,b) of group
 //!     18 stands at the a-th of three rows, in column 3 (j nf + k) + b.
 
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::provenance::generator;
 use crate::body::flex_body::{FlexBody, LoadKind, UnitLoad};
@@ -78,6 +79,14 @@ impl ExportFormat for Mbdyn {
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        if !is_exact(options) && !body.conditions().is_mean() {
+            let message = format!(
+                "{}: modes of such a body move only with the coupling of record groups 14 to 18, which dialect {LEVEL_13} does not have",
+                body.conditions()
+            );
+            let help = format!("use dialect {LEVEL_19}, or a body made with --frame com");
+            return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
+        }
         let places = frames(body, &options.points);
         let mut file = File(head(body));
         let told = inertia(body);

@@ -5,8 +5,10 @@ use crate::base::error::Result;
 use crate::body::invariants::{Groups, Invariants, Numbered, PrimaryData};
 use crate::formats::import::hdf5_arrays::Hdf5Arrays;
 use crate::formats::import::redundant::{ROUNDING, asymmetry, relative};
+use crate::formats::import::surface::surface;
 use crate::formats::import::{AuditCheck, ImportFormat, ImportedBody, ImportedFile, ImportedFrame};
 use crate::input::InputFile;
+use crate::model::SurfaceMesh;
 use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
@@ -27,6 +29,8 @@ const DAMPING: &str = "damping matrix";
 const NUMBERS: &str = "node numbers";
 const POSITIONS: &str = "nodal relative position";
 const TRANSLATIONS: &str = "nodal shape matrix of translation";
+const STRESSES: &str = "nodal stress matrix";
+const INDICES: &str = "openmbv indices";
 const ROTATIONS: &str = "nodal shape matrix of rotation";
 
 /// Beside the diagonal of the stiffness matrix, relative to it: below this the modes are eigenmodes.
@@ -48,6 +52,11 @@ impl ImportFormat for Mbsim {
         let integrals = Integrals::read(&mut arrays, nf)?;
         let damping = arrays.has(DAMPING).then(|| arrays.matrix(DAMPING, nf, nf)).transpose()?;
         let frames = frames(&mut arrays, nf)?;
+        let mut lacks = Vec::new();
+        if arrays.has(STRESSES) {
+            lacks.push(format!("`{STRESSES}`: stresses of the modes are not taken"));
+        }
+        let mesh = mesh(&mut arrays, frames.len(), &mut lacks)?;
         let stiffness = arrays.matrix("stiffness matrix", nf, nf)?;
         let inertia = integrals.numbered();
         let mut notes = vec![format!("{} nodes, {nf} modes", frames.len())];
@@ -69,7 +78,8 @@ impl ImportFormat for Mbsim {
                 modal_damping: damping,
                 geometric_stiffness: Vec::new(),
                 frames,
-                lacks: Vec::new(),
+                mesh,
+                lacks,
             },
         })
     }
@@ -164,6 +174,16 @@ fn frames(arrays: &mut Hdf5Arrays, nf: usize) -> Result<Vec<ImportedFrame>> {
         rotation: rotations.as_ref().map(|shapes| rows(shapes, i)),
     };
     Ok(labels.into_iter().enumerate().map(frame).collect())
+}
+
+/// Lines and faces of OpenMBV: indices of nodes from 0, each line or face ended by -1.
+fn mesh(arrays: &mut Hdf5Arrays, n: usize, lacks: &mut Vec<String>) -> Result<Option<SurfaceMesh>> {
+    if !arrays.has(INDICES) {
+        return Ok(None);
+    }
+    let indices = arrays.integers(INDICES)?;
+    let polygons: Vec<Vec<i64>> = indices.split(|index| *index == -1).map(<[i64]>::to_vec).collect();
+    Ok(surface(INDICES, &polygons, n, lacks))
 }
 
 fn checks(

@@ -137,5 +137,21 @@ fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
     if places.iter().any(|place| place.rotation.is_some()) {
         all.push(Hdf5Contents::from_fn(3 * places.len(), nf, turn).named("nodal shape matrix of rotation"));
     }
+    all.extend(openmbv_indices(body, places));
     all
+}
+
+/// Triangles, or else edges, of the surface on the places of the file, each ended by -1.
+fn openmbv_indices(body: &FlexBody, places: &[ExportFrame]) -> Option<Hdf5Entry> {
+    let numbers: Vec<i64> = places.iter().map(|place| place.id).collect();
+    let mesh = body.mesh()?.among(&body.nodes().ids, &numbers)?;
+    let ended = |corners: &[u32]| {
+        let indices: Vec<i64> = corners.iter().map(|&index| i64::from(index)).chain([-1]).collect();
+        indices
+    };
+    let indices: Vec<i64> = match mesh.triangles() {
+        [] => mesh.edges().iter().flat_map(|edge| ended(edge)).collect(),
+        triangles => triangles.iter().flat_map(|triangle| ended(triangle)).collect(),
+    };
+    Some(Hdf5Contents::Integers(vec![indices.len()], indices).named("openmbv indices"))
 }

@@ -1,9 +1,9 @@
 //! SID_FEM as a format that is imported.
 
 use super::checks::checks;
-use super::read::arrays::{Arrays, FrameArrays};
+use super::read::arrays::FrameArrays;
 use super::read::body::{Declared, body};
-use super::read::layout::Layout;
+use super::read::layout::{Layout, arrays_in_order};
 use super::read::parse::Listed;
 use crate::base::diagnostic::Code;
 use crate::base::error::Result;
@@ -39,9 +39,9 @@ impl ImportFormat for SidFile {
     fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         // Names may be of any encoding, keywords and numbers are ASCII.
         let text = String::from_utf8_lossy(file.bytes());
-        let listed = Listed::read(file.path(), &text)?;
+        let mut listed = Listed::read(file.path(), &text)?;
         let digits = listed.digits();
-        let arrays = Arrays::new(&listed, digits);
+        let arrays = arrays_in_order(&mut listed, digits);
         let frames: Vec<FrameArrays> =
             listed.frames.iter().map(|frame| FrameArrays::new(frame, &listed, digits)).collect();
         let layout = Layout::detect(&listed, &arrays);

@@ -59,12 +59,28 @@ impl<'a> Stage<'a> {
                 }
                 (Cow::Owned(own), found)
             }
-            None => (centred(body)?, Vec::new()),
+            None => {
+                refuse_numbered_modes(body, scene)?;
+                (centred(body)?, Vec::new())
+            }
         };
         let resolved = resolved(scene, &body.frame().axes, &staged.frame().origin);
         found.extend(idle(&staged, &resolved));
         Ok(Self { body: staged, scene: Cow::Owned(resolved), found })
     }
+}
+
+/// Refuses a start of modes by their numbers for a body that is simulated in mean axes, where it has other modes.
+fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
+    if body.conditions().is_mean() || scene.initial.modes.is_empty() {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: without a carrier the body is simulated in mean axes, where the mode numbers of [initial] mean other modes",
+        body.conditions()
+    );
+    let help = "convert with --frame com, or start from the static equilibrium of a load";
+    Err(Diagnostic::new(Code::SceneContradicts, message).with_help(help).into())
 }
 
 /// The carrier of a body that hangs from `point`.
@@ -75,15 +91,16 @@ fn carrier(point: &Point) -> Carrier {
     }
 }
 
-/// The body along the axes of the model, with its origin at the centre of mass.
+/// The body in mean axes along the axes of the model, with its origin at the centre of mass.
 fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
-    let invariants = body.invariants();
+    let mean = body.in_mean_axes()?;
+    let invariants = mean.invariants();
     let centre = invariants.first_moment() / invariants.mass();
     let shift = if centre.norm() <= AT_ORIGIN * body.extent() { Vector3::zeros() } else { centre };
-    if shift == Vector3::zeros() && body.frame().axes == Matrix3::identity() {
-        return Ok(Cow::Borrowed(body));
+    if shift == Vector3::zeros() && mean.frame().axes == Matrix3::identity() {
+        return Ok(mean);
     }
-    Ok(Cow::Owned(body.in_model_axes(shift)?))
+    Ok(Cow::Owned(mean.in_model_axes(shift)?))
 }
 
 /// The scene with its vectors along the axes of the model; `axes` are those of the body in the model,

@@ -164,7 +164,8 @@ pub fn respond(
     settings: &Settings,
     watch: Watch<'_>,
 ) -> Result<Response> {
-    let body = &*damped(body, settings)?;
+    let mean = body.in_mean_axes()?;
+    let body = &*damped(&mean, settings)?;
     let at_centre = body.in_model_axes(body.invariants().first_moment() / body.invariants().mass())?;
     let rows =
         |places: &[Place]| places.iter().map(|place| place.rows(&at_centre)).collect::<Result<Vec<_>>>();

@@ -150,6 +150,7 @@ pub fn select_for_cases(
     watch: Watch<'_>,
 ) -> Result<Selection> {
     assert!(!scenes.is_empty(), "a scene to select for");
+    body.require_mean_axes("select")?;
     let stages = scenes.iter().map(|scene| on_stage(body, scene, scenes)).collect::<Result<Vec<_>>>()?;
     watch(Event::Phase("bounds"));
     let mut demands = demands(&stages, scenes, memory, true)?;

@@ -27,8 +27,9 @@ impl Source {
     /// The reference, or a body alone; with the time that it took to make it, where that is known.
     ///
     /// # Errors
-    /// Of [`FlexBody::new`]: none for a valid body.
+    /// Those of [`FlexBody::require_mean_axes`].
     pub fn new(name: impl Into<String>, body: FlexBody, preprocessing: Option<f64>) -> Result<Self> {
+        body.require_mean_axes("trade")?;
         let mut parts = body.into_parts();
         let lumped = std::mem::take(&mut parts.lumped);
         let (name, body) = (name.into(), FlexBody::new(parts)?);

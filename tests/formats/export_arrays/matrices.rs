@@ -1,6 +1,6 @@
-//! `simscape` and `chrono`: K, M and damping in the motions of the interface frames.
+//! `simscape`: K, M and damping in the motions of the interface frames; bodies that have none there, of `chrono` too.
 
-use super::readers::{Variable, mat5, matrix_market};
+use super::readers::{Variable, mat5};
 use crate::support::exported::{exported, file, jointed, jointed_bodies};
 use crate::support::general::{dense, raw_fixture};
 use crate::support::plane::rectangle;
@@ -14,9 +14,9 @@ use hdf5_metno as hdf5;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 
-type Matrices = BTreeMap<String, DMatrix<f64>>;
+pub(super) type Matrices = BTreeMap<String, DMatrix<f64>>;
 
-fn of_rows(rows: &[Vec<f64>]) -> DMatrix<f64> {
+pub(super) fn of_rows(rows: &[Vec<f64>]) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), rows.first().map_or(0, Vec::len), |i, j| rows[i][j])
 }
 
@@ -58,7 +58,7 @@ fn of_hdf5(bytes: &[u8]) -> (Matrices, BTreeMap<String, Vec<String>>) {
 }
 
 /// Rigid motion about the origin of the body frame in the coordinates of frames at `origins`.
-fn rigid(origins: &DMatrix<f64>, size: usize) -> DMatrix<f64> {
+pub(super) fn rigid(origins: &DMatrix<f64>, size: usize) -> DMatrix<f64> {
     DMatrix::from_fn(size, 6, |row, column| {
         let (frame, k) = (row / 6, row % 6);
         if frame >= origins.nrows() {
@@ -80,7 +80,7 @@ fn rigid(origins: &DMatrix<f64>, size: usize) -> DMatrix<f64> {
 }
 
 /// What K, M and D of a file must be, whatever format it has.
-fn assert_is_the_body(name: &str, body: &FlexBody, matrices: &Matrices) {
+pub(super) fn assert_is_the_body(name: &str, body: &FlexBody, matrices: &Matrices) {
     let (k, m, origins) = (&matrices["K"], &matrices["M"], &matrices["P0"]);
     let size = k.nrows();
     let rigid = rigid(origins, size);
@@ -176,49 +176,6 @@ fn names_of_frames_are_kept() {
     }
     let table = String::from_utf8(exported(&body, "chrono", None).expect("writes").file).expect("UTF-8");
     assert!(table.contains("\n\"Lager außen\",") && table.contains("\n\"日本 \"\"x\"\"\","), "{table}");
-}
-
-/// Boundary nodes, then six coordinates for each internal node: those that are no modes have stiffness but no
-/// mass.
-#[test]
-fn chrono_has_the_same_matrices_filled_up_to_whole_nodes() {
-    let mut filled = 0;
-    for (name, body) in jointed_bodies() {
-        let done = exported(body, "chrono", None).expect("writes");
-        let table = String::from_utf8(done.file).expect("UTF-8");
-        let lines: Vec<&str> = table.lines().filter(|line| !line.starts_with('#')).collect();
-        assert_eq!(lines[0], "name,x,y,z");
-        let rows: Vec<Vec<f64>> = lines[1..]
-            .iter()
-            .map(|line| {
-                line.rsplitn(4, ',').take(3).map(|v| v.parse().expect("a number")).collect::<Vec<f64>>()
-            })
-            .map(|row| row.into_iter().rev().collect())
-            .collect();
-        let files: BTreeMap<&str, DMatrix<f64>> = done
-            .beside
-            .iter()
-            .map(|(extension, bytes)| (extension.as_ref(), of_rows(&matrix_market(bytes))))
-            .collect();
-        let size = body.coordinates().expect("jointed").names.len();
-        let all = files["M.mtx"].nrows();
-        assert_eq!((all, files["M.mtx"].ncols()), (size.next_multiple_of(6), all), "{name}");
-        filled += all - size;
-        let mut matrices = Matrices::from([("P0".to_owned(), of_rows(&rows))]);
-        for (extension, own) in [("K.mtx", "K"), ("M.mtx", "M"), ("R.mtx", "C")] {
-            let Some(matrix) = files.get(extension) else { continue };
-            matrices.insert(own.to_owned(), matrix.view((0, 0), (size, size)).into_owned());
-            for (i, j) in (size..all).flat_map(|i| (0..all).map(move |j| (i, j))) {
-                assert_eq!(matrix[(i, j)], matrix[(j, i)]);
-                assert!(
-                    if i == j && own == "K" { matrix[(i, j)] > 0.0 } else { matrix[(i, j)] == 0.0 },
-                    "{name}"
-                );
-            }
-        }
-        assert_is_the_body(name, body, &matrices);
-    }
-    assert!(filled > 0, "modes that do not fill whole nodes");
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! the body, for all fixture models.
 
 mod adams;
+mod chrono;
 mod entries;
 mod losses;
 mod matrices;

@@ -68,6 +68,7 @@ pub(crate) fn body(records: &Records) -> Option<Read> {
         modal_damping: matrix(13),
         geometric_stiffness,
         frames,
+        mesh: None,
         lacks,
     };
     Some(Read { body, lumped })

@@ -92,6 +92,7 @@ pub(crate) fn body(
         modal_damping: damped.then(|| arrays.de.m0.clone()),
         geometric_stiffness: stiffness,
         frames,
+        mesh: None,
         lacks: lacks(arrays),
     };
     (body, notes)

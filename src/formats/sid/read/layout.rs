@@ -3,6 +3,7 @@
 use super::arrays::Arrays;
 use super::parse::Listed;
 use super::taylor::ModeIndex;
+use crate::formats::import::digits::Digits;
 use nalgebra::Matrix3;
 
 /// Order of the columns of Gr and Ge.
@@ -92,12 +93,12 @@ fn fitting(misfit: impl Fn(Blocks) -> f64) -> Option<Blocks> {
 const DIALECTS: [(&str, Blocks, Blocks); 5] = [
     ("fembs", Blocks::Component, Blocks::Component),
     ("py-sid", Blocks::Mode, Blocks::Component),
-    (MODE_BLOCKED, Blocks::Mode, Blocks::Mode),
+    ("embs", Blocks::Mode, Blocks::Mode),
     ("morembs", Blocks::Component, Blocks::Component),
     ("fembeam", Blocks::Mode, Blocks::Mode),
 ];
 
-/// What no writer is known to write, but the reader of EMBSlib takes.
+/// Earlier name of the layout of `embs`.
 const MODE_BLOCKED: &str = "mode-blocked";
 
 /// The dialect.
@@ -130,26 +131,33 @@ impl Layout {
             Some((name, ..)) => name,
             None => by_numbers.unwrap_or("none"),
         };
-        let mode = match listed.modes {
-            ModeIndex::Middle => "middle",
-            ModeIndex::Last => "last",
-        };
-        let reason = format!(
-            "{reason}; Gr is {}, Ge is {}, m1 has the mode as its {mode} index",
-            gr.words(),
-            ge.words()
-        );
+        let reason =
+            format!("{reason}; Gr is {}, Ge is {}, {}", gr.words(), ge.words(), listed.modes.words());
         Self { dialect, declared, gr, ge, reason }
     }
 }
 
+/// Reads the arrays. Where no name says the dialect, `m1` is counted by rows if J1 is the symmetric part of Gr only so.
+pub(crate) fn arrays_in_order(listed: &mut Listed<'_>, digits: Digits) -> Arrays {
+    let arrays = Arrays::new(listed, digits);
+    if listed.modes != ModeIndex::Middle || declared(listed).0.is_some() || arrays.inertia.m1.is_none() {
+        return arrays;
+    }
+    let misfit = |arrays: &Arrays, blocks: Blocks| blocks.gr_misfit(arrays)[0];
+    let usual = Blocks::ALL.map(|blocks| misfit(&arrays, blocks)).into_iter().fold(f64::INFINITY, f64::min);
+    listed.modes = ModeIndex::Rows;
+    let by_rows = Arrays::new(listed, digits);
+    if misfit(&by_rows, Blocks::Mode) < CLEAR * usual {
+        return by_rows;
+    }
+    listed.modes = ModeIndex::Middle;
+    arrays
+}
+
 /// The dialect by names, and why.
 fn declared<'l>(listed: &'l Listed<'_>) -> (Option<&'l str>, String) {
-    let own = listed
-        .comment
-        .strip_prefix("flexbody ")
-        .and_then(|rest| rest.split(", ").find_map(|fact| fact.strip_prefix("dialect ")));
-    if let Some(name) = own {
+    if let Some(name) = listed.named_dialect() {
+        let name = if name == MODE_BLOCKED { "embs" } else { name };
         (Some(name), format!("the first line names the dialect {name}"))
     } else if listed.has_morembs_names() {
         (Some("morembs"), "the first moment is called mCM or the inertia mmi".to_owned())

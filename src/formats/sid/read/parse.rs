@@ -151,9 +151,19 @@ impl<'t> Listed<'t> {
         self.all_objects().map(|object| object.digits).fold(Digits::default(), Digits::most)
     }
 
-    /// Where `m1` has the mode: columns of one number tell, of three modes where there are three columns
-    /// nothing does.
+    /// Dialect that the first line of a file of flexbody names.
+    pub(crate) fn named_dialect(&self) -> Option<&str> {
+        let facts = self.comment.strip_prefix("flexbody ")?;
+        facts.split(", ").find_map(|fact| fact.strip_prefix("dialect "))
+    }
+
+    /// Finds the place of the mode in `m1`: columns of one number tell, of three modes where there are three columns
+    /// nothing does. The first line alone tells the order of EMBSlib here, whose indices fit every array.
     fn find_mode_index(&mut self) {
+        if self.named_dialect() == Some("embs") {
+            self.modes = ModeIndex::Rows;
+            return;
+        }
         let admits = |modes: ModeIndex| self.all_objects().all(|object| object.admits(modes, self.nq));
         let last = match (admits(ModeIndex::Middle), admits(ModeIndex::Last)) {
             (false, true) => true,

@@ -31,19 +31,39 @@ pub(crate) struct Taylor {
     pub(crate) digits: Digits,
 }
 
-/// Where `m1` has the index of the mode.
+/// Places of the indices of an entry of M1 in `m1(., ., .)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ModeIndex {
+    /// (row, mode, column).
     Middle,
+    /// (row, column, mode).
     Last,
+    /// (row, mode, column) of the place that an entry has when entries are counted mode by mode and then row by row,
+    /// while they are counted row by row and then mode by mode: for EMBSlib.
+    Rows,
 }
 
 impl ModeIndex {
-    /// (column, mode) of the second and third index.
-    fn split(self, [_, second, third]: [usize; 3]) -> (usize, usize) {
+    /// Words about `m1` in the reason of a layout.
+    pub(crate) fn words(self) -> &'static str {
         match self {
-            Self::Middle => (third, second),
-            Self::Last => (second, third),
+            Self::Middle => "m1 has the mode as its middle index",
+            Self::Last => "m1 has the mode as its last index",
+            Self::Rows => "m1 is counted by rows, as EMBSlib takes it",
+        }
+    }
+
+    /// [row, column, mode] for the three indices of an entry, of an array of `nrow` rows and `nq` modes.
+    fn place(self, [first, second, third]: [usize; 3], nrow: usize, nq: usize) -> [usize; 3] {
+        match self {
+            Self::Middle => [first, third, second],
+            Self::Last => [first, second, third],
+            // An index that is too large stays too large.
+            Self::Rows if first >= nrow || second >= nq => [first, third, second],
+            Self::Rows => {
+                let count = second * nrow + first;
+                [count / nq, third, count % nq]
+            }
         }
     }
 }
@@ -103,7 +123,7 @@ impl Taylor {
     /// Whether the indices of `m1` can be meant so.
     pub(crate) fn admits(&self, modes: ModeIndex, nq: usize) -> bool {
         self.m1.iter().all(|entry| {
-            let (column, mode) = modes.split(entry.index);
+            let [_, column, mode] = modes.place(entry.index, self.nrow, nq);
             column < self.ncol && mode < nq
         })
     }
@@ -151,8 +171,9 @@ impl Taylor {
         let mut places: Vec<([usize; 3], usize)> =
             entries.iter().map(|entry| (entry.index, entry.line)).collect();
         for &(index, line) in &places {
-            let (column, mode) = if order == 0 { (index[1], 0) } else { modes.split(index) };
-            if index[0] >= self.nrow || column >= self.ncol || mode >= nq {
+            let [row, column, mode] =
+                if order == 0 { [index[0], index[1], 0] } else { modes.place(index, self.nrow, nq) };
+            if row >= self.nrow || column >= self.ncol || mode >= nq {
                 let message = format!(
                     "entry of `{name}` outside of its {} x {} numbers for {nq} modes",
                     self.nrow, self.ncol
@@ -198,8 +219,8 @@ impl Taylor {
         }
         let mut all = vec![Mat::zeros(nrow, ncol); nq];
         for entry in &self.m1 {
-            let (column, mode) = modes.split(entry.index);
-            all[mode][(entry.index[0], column)] = entry.value;
+            let [row, column, mode] = modes.place(entry.index, nrow, nq);
+            all[mode][(row, column)] = entry.value;
         }
         all.iter_mut().for_each(|one| self.mirror(one));
         Some(all)

@@ -19,6 +19,53 @@ impl Blocks {
     }
 }
 
+/// Places of the indices of an entry of M1 in `m1(., ., .)`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ModeIndex {
+    /// (row, mode, column).
+    Middle,
+    /// (row, column, mode).
+    Last,
+    /// Entries are counted row by row, then mode by mode, then by columns; the file has for each the place (row, mode,
+    /// column) that it has when entries are counted mode by mode, then row by row. EMBSlib stores M1 in the second
+    /// order and hands the numbers on to an array of Modelica, which takes them in the first.
+    Rows,
+}
+
+impl ModeIndex {
+    /// The three indices, from 0, of an entry of an array of `nrow` rows and `nq` modes.
+    pub(crate) fn indices(self, [row, column, mode]: [usize; 3], nrow: usize, nq: usize) -> [usize; 3] {
+        match self {
+            Self::Middle => [row, mode, column],
+            Self::Last => [row, column, mode],
+            Self::Rows => {
+                let count = row * nq + mode;
+                [count % nrow, count / nrow, column]
+            }
+        }
+    }
+}
+
+/// Word behind `new modal =`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ModalName {
+    /// Neither a word nor a sign of equality.
+    Absent,
+    /// The name of the body. Readers of these files split the line at the sign of equality.
+    OfBody,
+    /// A word that is fixed for all bodies: a reader looks for names of arrays in all of the line.
+    Fixed(&'static str),
+}
+
+/// Limits of a reader that overruns its memory beyond them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Limits {
+    /// Largest number of frames, modes and columns.
+    pub(crate) count: usize,
+    /// Bytes of the first line.
+    pub(crate) first_line: usize,
+}
+
 /// A dialect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Dialect {
@@ -29,13 +76,14 @@ pub(crate) struct Dialect {
     pub(crate) square_inertia: bool,
     pub(crate) gr: Blocks,
     pub(crate) ge: Blocks,
-    /// Whether the mode is the last index of `m1` instead of the middle one.
-    pub(crate) mode_last: bool,
-    /// Whether symmetric matrices list one triangle instead of both.
+    pub(crate) mode_index: ModeIndex,
+    /// True if symmetric matrices list one triangle instead of both.
     pub(crate) triangle: bool,
-    /// Whether `new modal` has a sign of equality and a name after it: readers of these files split the line
-    /// there.
-    pub(crate) named_modal: bool,
+    pub(crate) modal_name: ModalName,
+    /// Largest number of a frame, for a reader that has room for no other than 1 to this one: frames are counted if one
+    /// of their nodes has another. `Some(0)` always counts them.
+    pub(crate) largest_frame: Option<i64>,
+    pub(crate) limits: Option<Limits>,
     /// Letter of exponents.
     pub(crate) exponent: char,
 }
@@ -46,20 +94,24 @@ const FEMBS: Dialect = Dialect {
     square_inertia: false,
     gr: Blocks::Component,
     ge: Blocks::Component,
-    mode_last: false,
+    mode_index: ModeIndex::Middle,
     triangle: false,
-    named_modal: true,
+    modal_name: ModalName::OfBody,
+    largest_frame: None,
+    limits: None,
     exponent: 'D',
 };
 
 /// All dialects, the usual one first.
-pub(crate) const DIALECTS: [Dialect; 4] = [
+pub(crate) const DIALECTS: [Dialect; 5] = [
     FEMBS,
     Dialect {
         name: "morembs",
         moments: ["mCM", "mmi"],
         triangle: true,
-        named_modal: false,
+        modal_name: ModalName::Absent,
+        // matflex has an array of structures with all numbers up to the largest one.
+        largest_frame: Some(1_000_000),
         exponent: 'E',
         ..FEMBS
     },
@@ -69,15 +121,32 @@ pub(crate) const DIALECTS: [Dialect; 4] = [
         square_inertia: true,
         gr: Blocks::Mode,
         ge: Blocks::Mode,
-        mode_last: true,
+        mode_index: ModeIndex::Last,
         // FEMBeam lists one triangle, but its reader mirrors none: of J it would lose the products of inertia
         // above the diagonal.
         triangle: false,
-        named_modal: false,
+        modal_name: ModalName::Absent,
         exponent: 'E',
         ..FEMBS
     },
+    EMBS,
 ];
 
+/// EMBSlib (Modelica, github.com/vwaurich/EMBS_ModelicaLib), by the source of its reader, `ReadSID_C.h` of 2022-06-30.
+/// It knows the letter D alone in exponents, holds five digits of a whole number and 511 bytes of a line, and takes a
+/// line for the head of an array wherever one of mdCM, J, Ct, Cr, Me, Gr, Ge, Oe, ksigma, Ke, De, frame, refmod
+/// stands in it.
+pub(crate) const EMBS: Dialect = Dialect {
+    name: "embs",
+    gr: Blocks::Mode,
+    ge: Blocks::Mode,
+    mode_index: ModeIndex::Rows,
+    modal_name: ModalName::Fixed("body"),
+    largest_frame: Some(0),
+    limits: Some(Limits { count: 99_999, first_line: 511 }),
+    ..FEMBS
+};
+
 /// Their names.
-pub(crate) const NAMES: [&str; 4] = [DIALECTS[0].name, DIALECTS[1].name, DIALECTS[2].name, DIALECTS[3].name];
+pub(crate) const NAMES: [&str; 5] =
+    [DIALECTS[0].name, DIALECTS[1].name, DIALECTS[2].name, DIALECTS[3].name, DIALECTS[4].name];

@@ -1,10 +1,12 @@
 //! SID_FEM as an export format: the file around its arrays, and what it cannot hold.
 
-use super::arrays::{modal, places};
-use super::dialect::{DIALECTS, Dialect, NAMES};
+use super::arrays::{StiffenedFrame, modal, places};
+use super::dialect::{DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES};
 use super::text::Text;
+use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::body::flex_body::{FlexBody, Group};
+use crate::body::invariants::CauchySchwarz;
 use crate::formats::export::losses::{general_w0, geometric_stiffness, internal_rows, plane};
 use crate::formats::export::{ExportFormat, ExportOptions, Exported};
 use crate::model::{LoadKind, UnitLoad};
@@ -32,41 +34,122 @@ impl ExportFormat for Sid {
 
     fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
         let places = places(body, &options.points);
+        let embs = *chosen(options) == EMBS;
         let holds = |load: &UnitLoad| match &load.kind {
             LoadKind::Acceleration | LoadKind::AngularAcceleration | LoadKind::Spin => true,
             LoadKind::Named(_) => false,
-            kind => places.iter().any(|place| place.holds(kind)),
+            kind => !embs && places.iter().any(|place| place.holds(kind)),
         };
-        [plane(body), general_w0(body), geometric_stiffness(body, holds), internal_rows(body)]
+        let coriolis = if embs { coriolis_of_frame(body) } else { None };
+        [plane(body), general_w0(body), coriolis, geometric_stiffness(body, holds), internal_rows(body)]
             .into_iter()
             .flatten()
             .collect()
     }
 
+    fn needs(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        let (dialect, places) = (chosen(options), places(body, &options.points));
+        let mut needs = Vec::new();
+        if are_counted(&places, dialect) {
+            needs.push(
+                "frames have the numbers of the rows of the table beside the file, not of nodes".to_owned(),
+            );
+        }
+        if *dialect == EMBS {
+            let (frames, modes) = (places.len(), body.n_modes());
+            needs.push(format!("EMBS_Body takes numNodes = {frames} and numModes = {modes}"));
+            needs.push(
+                "EMBS_Body needs a frame_ref whose origin is at rest: it counts omega x v of a moving one twice"
+                    .to_owned(),
+            );
+        }
+        needs
+    }
+
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
-        let name = options.dialect.as_deref().unwrap_or(DIALECTS[0].name);
-        // Names that are none are refused before.
-        let dialect = DIALECTS.iter().find(|dialect| dialect.name == name).unwrap_or(&DIALECTS[0]);
-        Ok(Exported::single(file(body, options, dialect).into_bytes()))
+        let dialect = chosen(options);
+        let places = places(body, &options.points);
+        let columns = 3 * body.n_modes();
+        if let Some(Limits { count, .. }) = dialect.limits
+            && places.len().max(columns) > count
+        {
+            let message = format!(
+                "sid cannot hold {} frames and {columns} columns of Gr in dialect {}: its reader takes {count} of each",
+                places.len(),
+                dialect.name
+            );
+            let help = "choose the frames that joints need with --points";
+            return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
+        }
+        let mut exported = Exported::single(file(body, &places, dialect).into_bytes());
+        if are_counted(&places, dialect) {
+            exported.beside.push(("frames.csv".into(), frame_table(&places).into_bytes()));
+        }
+        Ok(exported)
     }
 }
 
-fn file(body: &FlexBody, options: &ExportOptions, dialect: &Dialect) -> String {
+/// Returns the dialect of an export. Names that are none are refused before.
+fn chosen(options: &ExportOptions) -> &'static Dialect {
+    let name = options.dialect.as_deref().unwrap_or(DIALECTS[0].name);
+    DIALECTS.iter().find(|dialect| dialect.name == name).unwrap_or(&DIALECTS[0])
+}
+
+/// The Coriolis force on the frame of modes that move the centre of mass, which EMBSlib leaves out.
+fn coriolis_of_frame(body: &FlexBody) -> Option<String> {
+    /// Share of a bound that is rounding.
+    const ROUNDING: f64 = 1e-9;
+    let bound = CauchySchwarz::of(body.invariants());
+    let c1 = body.invariants().c1();
+    let of_mode = |k: usize| (0..3).map(|a| c1[(a, k)].abs()).fold(0.0, f64::max) / bound.c1(k);
+    let share = (0..body.n_modes()).map(of_mode).fold(0.0, f64::max);
+    (share > ROUNDING).then(|| {
+        format!(
+            "the Coriolis force 2 omega x C1 qd on the frame: C1 is up to {share:.1e} of its Cauchy-Schwarz \
+             bound, EMBSlib leaves the force out"
+        )
+    })
+}
+
+/// True if frames have the numbers 1, 2, ... in place of those of nodes and reference points.
+fn are_counted(places: &[StiffenedFrame], dialect: &Dialect) -> bool {
+    let beyond = |largest: i64| places.iter().any(|place| !(1..=largest).contains(&place.frame.id));
+    dialect.largest_frame.is_some_and(beyond)
+}
+
+/// Returns the table of the frames: number in the file, number of the node, name of the interface, place.
+fn frame_table(places: &[StiffenedFrame]) -> String {
+    let row = |(i, place): (usize, &StiffenedFrame)| {
+        let [x, y, z] = place.frame.position;
+        let name = place.frame.name.as_deref().unwrap_or("").replace('"', "\"\"");
+        format!("{},{},\"{name}\",{x:e},{y:e},{z:e}\n", i + 1, place.frame.id)
+    };
+    let rows = places.iter().enumerate().map(row);
+    std::iter::once("frame,node,interface,x,y,z\n".to_owned()).chain(rows).collect()
+}
+
+fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String {
     let nf = body.n_modes();
-    let places = places(body, &options.points);
     let mut text = Text::new(dialect, nf);
-    let head = format!("{:5}{nf:5}    :No. nodes, No. modes:{}", places.len(), comment(body, dialect));
+    let mut head = format!("{:5}{nf:5}    :No. nodes, No. modes:{}", places.len(), comment(body, dialect));
+    if let Some(Limits { first_line, .. }) = dialect.limits {
+        // With the end of the line it fills the buffer of the reader.
+        let whole = |end: &usize| head.is_char_boundary(*end);
+        head.truncate((0..first_line.min(head.len() + 1)).rev().find(whole).unwrap_or(0));
+    }
     text.line(0, &head);
     text.line(1, "part");
-    if dialect.named_modal {
-        text.value(6, "new modal", word(&body.source().name));
-    } else {
-        text.line(6, "new modal");
+    match dialect.modal_name {
+        ModalName::Absent => text.line(6, "new modal"),
+        ModalName::OfBody => text.value(6, "new modal", word(&body.source().name)),
+        ModalName::Fixed(name) => text.value(6, "new modal", name),
     }
     refmod(body, &mut text);
     text.line(11, "frame");
-    for place in &places {
-        text.value(16, "new node", format_args!("{:6}", place.frame.id));
+    let counted = are_counted(places, dialect);
+    for (place, number) in places.iter().zip(1i64..) {
+        let number = if counted { number } else { place.frame.id };
+        text.value(16, "new node", format_args!("{number:6}"));
         text.value(21, "rframe", "body ref");
         place.objects().iter().for_each(|object| text.taylor(21, object));
         text.line(16, "end node");

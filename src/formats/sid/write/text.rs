@@ -113,10 +113,10 @@ impl<'d> Text<'d> {
                     if value == 0.0 {
                         continue;
                     }
-                    let (middle, last) = if self.dialect.mode_last { (j, k) } else { (k, j) };
-                    let (key, value) =
-                        (format!("m1({:2},{:2},{:2})", i + 1, middle + 1, last + 1), self.number(value));
-                    self.value(inner, &key, value);
+                    let indices = self.dialect.mode_index.indices([i, j, k], m1.nrows(), self.nq);
+                    let [first, middle, last] = indices.map(|i| i + 1);
+                    let value = self.number(value);
+                    self.value(inner, &format!("m1({first:2},{middle:2},{last:2})"), value);
                 }
             }
         }

@@ -1,0 +1,10 @@
+//! Project Chrono: matrices for `ChModalAssembly::DoModalReduction(M, K, Cq, ...)` and
+//! `ChModalDampingReductionR(R)` as Matrix Market files.
+//!
+//! These calls take the matrices of boundary nodes, then internal nodes, six coordinates each. The boundary
+//! nodes are the frames; [`assembly`] says what the internal nodes are.
+
+mod assembly;
+mod format;
+
+pub(crate) use format::Chrono;
