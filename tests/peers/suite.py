@@ -61,10 +61,10 @@ def equations(flexbody, folder):
     """Equations of the target beside those of all nodes; with `--small` of two bodies, and no table."""
     from target_equations import table as of_targets
 
-    found, absent = of_targets.run(flexbody, folder, quick=OPTIONS["small"])
+    found, absent, refusals = of_targets.run(flexbody, folder, quick=OPTIONS["small"])
     if not OPTIONS["small"]:
-        TABLES["docs/export.md", "target equations"] = of_targets.text(found, absent)
-    return of_targets.rows(found)
+        TABLES["docs/export.md", "target equations"] = of_targets.text(found, absent, refusals)
+    return of_targets.rows(found, refusals)
 
 
 def equations_can_fail(flexbody, folder):

@@ -64,8 +64,7 @@ class Chrono(Matrices):
         rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
         self.names = [row["name"] for row in rows]
         self.points = np.array([[row[axis] for axis in "xyz"] for row in rows], float)
-        told = re.search(r"modes to request: (\d+)|in place of (\d+) fixed-interface modes", "".join(lines))
-        self.requested = int(told[1] or told[2])
+        self.requested = int(re.search(r"modes to request: (\d+)", "".join(lines))[1])
         self.assemble()
 
     def assemble(self):

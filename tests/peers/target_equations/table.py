@@ -32,7 +32,7 @@ REGION = [("weight", "rigid", None, [500]), ("end", "averaging", [-0.01, 0.08, 0
 MARKS = {"first": "a", "undeformed": "b", "rest": "c", "small": "d"}
 NOTES = {
     "a": "To first order in q, q' and q'', at any angular velocity: SID has mdCM, J and Cr to first order (modal forces of solids are exact, and compared at the random states), and the kinetic energy of nodes that turn is of second order in q and q' ([6.2a](theory.md)).",
-    "b": "At q = 0, to first order in q' and q'': the format has no stiffness of inertia of nodes that turn. mbdyn has it, and is held so for beams only: their mass has a symmetric part of W3, which it has not.",
+    "b": "At q = 0, to first order in q' and q'': the format has no stiffness of inertia of nodes that turn. mbdyn has it, and is compared so for beams and shells only: their mass has a symmetric part of W3, for which it has no place.",
     "c": "At q = q' = 0 at any angular velocity, and without angular velocity to first order: the engine has no terms of angular velocity with q and q'.",
     "d": "To first order without angular velocity: the file has no groups 14 to 18.",
     "e": "Small motions at rest: receptances between all interfaces at three frequencies. The column of gravity has its resultants and the deflection under it.",
@@ -82,6 +82,8 @@ class Bench:
         # One unit of the model in m and kg.
         self.other = solid.model.scaled(1e-3, 1e3)
         self.frames, self.carried, self.turning, self.stressed = [], [], [self.region], []
+        # Bodies that the program refuses to make, which is a failure.
+        self.refusals = []
         if not quick:
             self.frames = [make(solid, "principal"), make(solid, "model"), make(region, "model")]
             beams = bodies.Source(folder, "car_frame", BEAMS, 3, damped=True)
@@ -90,10 +92,15 @@ class Bench:
             self.stressed = [make(blade, "com"), make(blade, "principal")]
             self.turning += [make(beams, "com"), make(beams, "principal"), make(shells, "model")]
         if "interface=" in self.told:
-            self.carried = [make(solid, "interface=bolt_base")]
+            wanted = [(solid, "bolt_base")]
             if not quick:
                 self.stressed += [make(blade, "interface=root")]
-                self.carried += [make(solid, "interface=bolt_wall"), make(region, "interface=weight"), make(beams, "interface=front_left"), make(shells, "interface=fold")]
+                wanted += [(solid, "bolt_wall"), (region, "end"), (region, "weight"), (beams, "front_left"), (shells, "fold")]
+            for source, name in wanted:
+                try:
+                    self.carried.append(make(source, f"interface={name}"))
+                except RuntimeError as refusal:
+                    self.refusals.append(f"`{source.folder.name}`, `--frame interface={name}`: {str(refusal).split('error', 1)[-1].splitlines()[0]}")
 
     def has_dialect(self, name):
         """Returns true if the program has this dialect of sid."""
@@ -164,7 +171,7 @@ PHYSICS = ["accelerations", "gravity", "force", "moment", "deflection"]
 def whole(target, results):
     """Returns one entry for all checks of several bodies: the result with the largest ratio to its limit."""
     if not results:
-        return Cell(marks="")
+        return Cell()
     pairs = []
     for result in results:
         for column in PHYSICS + (["damping"] if result["damping"] is not None else []):
@@ -282,7 +289,7 @@ def drawn(target, bench):
 
 
 def run(flexbody, folder, quick=False):
-    """Returns the entries of all formats by name and column, and a note for each format that was not run."""
+    """Returns the entries of all formats by name and column, a note for each format that was not run, and one for each body that was refused."""
     bench, found, absent = Bench(flexbody, folder, quick), {}, []
     for target in bodies.targets(bench.dialects):
         try:
@@ -299,7 +306,7 @@ def run(flexbody, folder, quick=False):
     if quick:
         for cells in found.values():
             del cells["frames"], cells["geometric stiffness"]
-    return found, absent
+    return found, absent, bench.refusals
 
 
 def columns_of(found):
@@ -307,13 +314,13 @@ def columns_of(found):
     return [column for column in COLUMNS if all(column in cells for cells in found.values())]
 
 
-def rows(found):
-    """Returns a row of the suite for each entry that has a number."""
-    return [Row("all nodes", name, f"equations of the target: {column}", cells[column].found, cells[column].limit)
+def rows(found, refusals):
+    """Returns a row of the suite for each entry that has a number and for each body that was refused."""
+    return [Row("all nodes", "all", f"equations of the target: {one} (1: refused)", 1.0, 0.0) for one in refusals] + [Row("all nodes", name, f"equations of the target: {column}", cells[column].found, cells[column].limit)
             for name, cells in found.items() for column in columns_of(found) if cells[column].found is not None]
 
 
-def text(found, absent):
+def text(found, absent, refusals):
     """Returns the table with its footnotes."""
     columns = columns_of(found)
     lines = ["| format | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
@@ -321,4 +328,5 @@ def text(found, absent):
     used = sorted({mark for cells in found.values() for column in columns for mark in cells[column].marks})
     notes = "".join(f"\n<sup>{mark}</sup> {NOTES[mark]}\n" for mark in used)
     missing = f"\nNot at hand when this was written: {'; '.join(absent)}.\n" if absent else ""
+    missing += "".join(f"\nNot converted when this was written: {one}.\n" for one in refusals)
     return "\n".join(lines) + "\n" + notes + missing
