@@ -41,7 +41,7 @@ NOTES = {
     "h": "Angles between the modes: each is drawn with a factor of its own, in single precision, in metres whatever the units of the body are.",
     "i": "The moment acts on the axes $e^{\\tilde\\theta}$ at a random q ([6.8](theory.md)).",
     "j": "Refused (FB720).",
-    "l": "At q = 0.",
+    "l": "At q = 0: Exudyn takes the moment of the undeformed centre of mass.",
     "k": "Without groups 14 to 18 the modes of such a body do not move its centre of mass. `export` asks for `--allow-loss`.",
 }
 
