@@ -76,7 +76,7 @@ def fails(equations, target, body, oracle):
     found = table.checked(equations, target, body, body.source.model, oracle=oracle)
     failing = []
     for column, value in found.items():
-        if column not in ("order", "shapes") and value is not None and not value <= table.limit(target, found["order"], column):
+        if column not in ("order", "carried", "shapes") and value is not None and not value <= table.limit(target, found, column):
             failing.append(column)
     return failing
 
