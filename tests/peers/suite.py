@@ -8,7 +8,8 @@ peer with target/release/flexbody and writes the table of docs/export.md and tha
 installed and prints. Programs that are in no package archive are found by environment variables: MBDYN (the program, where it is not on the PATH), PYMBS,
 FEMBEAM, EMBSLIB (folders of their sources). Exits with 1 when a number is worse than its limit; what is not found is said and fails nothing.
 
-`--small` takes those peers that need seconds (CI runs it); `--all` also runs craig_bampton.py and mechanisms.py, which write files of their own.
+`--small` takes those peers that need seconds (CI runs it); `--only equations` those with this word in their name: the equations of each target, evaluated from its file, beside those of
+all nodes (target_equations/). `--all` also runs craig_bampton.py and mechanisms.py, which write files of their own.
 """
 
 import argparse
@@ -56,6 +57,26 @@ def arm_table(flexbody, folder):
     return []
 
 
+def equations(flexbody, folder):
+    """Equations of the target beside those of all nodes; with `--small` of two bodies, and no table."""
+    from target_equations import table as of_targets
+
+    found, absent, refusals = of_targets.run(flexbody, folder, quick=OPTIONS["small"])
+    if not OPTIONS["small"]:
+        TABLES["docs/export.md", "target equations"] = of_targets.text(found, absent, refusals)
+    return of_targets.rows(found, refusals)
+
+
+def equations_can_fail(flexbody, folder):
+    """Every array of every format changed: some check of its equations must fail."""
+    from target_equations import selftest
+
+    missed, made = selftest.run(flexbody, folder)
+    print(f"  {made} changes, not found: {', '.join(missed) or 'none'}")
+    return [Row("all nodes", "all", "equations of the target: changed arrays that no check finds", float(len(missed)), 0.0)]
+
+
+OPTIONS = {"small": False}
 # Pages and the marked places in them that `--write` fills.
 TABLES = {}
 # Those of the peers that have a table of their own.
@@ -78,6 +99,8 @@ PEERS = [
     ("EMBSlib", "embs.rows", True),
     ("welib", "sid.rows", True),
     ("h5py, numpy, scipy", "suite.other_libraries", True),
+    ("equations of the targets", "suite.equations", True),
+    ("equations of the targets can fail", "suite.equations_can_fail", True),
     ("scipy's integrator", "scipy_spin.rows", True),
     ("compilers", "compilers.rows", True),
     ("ARM compiler", "suite.arm_table", True),
@@ -96,11 +119,12 @@ PEERS = [
 ]
 
 
-def measure(flexbody, small):
-    """Rows of every peer that is here, and what is not."""
+def measure(flexbody, small, only):
+    """Rows of every peer that is here, and what is not; `only`: of those whose name has this word."""
     found, absent = [], []
+    OPTIONS["small"] = small
     for name, where, quick in PEERS:
-        if small and not quick:
+        if small and not quick or only not in name:
             continue
         print(f"{name}:", flush=True)
         module, function = where.split(".")
@@ -171,18 +195,20 @@ def main():
     parser.add_argument("--install", action="store_true", help="install what pip and apt-get have, then run")
     parser.add_argument("--write", action="store_true", help="write the tables of docs/")
     parser.add_argument("--small", action="store_true", help="only what needs seconds")
+    parser.add_argument("--only", default="", metavar="WORD", help="only peers whose name has this word; with --write their own tables")
     parser.add_argument("--all", action="store_true", help="also the scripts that write files of their own")
     args = parser.parse_args()
     if args.install:
         install()
     if not args.flexbody.is_file():
         sys.exit(f"{args.flexbody} is not there: cargo build --release, or --flexbody PROGRAM")
-    rows, absent = measure(args.flexbody.resolve(), args.small)
+    rows, absent = measure(args.flexbody.resolve(), args.small, args.only)
     bad = [row for row in rows if not row.good()]
     if args.write and not (bad or args.small):
-        elsewhere = ("CalculiX", "Abaqus", "pyNastran", "pyYeti", "NX Nastran", "public decks")
+        elsewhere = ("CalculiX", "Abaqus", "pyNastran", "pyYeti", "NX Nastran", "public decks", "all nodes")
         of_exports = [row for row in rows if not (row.program.startswith(elsewhere) or "CalculiX" in row.program or row.format.startswith(("recipe", "cluster")))]
-        TABLES["docs/export.md", "peers"] = table(of_exports, absent)
+        if not args.only:
+            TABLES["docs/export.md", "peers"] = table(of_exports, absent)
         for (page, mark), text in TABLES.items():
             write(page, mark, text)
     print(f"\n{len(rows)} comparisons, {len(bad)} worse than allowed" + "".join(f"\nnot found: {one}" for one in absent))
