@@ -13,6 +13,7 @@ use crate::model::SurfaceMesh;
 use crate::numerics::linalg::larger;
 use faer::Mat;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::HashSet;
 
 /// The format.
 pub(crate) struct Exudyn;
@@ -36,6 +37,7 @@ const REQUIRED: [&str; 16] = [
     "mXRefTildePsiTilde",
 ];
 
+const NUMBERS: &str = "nodeNumbers";
 const TRIANGLES: &str = "trigList";
 const STRESSES: &str = "postProcessingModes";
 
@@ -67,14 +69,16 @@ impl ImportFormat for Exudyn {
         let told = given.numbered();
         let general = arrays.attribute("massMatrixReduced", "mass_structure").as_deref() == Some("general");
         let checks = given.checks(&told, general);
+        let labels = labels(&mut arrays, n)?;
         let frame = |i: usize| ImportedFrame {
-            label: i.to_string(),
+            label: labels[i].to_string(),
             interface: None,
             position: [positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]],
             translation: shapes.as_ref().subrows(3 * i, 3).to_owned(),
             rotation: None,
         };
-        let mut notes = vec![format!("{n} nodes, {nf} modes; nodes count from 0")];
+        let counted = if arrays.has(NUMBERS) { "" } else { "; nodes count from 0" };
+        let mut notes = vec![format!("{n} nodes, {nf} modes{counted}")];
         if general {
             notes.push("the mass does not commute with rotations, says the file: modal mass and mPsiTildePsiTilde need not agree".to_owned());
         }
@@ -107,6 +111,21 @@ impl ImportFormat for Exudyn {
             },
         })
     }
+}
+
+/// Numbers of the nodes in the FE model, which files of flexbody state; else those by which Exudyn counts, from 0.
+fn labels(arrays: &mut Hdf5Arrays, n: usize) -> Result<Vec<i64>> {
+    let counted = || (0..n as i64).collect();
+    if !arrays.has(NUMBERS) {
+        return Ok(counted());
+    }
+    let numbers = arrays.integers(NUMBERS)?;
+    if numbers.len() != n {
+        return Err(arrays.refuse(NUMBERS, &format!("expected {n} numbers, found {}", numbers.len())));
+    }
+    // The nodes of a cross have one number together.
+    let distinct: HashSet<i64> = numbers.iter().copied().collect();
+    Ok(if distinct.len() == n { numbers } else { counted() })
 }
 
 /// Triangles for drawing and contact: three indices of nodes each (k x 3), or nothing.

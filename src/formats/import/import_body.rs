@@ -335,13 +335,22 @@ fn not_in_file(group: Group, format: &str) -> TermDecision {
     }
 }
 
-/// Node numbers are the labels where all of them are numbers, each once; else 1, 2, ...
+/// Nodes with their labels as numbers. Labels that are names get numbers above all others, in their order, as places
+/// that are no nodes of the model have them; nodes are 1, 2, ... if no label is a number or two are the same.
 fn nodes(frames: &[ImportedFrame]) -> Nodes {
-    let numbers: Option<Vec<i64>> = frames.iter().map(|frame| frame.label.parse().ok()).collect();
+    let numbers: Vec<Option<i64>> = frames.iter().map(|frame| frame.label.parse().ok()).collect();
     let mut seen = HashSet::new();
-    let ids = numbers
-        .filter(|ids| ids.iter().all(|id| seen.insert(*id)))
-        .unwrap_or_else(|| (1..=frames.len() as i64).collect());
+    let distinct = numbers.iter().flatten().all(|number| seen.insert(*number));
+    let highest = numbers.iter().flatten().max().copied();
+    let numbered = highest.filter(|_| distinct).and_then(|highest| {
+        let mut above = highest;
+        let mut next = || {
+            above = above.checked_add(1)?;
+            Some(above)
+        };
+        numbers.iter().map(|number| number.map_or_else(&mut next, Some)).collect::<Option<Vec<i64>>>()
+    });
+    let ids = numbered.unwrap_or_else(|| (1..=frames.len() as i64).collect());
     Nodes { ids, positions: frames.iter().map(|frame| frame.position).collect() }
 }
 
