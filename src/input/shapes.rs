@@ -46,17 +46,18 @@ pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) ->
 pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<RawShapes> {
     let file = InputFile::open(&location.path)?;
     let path = file.path();
-    let array = read(&file, location.group.as_deref())
-        .and_then(|array| oriented(array, counts).map_err(|diagnostic| vec![diagnostic]));
+    let array = read(&file, location.group.as_deref());
+    file.refuse_changed()?;
+    let array = array.and_then(|array| oriented(array, counts).map_err(|diagnostic| vec![diagnostic]));
     let (matrix, digits) =
         array.map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))?;
-    let source = Some(SourceFile::new(role, path, file.sha256()));
+    let source = Some(SourceFile::new(role, path, file.sha256()?));
     Ok(RawShapes { matrix, digits, path: path.to_path_buf(), source })
 }
 
 fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
     let compression = Compression::of(file.bytes());
-    let head = compression.head(file.bytes(), HEAD);
+    let head = compression.head(file, HEAD);
     let packed = compression != Compression::None;
     if !packed && Hdf5.recognises(&head) {
         return hdf5::read_array(file, dataset);
