@@ -28,9 +28,10 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
 
     let file = InputFile::open(path)?;
+    let read = format.read(&file);
+    file.refuse_changed()?;
     let source = SourceFile::new("body", path, file.sha256()?);
-    let mut imported =
-        import_body(&format.read(&file)?, source, units).map_err(|error| error.in_file(path))?;
+    let mut imported = import_body(&read?, source, units).map_err(|error| error.in_file(path))?;
     if arguments.storage == StorageName::F32 {
         imported.body = imported.body.rounded_to_f32()?;
     }

@@ -80,7 +80,7 @@ impl InputFile {
     /// # Errors
     /// FB101, FB132, FB601.
     pub(super) fn load(&self) -> Result<(), Diagnostic> {
-        if super::reader::is_hdf5(&self.head) {
+        if is_hdf5(&self.head) {
             return Ok(());
         }
         self.whole.get_or_init(|| self.read_whole()).as_ref().map(|_| ()).map_err(Diagnostic::clone)
@@ -114,10 +114,12 @@ impl InputFile {
 
     /// Bytes that were read, at least one: all of them, of an HDF5 file or one that was not loaded those at the begin.
     pub fn bytes(&self) -> &[u8] {
-        match self.whole.get() {
-            Some(Ok(bytes)) => bytes,
-            _ => &self.head,
-        }
+        self.loaded().unwrap_or(&self.head)
+    }
+
+    /// All bytes, where they are in memory.
+    pub(super) fn loaded(&self) -> Option<&[u8]> {
+        self.whole.get()?.as_deref().ok()
     }
 
     /// The first bytes of the file, at most `limit`; fewer where the file is shorter or cannot be read.
@@ -169,7 +171,7 @@ impl InputFile {
     ///
     /// # Errors
     /// FB132.
-    pub(super) fn refuse_changed(&self) -> Result<(), Diagnostic> {
+    pub fn refuse_changed(&self) -> Result<(), Diagnostic> {
         self.state.refuse_changed(&self.path)
     }
 
@@ -183,6 +185,13 @@ impl InputFile {
         let own = || Diagnostic::new(Code::FileUnreadable, reason(error)).in_file(&self.path);
         reading_error(error).unwrap_or_else(own)
     }
+}
+
+/// True if a file that begins with `head` is HDF5: the signature stands at 0 or, after a user block (MATLAB
+/// writes one), at 512, 1024, 2048, ...
+pub(super) fn is_hdf5(head: &[u8]) -> bool {
+    let signed = |&at: &usize| head.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
+    [0, 512, 1024, 2048].iter().any(signed)
 }
 
 const MEMORY_HELP: &str = "give the file in a compressed or binary form, or use a larger machine";

@@ -40,10 +40,11 @@ impl Compression {
 
     /// A stream of the unpacked bytes of a file.
     pub(super) fn stream_of<'a>(self, file: &'a InputFile) -> Box<dyn Read + Send + 'a> {
-        match self {
+        match (file.loaded(), self) {
+            (Some(bytes), _) => self.stream(bytes),
             // Who takes large pieces needs no buffer between.
-            Self::None => Box::new(file.reader()),
-            _ => self.stream(file.buffered()),
+            (None, Self::None) => Box::new(file.reader()),
+            (None, _) => self.stream(file.buffered()),
         }
     }
 

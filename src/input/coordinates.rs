@@ -95,15 +95,12 @@ impl Coordinates {
     /// # Errors
     /// FB601 where the number of entries is not announced, and those that were read leave no memory for others.
     fn is_too_much(&self) -> Result<bool, Vec<Diagnostic>> {
-        let Some(announced) = self.announced else {
-            let one = |diagnostic| Err(vec![diagnostic]);
-            let n = u64::from(self.limits.n);
-            return check_size(n, n, self.count.max(n)).map(|_| false).or_else(one).and_then(|_| {
-                // What was read is in memory: as much again is needed to assemble it.
-                refuse_beyond_memory(self.count / 2).map(|()| false).or_else(one)
-            });
-        };
-        Ok(self.count > announced)
+        if let Some(announced) = self.announced {
+            return Ok(self.count > announced);
+        }
+        let (n, entries) = (u64::from(self.limits.n), self.count - self.bad_count as u64);
+        let fits = check_size(n, n, entries.max(n)).and_then(|_| refuse_beyond_memory(entries));
+        fits.map(|()| false).map_err(|diagnostic| vec![diagnostic])
     }
 
     fn parse(&mut self, block: &[u8]) {

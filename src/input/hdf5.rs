@@ -1,9 +1,9 @@
 //! Sparse matrices in HDF5 files: opening, and finding the group that holds the matrix.
 
-use super::bytes::InputFile;
+use super::bytes::{InputFile, is_hdf5};
 use super::compression::Compression;
 use super::named_matrices::NamedMatrices;
-use super::reader::{MatrixRole, MatrixSource, Reader, is_hdf5};
+use super::reader::{MatrixRole, MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::hdf5_file::{by_utf8_name, without_plugins};

@@ -79,6 +79,9 @@ pub(super) struct JobModel {
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// A matrix and the file that it was read from.
+type FromFile = (RawMatrix, SeenFile);
+
 /// All that is wrong with a job.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 

@@ -107,13 +107,6 @@ pub trait Reader: Sync {
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix>;
 }
 
-/// Whether a file that begins with `head` is HDF5: the signature stands at 0 or, after a user block (MATLAB
-/// writes one), at 512, 1024, 2048, ...
-pub(super) fn is_hdf5(head: &[u8]) -> bool {
-    let signed = |&at: &usize| head.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
-    [0, 512, 1024, 2048].iter().any(signed)
-}
-
 /// Number of bytes that [`Reader::recognises`] is shown. HDF5 files may begin with a user block of this size.
 pub const HEAD: usize = 2048 + 8;
 

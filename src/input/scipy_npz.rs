@@ -97,7 +97,7 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
 fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Result<RawMatrix, Diagnostic> {
     let wrong = |code, message: String| Err(Diagnostic::new(code, message).with_help(HELP));
     let npy::Blocks { count, rows, columns, values, digits } = npy::read_blocks(&archive.member("data")?)?;
-    if rows == 0 || columns == 0 || n % rows != 0 || n % columns != 0 {
+    if rows == 0 || columns == 0 || !n.is_multiple_of(rows) || !n.is_multiple_of(columns) {
         return wrong(
             Code::MatrixCount,
             format!("blocks of {rows} x {columns} do not make up {n} rows and columns"),

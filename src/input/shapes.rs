@@ -31,7 +31,7 @@ pub enum ImportedColumns {
 /// # Errors
 /// Those of [`read_shapes`]; FB128 and FB306 for files of modes.
 pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<ImportedColumns> {
-    let file = InputFile::open(&location.path)?;
+    let file = InputFile::open_unread(&location.path)?;
     match read_modes(&file, role).filter(|_| location.group.is_none()) {
         Some(modes) => modes.map(ImportedColumns::Modes).map_err(Error::new),
         None => read_shapes(location, counts, role).map(ImportedColumns::Rows),
@@ -44,7 +44,7 @@ pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) ->
 /// # Errors
 /// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.
 pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<RawShapes> {
-    let file = InputFile::open(&location.path)?;
+    let file = InputFile::open_unread(&location.path)?;
     let path = file.path();
     let array = read(&file, location.group.as_deref());
     file.refuse_changed()?;
@@ -70,6 +70,7 @@ fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, V
         return matrix_market::read_array(file, compression);
     }
     if !packed && npy::recognises(&head) {
+        file.load().map_err(|diagnostic| vec![diagnostic])?;
         return npy::read(file.bytes()).map_err(|diagnostic| vec![diagnostic]);
     }
     let start = &head[..head.len().min(24)];

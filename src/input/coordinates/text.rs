@@ -6,6 +6,9 @@ use crate::input::bytes::InputFile;
 /// Bytes per block. Larger blocks would be fresh pages each time.
 const BLOCK: usize = 8 << 20;
 
+/// Bytes that the first block has at the begin: it grows with what there is, for most files are small.
+const FIRST_BLOCK: usize = 1 << 16;
+
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
@@ -33,17 +36,19 @@ impl<'a> Blocks<'a> {
     /// anywhere.
     pub(in crate::input) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
         let mut block = std::mem::take(&mut self.spare);
-        let mut filled = self.carry.len();
-        block.resize(BLOCK.max(filled), 0);
+        let (mut filled, mut ends) = (self.carry.len(), false);
+        block.resize(block.len().clamp(FIRST_BLOCK.max(filled), BLOCK.max(filled)), 0);
         block[..filled].copy_from_slice(&self.carry);
         self.carry.clear();
-        while filled < block.len() {
-            match self.stream.read(&mut block[filled..])? {
-                0 => break,
-                count => filled += count,
+        while !ends && filled < BLOCK {
+            if filled == block.len() {
+                block.resize((2 * filled).min(BLOCK), 0);
             }
+            let count = self.stream.read(&mut block[filled..])?;
+            filled += count;
+            ends = count == 0;
         }
-        let end = whole_lines(&block[..filled], filled < block.len());
+        let end = whole_lines(&block[..filled], ends);
         self.carry.extend_from_slice(&block[end..filled]);
         block.truncate(end);
         let Some(&last) = block.last() else { return Ok(None) };

@@ -9,7 +9,7 @@ use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::labelled_lines::{has_labels, labelled};
-use super::{Found, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
+use super::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bytes::SeenFile;
 use crate::input::reader::MatrixRole;
@@ -182,7 +182,7 @@ fn numbered(
     mesh: &DeckMesh,
     deck: &Path,
     [stiffness, mass]: [&PathBuf; 2],
-) -> Found<(Vec<DofLabel>, [(RawMatrix, SeenFile); 2])> {
+) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let labels = labels(mesh, deck)?;
     let n = labels.len();
     let read = |path: &Path, role| {

@@ -1,12 +1,11 @@
 //! Matrices as lines `row column value` without a header, as CalculiX and Abaqus write them.
 
-use super::Found;
+use super::{Found, FromFile};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
 use crate::input::bytes::{InputFile, SeenFile};
 use crate::input::compression::Compression;
 use crate::input::coordinates::{Blocks, Coordinates, Limits};
-use crate::model::RawMatrix;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -65,7 +64,7 @@ impl CoordinateFile {
     ///
     /// # Errors
     /// FB301 for more rows than entries can fill, FB306, FB312.
-    pub(super) fn into_matrix(self, n: usize) -> Found<(RawMatrix, SeenFile)> {
+    pub(super) fn into_matrix(self, n: usize) -> Found<FromFile> {
         let path = &self.seen.path;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];
         check_size(n as u64, n as u64, self.count).map_err(in_file)?;

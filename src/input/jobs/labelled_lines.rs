@@ -2,7 +2,7 @@
 //! or LABELS: `node, direction, node, direction, value`. Their rows are the labels in ascending order.
 
 use super::deck::fields;
-use super::{Found, both};
+use super::{Found, FromFile, both};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
 use crate::input::bytes::{InputFile, SeenFile};
@@ -22,7 +22,7 @@ const SHOWN: usize = 5;
 ///
 /// # Errors
 /// FB101, FB132, FB301 for their lines, and those of [`assemble`].
-pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [(RawMatrix, SeenFile); 2])> {
+pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
     let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);
     let mut labels: Vec<DofLabel> = all.copied().collect();
