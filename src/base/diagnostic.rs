@@ -401,8 +401,8 @@ impl std::fmt::Display for Diagnostic {
     }
 }
 
-/// A text without characters that a terminal takes as commands: control characters but line ends and tabs, and those that
-/// turn the direction of writing, are shown by their numbers, as `\u{1b}`.
+/// Returns a text without characters that a terminal takes as commands: control characters but line ends and tabs, and
+/// those that turn the direction of writing, are shown by their numbers, as `\u{1b}`.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(is_command) {
         return Cow::Borrowed(text);

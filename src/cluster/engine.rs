@@ -51,8 +51,8 @@ pub struct Engine {
 /// Pythons that are tried where none is named.
 const PYTHONS: [&str; 2] = ["python3", "/usr/bin/python3"];
 
-/// What keeps a Python from loading packages of the current folder, of the folder of the driver and of PYTHONPATH: data
-/// lie there. Since Python 3.11 it includes `-P`, which older ones do not know.
+/// Options that keep Python from loading packages of the current folder, of the folder of the driver and of PYTHONPATH:
+/// data lie there. Since Python 3.11 it includes `-P`, which older ones do not know.
 const ISOLATED: [&str; 1] = ["-I"];
 
 impl Engine {

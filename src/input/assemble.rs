@@ -60,7 +60,10 @@ pub(super) fn most_entries_of(n: u64) -> u64 {
     u64::try_from(ENTRIES_PER_PLACE.saturating_mul(places)).unwrap_or(u64::MAX).max(ALWAYS_ENTRIES)
 }
 
-/// FB601 where so many entries do not fit the memory that is left.
+/// Refuses so many entries where they do not fit the memory that is left.
+///
+/// # Errors
+/// FB601.
 pub(super) fn refuse_beyond_memory(entries: u64) -> Result<(), Diagnostic> {
     let what = format!("a matrix of {entries} entries");
     let refused = refuse_beyond(left(), entries as f64 * BYTES_PER_ENTRY, &what, "use a larger machine");

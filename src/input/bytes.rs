@@ -1,8 +1,8 @@
 //! Input files: read into memory as a whole, or from begin to end by those who take them piece by piece.
 //!
-//! Inputs are never mapped into memory: another program may cut such a file off at any moment (an FE program that starts
-//! again does), and touching a page that is gone ends the process. The fingerprint is taken of the bytes that are read,
-//! while they are read; a file that changed meanwhile is refused.
+//! Inputs are never mapped into memory: another program may cut such a file off at any moment (an FE program that
+//! starts again does), and touching a page that is gone ends the process. The fingerprint is taken of the bytes that
+//! are read, while they are read; a file that changed meanwhile is refused.
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::memory::{left, or_go_without, refuse_beyond};
@@ -33,8 +33,8 @@ pub struct InputFile {
 }
 
 impl InputFile {
-    /// Opens a regular file that is not empty and reads it into memory. Of an HDF5 file only the begin is read: the HDF5
-    /// library reads the rest.
+    /// Opens a regular file that is not empty and reads it into memory. Of an HDF5 file only the begin is read: the
+    /// HDF5 library reads the rest.
     ///
     /// # Errors
     /// FB101 when it does not exist, is no regular file or may not be read; FB106 when it has no bytes; FB132 when it
@@ -71,6 +71,10 @@ impl InputFile {
         let mut head = Vec::new();
         let read = opened.reader().take(HEAD_BYTES as u64).read_to_end(&mut head);
         read.map_err(|e| opened.failed(&e))?;
+        if head.len() as u64 == opened.state.length {
+            // A small file is read once.
+            opened.whole = OnceLock::from(Ok(head.clone()));
+        }
         opened.head = head;
         Ok(opened)
     }
@@ -88,14 +92,16 @@ impl InputFile {
 
     fn read_whole(&self) -> Result<Vec<u8>, Diagnostic> {
         let length = self.state.length;
-        let needed = |left: Option<u64>| refuse_beyond(left, length as f64, "reading the file", MEMORY_HELP);
-        let short = |error: crate::base::error::Error| error.first_error().clone().in_file(&self.path);
-        needed(left()).map_err(short)?;
+        let refuse = |left: Option<u64>| {
+            let refused = refuse_beyond(left, length as f64, "reading the file", MEMORY_HELP);
+            refused.map_err(|error| error.first_error().clone().in_file(&self.path))
+        };
+        refuse(left())?;
         let mut bytes = Vec::new();
         // One more than there should be: the end of the file is seen without growing.
         let size = usize::try_from(length).unwrap_or(usize::MAX).saturating_add(1);
         if or_go_without(|| bytes.try_reserve_exact(size)).is_err() {
-            return Err(needed(Some(0)).map_err(short).err().unwrap_or_else(|| self.changed("")));
+            refuse(Some(0))?;
         }
         self.reader().read_to_end(&mut bytes).map_err(|e| self.failed(&e))?;
         self.refuse_changed()?;
@@ -117,7 +123,7 @@ impl InputFile {
         self.loaded().unwrap_or(&self.head)
     }
 
-    /// All bytes, where they are in memory.
+    /// Returns all bytes where they are in memory.
     pub(super) fn loaded(&self) -> Option<&[u8]> {
         self.whole.get()?.as_deref().ok()
     }
@@ -140,7 +146,7 @@ impl InputFile {
         FileReader { file: self, at: 0, hashed: Some(Fingerprint::default()) }
     }
 
-    /// [`Self::reader`] for decoders, which take a few bytes at a time.
+    /// A reader as [`Self::reader`] gives it, for decoders that take a few bytes at a time.
     pub(super) fn buffered(&self) -> BufReader<FileReader<'_>> {
         BufReader::with_capacity(DECODER_BYTES, self.reader())
     }
@@ -175,12 +181,12 @@ impl InputFile {
         self.state.refuse_changed(&self.path)
     }
 
-    /// FB132.
+    /// Returns FB132 for this file with the reason.
     pub(super) fn changed(&self, what: &str) -> Diagnostic {
         changed(&self.path, what)
     }
 
-    /// What an error of reading means.
+    /// Returns the diagnostic of an error of reading this file.
     pub(super) fn failed(&self, error: &std::io::Error) -> Diagnostic {
         let own = || Diagnostic::new(Code::FileUnreadable, reason(error)).in_file(&self.path);
         reading_error(error).unwrap_or_else(own)
@@ -218,7 +224,8 @@ impl std::fmt::Display for Failed {
 
 impl std::error::Error for Failed {}
 
-/// The bytes of a file from begin to end. The end comes where the file ended when it was opened; another end is an error.
+/// The bytes of a file from begin to end. The end comes where the file ended when it was opened; another end is an
+/// error.
 pub(super) struct FileReader<'a> {
     file: &'a InputFile,
     at: u64,
@@ -321,7 +328,7 @@ impl FileState {
     }
 }
 
-/// FB132.
+/// Returns FB132 with the reason.
 fn changed(path: &Path, what: &str) -> Diagnostic {
     Diagnostic::new(Code::InputChanged, format!("file changed while it was read: {what}")).in_file(path)
 }

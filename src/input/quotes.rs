@@ -4,8 +4,8 @@
 use crate::base::diagnostic::Diagnostic;
 use std::path::Path;
 
-/// Leaves out what a message quotes of a file that does not lie in the folder of `main` or below: `main` is the manifest,
-/// the scene or the deck that names it.
+/// Leaves out what a message quotes of a file that does not lie in the folder of `main` or below: `main` is the
+/// manifest, the scene or the deck that names it.
 pub(crate) fn without_foreign_quotes(diagnostic: Diagnostic, main: &Path) -> Diagnostic {
     let is_foreign = diagnostic.file().is_some_and(|file| !lies_beside(file, main));
     if is_foreign { diagnostic.without_quotes() } else { diagnostic }

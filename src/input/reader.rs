@@ -94,7 +94,8 @@ pub trait Reader: Sync {
     /// bytes unless the file is shorter.
     fn recognises(&self, head: &[u8]) -> bool;
 
-    /// True if the reader takes the file piece by piece or by its path; others are given a file whose bytes are in memory.
+    /// True if the reader takes the file piece by piece or by its path; others are given a file whose bytes are in
+    /// memory.
     fn reads_by_itself(&self) -> bool {
         false
     }

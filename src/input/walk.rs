@@ -72,7 +72,7 @@ pub(crate) struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// What was found, in the order of lines: the first of it where it is much.
+    /// Returns the findings in the order of lines, the first of them where there are many.
     fn told(mut self) -> Vec<Diagnostic> {
         /// Findings that are told one by one.
         const SHOWN: usize = 200;

@@ -55,7 +55,7 @@ fn lines_without_a_head_are_no_more_than_their_rows_can_have() {
     let deck = folder.path().join("job.inp");
     let files = ModelFiles::from_job(&deck, None, Vec::new(), Some("m,kg,s")).expect("units");
     gzip(&folder.path().join("job.sti"), "", "1 1 1\n", 40);
-    let error = read_model(&files).err().expect("refused");
+    let error = read_model(&files).expect_err("refused");
     assert!(error.to_string().contains("declares") && error.has(Code::MatrixCount), "{error}");
 }
 
@@ -142,7 +142,10 @@ fn points_of_vtk_are_unpacked_as_many_as_there_are() {
     let head = [12, BLOCK as u64, 0].into_iter().chain([one.len() as u64; 12]);
     let mut data: Vec<u8> = head.flat_map(u64::to_le_bytes).collect();
     (0..12).for_each(|_| data.extend(&one));
-    let before = "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid><Piece NumberOfPoints=\"4\" NumberOfCells=\"0\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/></Points></Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_";
+    let before = "<VTKFile type=\"UnstructuredGrid\" byte_order=\"LittleEndian\" \
+        header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\"><UnstructuredGrid>\
+        <Piece NumberOfPoints=\"4\" NumberOfCells=\"0\"><Points><DataArray type=\"Float64\" \
+        NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"/></Points></Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_";
     let file = [before.as_bytes(), &data, b"</AppendedData></VTKFile>"].concat();
     let folder = tempfile::tempdir().expect("a folder");
     for file in ["K.mtx", "M.mtx", "dofs.csv", "model.toml"] {
@@ -153,7 +156,7 @@ fn points_of_vtk_are_unpacked_as_many_as_there_are() {
     let text = fs::read_to_string(&manifest).expect("a manifest").replace("nodes.csv", "nodes.vtu");
     fs::write(&manifest, text).expect("written");
     let files = read_manifest(&manifest).expect("a manifest");
-    let error = read_model(&files).err().expect("refused");
+    let error = read_model(&files).expect_err("refused");
     assert!(error.to_string().contains("unpacks to 50331648 bytes, 96 are expected"), "{error}");
 }
 

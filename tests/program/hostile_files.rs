@@ -89,7 +89,8 @@ fn matrices_that_are_cut_off_while_they_are_read_end_no_run() {
 fn telling_library(folder: &Path) -> Option<PathBuf> {
     let mark = folder.join("loaded");
     let source = format!(
-        "#include <stdio.h>\n__attribute__((constructor)) static void tell(void) {{ FILE *f = fopen(\"{}\", \"w\"); if (f) fclose(f); }}\n",
+        "#include <stdio.h>\n__attribute__((constructor)) static void tell(void) \
+         {{ FILE *f = fopen(\"{}\", \"w\"); if (f) fclose(f); }}\n",
         mark.display()
     );
     fs::write(folder.join("tell.c"), source).expect("written");
@@ -253,7 +254,7 @@ fn a_deck_includes_no_more_than_a_thousand_files() {
     assert!(run.status.code() == Some(2) && said.contains("FB110") && said.contains("1000 times"), "{said}");
 }
 
-/// What a manifest has wrong many times is told a few times, and no more interfaces are read than a body can have.
+/// Mistakes that a manifest has many times are told a few times, and no more interfaces are read than a body can have.
 #[test]
 fn a_manifest_with_very_many_interfaces_is_refused_in_short() {
     let folder = tet4();

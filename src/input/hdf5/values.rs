@@ -133,7 +133,10 @@ fn check_stored(dataset: &Dataset) -> Result<(), String> {
     Ok(())
 }
 
-/// FB601 where so many values do not fit the memory that is left.
+/// Refuses so many values where they do not fit the memory that is left.
+///
+/// # Errors
+/// FB601.
 pub(super) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
     let what = format!("reading {values} values of the dataset {name}");
     let needed = values as f64 * size_of::<f64>() as f64;

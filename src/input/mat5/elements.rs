@@ -60,8 +60,8 @@ impl<'a> Elements<'a> {
     /// The next element.
     ///
     /// # Errors
-    /// FB103 for damaged packed bytes, FB304 where the variable ends within it or the element has more than `most` bytes,
-    /// FB601.
+    /// FB103 for damaged packed bytes, FB304 where the variable ends within it or the element has more than `most`
+    /// bytes, FB601.
     pub(super) fn next(&mut self, most: u64) -> Found<Numbers> {
         let tag: [u8; 8] = self.take(8)?.try_into().expect("eight bytes were read");
         let [kind, length] = self.order.two(&tag);
