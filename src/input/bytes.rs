@@ -426,9 +426,9 @@ mod tests {
             let file = InputFile::open_unread(&path).expect("a file");
             assert_eq!(file.refuse_changed(), Ok(()));
             change(&path, later);
+            assert_eq!(file.sha256().expect_err(name).code(), Code::InputChanged, "{name}");
             let found = file.load().expect_err(name);
             assert_eq!(found.code(), Code::InputChanged, "{name}: {found}");
-            assert_eq!(file.sha256().expect_err(name).code(), Code::InputChanged, "{name}");
         }
     }
 }
