@@ -377,7 +377,7 @@ mod tests {
 
     #[test]
     fn the_fingerprint_is_that_of_the_bytes_however_they_are_read() {
-        let bytes: Vec<u8> = (0..3_000_000u32).map(|k| (k * k >> 7) as u8).collect();
+        let bytes: Vec<u8> = (0..3_000_000u32).map(|k| (k.wrapping_mul(k) >> 7) as u8).collect();
         let (_folder, path) = written(&bytes);
         let expected = sha256_hex(&bytes);
         let whole = InputFile::open(&path).expect("a file");
