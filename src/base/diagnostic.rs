@@ -416,6 +416,20 @@ fn is_command(c: char) -> bool {
         || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
 }
 
+impl serde::Serialize for Diagnostic {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        let mut s = serializer.serialize_struct("Diagnostic", 6)?;
+        s.serialize_field("code", self.code.id())?;
+        s.serialize_field("severity", &self.severity())?;
+        s.serialize_field("message", &self.message)?;
+        s.serialize_field("file", &self.file.as_ref().map(|f| f.display().to_string()))?;
+        s.serialize_field("line", &self.line)?;
+        s.serialize_field("help", self.help())?;
+        s.end()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -440,19 +454,5 @@ mod tests {
         assert_eq!(of("column `root:$6$` is not `node`"), "column `...` is not `...`");
         assert_eq!(of("file does not exist"), "file does not exist");
         assert_eq!(of("an open `quote"), "an open `...");
-    }
-}
-
-impl serde::Serialize for Diagnostic {
-    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        use serde::ser::SerializeStruct;
-        let mut s = serializer.serialize_struct("Diagnostic", 6)?;
-        s.serialize_field("code", self.code.id())?;
-        s.serialize_field("severity", &self.severity())?;
-        s.serialize_field("message", &self.message)?;
-        s.serialize_field("file", &self.file.as_ref().map(|f| f.display().to_string()))?;
-        s.serialize_field("line", &self.line)?;
-        s.serialize_field("help", self.help())?;
-        s.end()
     }
 }

@@ -368,6 +368,9 @@ mod tests {
     use super::*;
     use crate::base::provenance::sha256_hex;
 
+    /// Changes a file; the time is later than that of the file.
+    type Change = fn(&Path, SystemTime);
+
     fn written(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("K.mtx");
@@ -399,7 +402,7 @@ mod tests {
     fn what_changes_while_it_is_read_is_refused() {
         let bytes = vec![b'1'; 100_000];
         let later = SystemTime::now() + std::time::Duration::from_secs(10);
-        let changes: [(&str, fn(&Path, SystemTime)); 5] = [
+        let changes: [(&str, Change); 5] = [
             ("cut off", |path, _| {
                 File::options().write(true).open(path).and_then(|file| file.set_len(50_000)).expect("cut off")
             }),
