@@ -2,6 +2,7 @@
 //! title and a default help here. `docs/codes.md` is generated from it; `fixtures/codes/` triggers each.
 
 use crate::base::exit_code::ExitCode;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 /// How much a diagnostic weighs.
@@ -96,6 +97,7 @@ codes! {
     ModeFileSyntax = "FB128", Error, BadInput, "file of modes cannot be read", "write it again as docs/fe_programs.md says, or give the shapes as an array";
     ModesCompleted = "FB129", Note, Done, "rows that the file of modes lacks follow from the others by K and M", "nothing to do: the modes that the file states fulfil the equations of motion there too";
     DeckConstrained = "FB131", Note, Done, "rows that follow others by constraints of the deck are eliminated", "nothing to do: matrices before the constraints (KGG, MGG) are those of parts that are not joined";
+    InputChanged = "FB132", Error, BadInput, "file changed while it was read", "run again when the program that writes the file has ended";
     // FB2xx: tables and manifest
     ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
     ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
@@ -284,7 +286,7 @@ pub fn codes_markdown() -> String {
          | 1 | a check failed or a tolerance was exceeded; the inputs themselves were readable |\n\
          | 2 | bad input or usage |\n\
          | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
-         | 4 | not enough memory or disk |\n\
+         | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB104) |\n\
          | 70 | a bug of ours |\n\
          | 130 | interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left |\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
@@ -344,6 +346,16 @@ impl Diagnostic {
         self
     }
 
+    /// Leaves out what the message quotes between backticks.
+    pub fn without_quotes(mut self) -> Self {
+        let parts: Vec<&str> = self.message.split('`').collect();
+        // Every second part stands between backticks.
+        let shown =
+            |(k, part): (usize, &&str)| if k % 2 == 1 { "...".to_owned() } else { (*part).to_owned() };
+        self.message = parts.iter().enumerate().map(shown).collect::<Vec<_>>().join("`");
+        self
+    }
+
     /// Its code.
     pub fn code(&self) -> Code {
         self.code
@@ -378,15 +390,31 @@ impl Diagnostic {
 impl std::fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let severity = self.severity().name();
-        write!(f, "{severity}[{}]: {}", self.code.id(), self.message)?;
+        write!(f, "{severity}[{}]: {}", self.code.id(), printable(&self.message))?;
         if let Some(file) = &self.file {
-            write!(f, "\n  in {}", file.display())?;
+            let name = file.display().to_string().replace('\n', "\\n");
+            write!(f, "\n  in {}", printable(&name))?;
             if let Some(line) = self.line {
                 write!(f, ", line {line}")?;
             }
         }
-        write!(f, "\n  help: {}", self.help())
+        write!(f, "\n  help: {}", printable(self.help()))
     }
+}
+
+/// Returns a text without characters that a terminal takes as commands: control characters but line ends and tabs, and
+/// those that turn the direction of writing, are shown by their numbers, as `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_command) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c: char| if is_command(c) { c.escape_unicode().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(shown).collect())
+}
+
+fn is_command(c: char) -> bool {
+    c.is_control() && !matches!(c, '\n' | '\t')
+        || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
 }
 
 impl serde::Serialize for Diagnostic {
@@ -400,5 +428,32 @@ impl serde::Serialize for Diagnostic {
         s.serialize_field("line", &self.line)?;
         s.serialize_field("help", self.help())?;
         s.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_would_take_for_a_command_is_shown_by_its_number() {
+        let diagnostic = Diagnostic::new(Code::Hdf5Layout, "group `\u{1b}]0;t\u{7}K\u{9b}31m` \u{202e}x")
+            .in_file("a\nb\u{1b}[31m.h5")
+            .with_help("\u{1b}[2J");
+        let told = diagnostic.to_string();
+        assert!(!told.contains(is_command), "{told:?}");
+        assert!(
+            told.contains("`\\u{1b}]0;t\\u{7}K\\u{9b}31m`") && told.contains("a\\nb\\u{1b}[31m.h5"),
+            "{told}"
+        );
+        assert_eq!(printable("a\tb\nc"), "a\tb\nc");
+    }
+
+    #[test]
+    fn quotes_are_left_out() {
+        let of = |message: &str| Diagnostic::new(Code::TableHeader, message).without_quotes().message;
+        assert_eq!(of("column `root:$6$` is not `node`"), "column `...` is not `...`");
+        assert_eq!(of("file does not exist"), "file does not exist");
+        assert_eq!(of("an open `quote"), "an open `...");
     }
 }

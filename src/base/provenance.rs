@@ -1,5 +1,6 @@
 //! What a result was made from: fingerprints of the input files and the generator's name.
 
+use crate::base::diagnostic::Diagnostic;
 use std::fs::File;
 use std::io::Read;
 use std::ops::Deref;
@@ -28,28 +29,37 @@ impl SourceFile {
 /// The input files of a model. Their fingerprints are taken when somebody asks for them first: a file of gigabytes takes
 /// seconds, in which something else may have to wait for a single thread.
 #[derive(Clone)]
-pub struct Sources(Arc<LazyLock<Vec<SourceFile>, Find>>);
+pub struct Sources(Arc<LazyLock<Result<Vec<SourceFile>, Diagnostic>, Find>>);
 
-type Find = Box<dyn FnOnce() -> Vec<SourceFile> + Send>;
+type Find = Box<dyn FnOnce() -> Result<Vec<SourceFile>, Diagnostic> + Send>;
 
 impl Sources {
     /// Those that `find` finds.
-    pub fn later(find: impl FnOnce() -> Vec<SourceFile> + Send + 'static) -> Self {
+    pub fn later(find: impl FnOnce() -> Result<Vec<SourceFile>, Diagnostic> + Send + 'static) -> Self {
         Self(Arc::new(LazyLock::new(Box::new(find))))
+    }
+
+    /// Takes the fingerprints that were not taken while reading.
+    ///
+    /// # Errors
+    /// FB101, FB132 for a file that is no longer the one that was read.
+    pub fn find(&self) -> Result<(), Diagnostic> {
+        LazyLock::force(&self.0).as_ref().map(|_| ()).map_err(Diagnostic::clone)
     }
 }
 
 impl Default for Sources {
     fn default() -> Self {
-        Self::later(Vec::new)
+        Self::later(|| Ok(Vec::new()))
     }
 }
 
 impl Deref for Sources {
     type Target = [SourceFile];
 
+    /// The files; none where [`Self::find`] fails.
     fn deref(&self) -> &[SourceFile] {
-        &self.0
+        self.0.as_ref().as_ref().map_or(&[], Vec::as_slice)
     }
 }
 

@@ -22,7 +22,7 @@ use std::path::PathBuf;
 #[command(version, about, max_term_width = 100, disable_help_subcommand = false)]
 #[command(
     after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
-    numerical result; 4 not enough memory or disk; 70 internal error; 130 interrupted, no unfinished file is left. Codes of all messages: docs/codes.md."
+    numerical result; 4 not enough memory or disk, or an output that may not be written; 70 internal error; 130 interrupted, no unfinished file is left. Codes of all messages: docs/codes.md."
 )]
 pub struct Arguments {
     /// What to do.

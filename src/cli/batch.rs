@@ -48,6 +48,9 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
     let slots = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading the list");
     let parsed = list.bodies.iter().map(|body| parse(&list, body)).collect::<Result<Vec<_>>>()?;
+    if !arguments.allow_programs {
+        list.bodies.iter().zip(&parsed).try_for_each(|(body, (_, own))| refuse_programs(body, own))?;
+    }
     let mut ledger = Ledger::of(&arguments.list);
     let budget = Budget {
         memory: memory_left(arguments.memory_limit).unwrap_or(u64::MAX),
@@ -128,6 +131,21 @@ fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<Convert
             let text = error.render().to_string();
             let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
             Err(refused(body, &first))
+        }
+    }
+}
+
+/// A list is data: it names no program to start, unless the command line allows it.
+fn refuse_programs(body: &BatchBody, converted: &ConvertArguments) -> Result<()> {
+    let named =
+        [("--mpiexec", converted.engine.mpiexec.is_some()), ("--python", converted.engine.python.is_some())];
+    match named.iter().find(|(_, is_named)| *is_named) {
+        None => Ok(()),
+        Some((option, _)) => {
+            let message = format!("{}: {option} names a program to start", body.output.display());
+            let help =
+                "set FLEXBODY_MPIEXEC and FLEXBODY_PYTHON, or allow it by flexbody batch --allow-programs";
+            Err(Diagnostic::new(Code::BatchSyntax, message).with_help(help).into())
         }
     }
 }

@@ -28,14 +28,15 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
 
     let file = InputFile::open(path)?;
-    let source = SourceFile::new("body", path, file.sha256());
+    let read = format.read(&file);
+    file.refuse_changed()?;
+    let source = SourceFile::new("body", path, file.sha256()?);
     let frame = match &arguments.frame {
         None => ImportFrame::Kept,
         Some(FrameName::Mean(at)) => ImportFrame::Mean(*at),
         Some(FrameName::Interface(name)) => ImportFrame::Interface(name.clone()),
     };
-    let mut imported =
-        import_body(&format.read(&file)?, source, units, &frame).map_err(|error| error.in_file(path))?;
+    let mut imported = import_body(&read?, source, units, &frame).map_err(|error| error.in_file(path))?;
     if arguments.storage == StorageName::F32 {
         imported.body = imported.body.rounded_to_f32()?;
     }

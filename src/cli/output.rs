@@ -2,14 +2,15 @@
 
 use super::arguments::{Arguments, Command, Printing};
 use super::outcome::{Outcome, warnings};
-use super::resources::use_threads;
-use super::terminal::colours_of_stderr;
+use super::resources::{memory_left, use_threads};
+use super::terminal::{colours_of_stderr, for_terminal};
 use super::{
     assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare, recipe,
     response, select, simulate, trade, view,
 };
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{ExitCode, Result};
+use crate::base::memory::tell_left;
 use crate::base::read_files::begin_run;
 use crate::report::output_json;
 use clap::{CommandFactory, Parser};
@@ -65,6 +66,7 @@ pub fn run(arguments: &Arguments) -> ExitCode {
     });
     let (name, printing) = command_of(arguments);
     begin_run();
+    tell_left(|| memory_left(None));
     // In a thread of the pool: from any other one every loop in parallel is handed over, and waited for asleep.
     let outcome = rayon::scope(|_| outcome_of(arguments));
     finish(Some(name), printing, outcome)
@@ -135,7 +137,7 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
     tell(printing, &diagnostics);
     let printed = match text {
         _ if printing.json => print(&output_json(command, code, &diagnostics, results.as_deref())),
-        Some(text) if !printing.quiet => print(&text),
+        Some(text) if !printing.quiet => print(&for_terminal(&text)),
         _ => Ok(()),
     };
     match printed {

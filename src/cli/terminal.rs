@@ -1,7 +1,9 @@
 //! What the terminal shows of a body, in how many columns, and whether in colours.
 
 use super::arguments::Printing;
+use crate::base::diagnostic::printable;
 use crate::report::{Facts, Format, Screen, render, summary};
+use std::borrow::Cow;
 use std::io::IsTerminal;
 
 /// The summary of a body, or with `verbose` all that is known of it.
@@ -37,9 +39,36 @@ fn are_wanted() -> bool {
     !is_set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
+/// A text for stdout: of what a terminal takes as commands only colours are left, which this program uses itself. Names
+/// come from files.
+pub(super) fn for_terminal(text: &str) -> Cow<'_, str> {
+    const COLOUR: &str = "\u{1b}[";
+    let Some(first) = text.find(COLOUR) else { return printable(text) };
+    let mut shown = printable(&text[..first]).into_owned();
+    for part in text[first..].split(COLOUR).skip(1) {
+        let length = part.find(|c: char| !c.is_ascii_digit() && c != ';').unwrap_or(part.len());
+        let is_colour = part[length..].starts_with('m');
+        shown += if is_colour { COLOUR } else { "\\u{1b}[" };
+        shown += &printable(part);
+    }
+    Cow::Owned(shown)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn of_commands_to_a_terminal_only_colours_are_left() {
+        for (text, shown) in [
+            ("plain\ttext\n", "plain\ttext\n"),
+            ("\u{1b}[1;31mred\u{1b}[0m", "\u{1b}[1;31mred\u{1b}[0m"),
+            ("a\u{1b}[2Jb\u{1b}]0;t\u{7}", "a\\u{1b}[2Jb\\u{1b}]0;t\\u{7}"),
+            ("\u{1b}[31mname\u{9b}31m\r", "\u{1b}[31mname\\u{9b}31m\\u{d}"),
+        ] {
+            assert_eq!(for_terminal(text), shown);
+        }
+    }
 
     #[test]
     fn what_the_user_says_of_the_terminal_counts_more_than_what_it_says() {

@@ -18,12 +18,17 @@ Exit codes: 0 done, 1 not all modes converged or some are missing (what was foun
 the packages are not what they should be, 3 a solver or a rank failed (what was found is kept).
 """
 
+import sys
+
+# Packages are not looked for beside this file or in the current folder: data lie there, not code.
+if not (sys.flags.isolated or getattr(sys.flags, "safe_path", False)):
+    del sys.path[0]
+
 import argparse
 import glob
 import hashlib
 import json
 import os
-import sys
 import time
 
 VERSION = 1

@@ -51,6 +51,10 @@ pub struct Engine {
 /// Pythons that are tried where none is named.
 const PYTHONS: [&str; 2] = ["python3", "/usr/bin/python3"];
 
+/// Options that keep Python from loading packages of the current folder, of the folder of the driver and of PYTHONPATH:
+/// data lie there. Since Python 3.11 it includes `-P`, which older ones do not know.
+const ISOLATED: [&str; 1] = ["-I"];
+
 impl Engine {
     /// The Python that has the packages.
     ///
@@ -95,7 +99,12 @@ impl Engine {
         };
         let mut command = Command::new(program);
         command.args(options).arg("-n").arg(self.ranks.to_string());
-        command.arg(python).arg(folder.join(DRIVER)).arg(folder).args(["--solver", self.solver.name()]);
+        command
+            .arg(python)
+            .args(ISOLATED)
+            .arg(folder.join(DRIVER))
+            .arg(folder)
+            .args(["--solver", self.solver.name()]);
         // Threads of BLAS beside the ranks would take their processors.
         command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").stdin(Stdio::null());
         let output = children::output(&mut command).map_err(|e| missing(program, &e))?;
@@ -114,7 +123,12 @@ fn missing(program: &str, error: &std::io::Error) -> Diagnostic {
 /// Hands the driver to a Python, to say which packages it finds.
 fn probe(python: &str) -> std::io::Result<Output> {
     let mut command = Command::new(python);
-    command.args(["-", "--probe"]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+        .args(ISOLATED)
+        .args(["-", "--probe"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
     let mut child = command.spawn()?;
     if let Some(mut input) = child.stdin.take() {
         // A program that does not read it says itself what it is.

@@ -3,7 +3,7 @@
 
 use super::digits::significant_digits;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::memory::or_go_without;
+use crate::base::memory::{left, or_go_without, refuse_beyond};
 use crate::model::RawMatrix;
 use crate::numerics::linalg::{ColumnBlock, CscMatrix, split_columns};
 use rayon::prelude::*;
@@ -44,6 +44,32 @@ impl Storage {
     }
 }
 
+/// Entries that a matrix may have for each of its places: contributions of many elements may be listed one by one. A
+/// larger number lets a compressed file unpack to more; all that was seen has less than 10.
+const ENTRIES_PER_PLACE: u128 = 64;
+
+/// Entries that a matrix of any size may have.
+const ALWAYS_ENTRIES: u64 = 1_000_000;
+
+/// Bytes that an entry takes while a matrix is assembled: as it was read, and in a compressed column.
+const BYTES_PER_ENTRY: f64 = (size_of::<Entry>() + size_of::<u32>() + size_of::<f64>()) as f64;
+
+/// Largest number of entries that a matrix of `n` rows may have.
+pub(super) fn most_entries_of(n: u64) -> u64 {
+    let places = u128::from(n) * u128::from(n);
+    u64::try_from(ENTRIES_PER_PLACE.saturating_mul(places)).unwrap_or(u64::MAX).max(ALWAYS_ENTRIES)
+}
+
+/// Refuses so many entries where they do not fit the memory that is left.
+///
+/// # Errors
+/// FB601.
+pub(super) fn refuse_beyond_memory(entries: u64) -> Result<(), Diagnostic> {
+    let what = format!("a matrix of {entries} entries");
+    let refused = refuse_beyond(left(), entries as f64 * BYTES_PER_ENTRY, &what, "use a larger machine");
+    refused.map_err(|error| error.first_error().clone())
+}
+
 /// Checks a declared size against the number of stored entries, before anything of that size is allocated.
 pub(crate) fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnostic> {
     if rows != cols {
@@ -59,6 +85,10 @@ pub(crate) fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Di
     if rows > 1_000_000 && rows / 100 > entries {
         let message = format!("matrix declares {rows} rows but stores only {entries} entries");
         return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"));
+    }
+    if entries > most_entries_of(rows) {
+        let message = format!("matrix of {rows} rows declares {entries} entries");
+        return Err(Diagnostic::new(Code::MatrixCount, message).with_help("write the matrix again"));
     }
     Ok(rows as usize)
 }
@@ -498,5 +528,7 @@ mod tests {
         assert_eq!(check_size(1 << 40, 1 << 40, 1 << 50).unwrap_err().code(), Code::MatrixTooLarge);
         assert_eq!(check_size(3, 4, 3).unwrap_err().code(), Code::MatrixNotSquare);
         assert_eq!(check_size(1_000_000, 1_000_000, 1), Ok(1_000_000));
+        assert_eq!(check_size(12, 12, 1_000_001).unwrap_err().code(), Code::MatrixCount);
+        assert_eq!(check_size(1000, 1000, 64_000_000), Ok(1000));
     }
 }

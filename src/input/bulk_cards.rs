@@ -5,7 +5,7 @@ mod apart;
 mod matrix_lines;
 mod replication;
 
-use super::bytes::InputFile;
+use super::bytes::{InputFile, SeenFile};
 use super::coordinates::{excerpt, real};
 use crate::base::diagnostic::{Code, Diagnostic};
 use apart::Apart;
@@ -133,11 +133,9 @@ pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
     field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
 }
 
-/// Whether a file is a deck of Nastran or bulk data, by its first lines that say so.
+/// True if a file that begins with `bytes` is a deck of Nastran or bulk data, by its first lines that say so.
 pub(super) fn is_bulk_data(bytes: &[u8]) -> bool {
-    const LOOKED_AT: usize = 1 << 20;
-    let head = &bytes[..bytes.len().min(LOOKED_AT)];
-    head.split(|&b| b == b'\n').any(|line| {
+    bytes.split(|&b| b == b'\n').any(|line| {
         let upper: Vec<u8> = line.iter().take(16).map(u8::to_ascii_uppercase).collect();
         let is_card = |name: &[u8]| {
             upper
@@ -183,13 +181,9 @@ type Taken = Result<(), Diagnostic>;
 pub(super) fn read_deck(
     path: &Path,
     take: &mut dyn FnMut(Item<'_>) -> Taken,
-) -> Result<Vec<PathBuf>, Diagnostic> {
+) -> Result<Vec<SeenFile>, Diagnostic> {
     let file = InputFile::open(path)?;
-    let mut given = 0;
-    let has_control = Lines::of(file.bytes(), 0).any(|(_, range)| {
-        file.release_up_to(range.start, &mut given);
-        is_control(&file.bytes()[range])
-    });
+    let has_control = Lines::of(file.bytes(), 0).any(|(_, range)| is_control(&file.bytes()[range]));
     let mut reading = Reading::new(!has_control, take);
     reading.file(path, &file, 0)?;
     reading.flush()?;
@@ -246,7 +240,7 @@ impl Iterator for Lines<'_> {
 
 /// A deck while it is read.
 struct Reading<'t> {
-    files: Vec<PathBuf>,
+    files: Vec<SeenFile>,
     in_bulk: bool,
     /// ENDDATA has come.
     ended: bool,
@@ -277,7 +271,7 @@ impl<'t> Reading<'t> {
                 .in_file(path)
                 .with_help("a file includes itself: take the INCLUDE out"));
         }
-        self.files.push(path.to_path_buf());
+        self.files.push(file.seen()?);
         let before = std::mem::replace(&mut self.apart, Apart::of(file));
         self.lines_of(path, file, depth)?;
         if !self.apart.is_empty() {
@@ -330,7 +324,7 @@ impl<'t> Reading<'t> {
         let name = name.split('$').next().filter(|_| !name.starts_with(['\'', '"'])).unwrap_or(name);
         let name = name.trim().trim_matches(['\'', '"']);
         let folder = at.path.parent().unwrap_or(Path::new(""));
-        let main = self.files.first().and_then(|path| path.parent()).unwrap_or(folder);
+        let main = self.files.first().and_then(|file| file.path.parent()).unwrap_or(folder);
         let beside = folder.join(name);
         let path = if beside.exists() { beside } else { main.join(name) };
         let file = InputFile::open(&path).map_err(|diagnostic| {

@@ -1,9 +1,9 @@
 //! gzip and Zstandard around a text file, recognised by their first bytes whatever the file is called.
 
-use super::bytes::InputFile;
+use super::bytes::{InputFile, reading_error};
 use super::zstd_frames::ZstdFrames;
 use crate::base::diagnostic::{Code, Diagnostic};
-use std::io::Read;
+use std::io::{BufRead, Read};
 use std::path::Path;
 
 /// How the bytes on disk are packed.
@@ -29,22 +29,36 @@ impl Compression {
         }
     }
 
-    /// A stream of the unpacked bytes.
-    pub(super) fn stream<'a>(self, bytes: &'a [u8]) -> Box<dyn Read + Send + 'a> {
+    /// A stream of the unpacked bytes of what is `stored`.
+    pub(super) fn stream<'a>(self, stored: impl BufRead + Send + 'a) -> Box<dyn Read + Send + 'a> {
         match self {
-            Self::None => Box::new(bytes),
-            Self::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(bytes)),
-            Self::Zstd => Box::new(ZstdFrames::new(bytes)),
+            Self::None => Box::new(stored),
+            Self::Gzip => Box::new(flate2::bufread::MultiGzDecoder::new(stored)),
+            Self::Zstd => Box::new(ZstdFrames::new(stored)),
+        }
+    }
+
+    /// A stream of the unpacked bytes of a file.
+    pub(super) fn stream_of<'a>(self, file: &'a InputFile) -> Box<dyn Read + Send + 'a> {
+        match (file.loaded(), self) {
+            (Some(bytes), _) => self.stream(bytes),
+            // Who takes large pieces needs no buffer between.
+            (None, Self::None) => Box::new(file.reader()),
+            (None, _) => self.stream(file.buffered()),
         }
     }
 
     /// The first unpacked bytes, at most `limit` of them; fewer when the file is short or damaged.
-    pub(super) fn head(self, bytes: &[u8], limit: usize) -> Vec<u8> {
-        let mut head = Vec::new();
-        // A damaged stream gives what came before the damage; reading it in earnest reports it.
-        let _ = self.stream(bytes).take(limit as u64).read_to_end(&mut head);
-        head
+    pub(super) fn head(self, file: &InputFile, limit: usize) -> Vec<u8> {
+        first_bytes(self.stream_of(file), limit)
     }
+}
+
+fn first_bytes(stream: impl Read, limit: usize) -> Vec<u8> {
+    let mut head = Vec::new();
+    // A damaged stream gives what came before the damage; reading it in earnest reports it.
+    let _ = stream.take(limit as u64).read_to_end(&mut head);
+    head
 }
 
 /// FB102 for a compressed file whose reader takes it unpacked; `what` it is, as in "file of nodes".
@@ -58,8 +72,11 @@ pub(super) fn refuse_packed(file: &InputFile, what: &str) -> Result<(), Diagnost
     Err(Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).with_help("unpack it"))
 }
 
-/// FB103 for `path`, with the decoder's reason.
+/// FB103 for `path`, with the decoder's reason; the diagnostic of the file where reading it failed.
 pub(super) fn broken(path: &Path, error: &std::io::Error) -> Diagnostic {
+    if let Some(diagnostic) = reading_error(error) {
+        return diagnostic;
+    }
     let message = if error.kind() == std::io::ErrorKind::UnexpectedEof {
         "compressed file ends before its data does".to_owned()
     } else {
@@ -90,9 +107,9 @@ mod tests {
             let compression = Compression::of(&two);
             assert_eq!(compression, expected);
             let mut text = String::new();
-            compression.stream(&two).read_to_string(&mut text).unwrap();
+            compression.stream(&two[..]).read_to_string(&mut text).unwrap();
             assert_eq!(text, "one two");
-            assert_eq!(compression.head(&two, 3), b"one");
+            assert_eq!(first_bytes(compression.stream(&two[..]), 3), b"one");
         }
     }
 }

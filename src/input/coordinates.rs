@@ -2,14 +2,13 @@
 //!
 //! The text is cut at line ends into pieces that are parsed in parallel; pieces keep the order of the file.
 
-use super::assemble::{Entry, Sides};
+use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
 use super::compression::{Compression, broken};
 use super::digits::{COUNTED, written_digits};
-use super::reader::MatrixSource;
 use crate::base::diagnostic::Diagnostic;
 use rayon::prelude::*;
-use std::borrow::Cow;
 use std::io::Read;
+use std::path::Path;
 
 mod line;
 mod text;
@@ -30,6 +29,8 @@ pub(super) struct Coordinates {
     pub pieces: Vec<Vec<Entry>>,
     /// Data lines so far, bad ones included.
     pub count: u64,
+    /// True if reading ended at an entry too many.
+    pub stopped: bool,
     /// Lines of the file so far.
     lines: usize,
     bad: Vec<BadLine>,
@@ -50,6 +51,7 @@ impl Coordinates {
             announced,
             pieces: Vec::new(),
             count: 0,
+            stopped: false,
             lines,
             bad: Vec::new(),
             bad_count: 0,
@@ -64,27 +66,41 @@ impl Coordinates {
     ///
     /// # Errors
     /// FB103 for a compressed file that is damaged.
-    pub(super) fn read<'a>(
+    pub(super) fn read(
         &mut self,
-        source: &MatrixSource<'a>,
-        mut blocks: Blocks<'a>,
-        first: Cow<'a, [u8]>,
+        path: &Path,
+        mut blocks: Blocks<'_>,
+        first: Vec<u8>,
         skip: usize,
     ) -> Result<bool, Vec<Diagnostic>> {
-        let mut next = || blocks.next().map_err(|e| vec![broken(source.file.path(), &e)]);
-        let (mut block, mut skip, mut given) = (first, skip, 0);
+        let (mut block, mut skip) = (first, skip);
         loop {
-            // The next block is unpacked while this one is parsed.
-            let (following, ()) = rayon::join(&mut next, || self.parse(&block[skip..]));
-            if source.compression == Compression::None {
-                source.file.release(given..given + block.len());
-                given += block.len();
+            // The next block is read and unpacked while this one is parsed.
+            let (following, ()) = rayon::join(|| blocks.next(), || self.parse(&block[skip..]));
+            let following = following.map_err(|e| vec![broken(path, &e)]);
+            if self.is_too_much()? && !matches!(following, Ok(None)) {
+                self.stopped = true;
+                return Ok(true);
             }
             match following? {
-                Some(following) => (block, skip) = (following, 0),
+                Some(following) => blocks.take_back(std::mem::replace(&mut block, following)),
                 None => return Ok(blocks.ends_with_newline()),
             }
+            skip = 0;
         }
+    }
+
+    /// True if there are more entries than the file announces, or than any matrix of its rows has.
+    ///
+    /// # Errors
+    /// FB601 where the number of entries is not announced, and those that were read leave no memory for others.
+    fn is_too_much(&self) -> Result<bool, Vec<Diagnostic>> {
+        if let Some(announced) = self.announced {
+            return Ok(self.count > announced);
+        }
+        let (n, entries) = (u64::from(self.limits.n), self.count - self.bad_count as u64);
+        let fits = check_size(n, n, entries.max(n)).and_then(|_| refuse_beyond_memory(entries));
+        fits.map(|()| false).map_err(|diagnostic| vec![diagnostic])
     }
 
     fn parse(&mut self, block: &[u8]) {
@@ -103,7 +119,14 @@ impl Coordinates {
             self.lines += piece.lines;
             // A compressed file may hold any number of lines: keep no more than the header announces.
             if self.announced.is_none_or(|announced| self.count <= announced) {
-                self.pieces.push(piece.entries);
+                let mut entries = piece.entries;
+                // Lines without an entry leave room that is not needed.
+                if entries.capacity() > 2 * entries.len() {
+                    entries.shrink_to_fit();
+                }
+                if !entries.is_empty() {
+                    self.pieces.push(entries);
+                }
             } else {
                 self.pieces.clear();
             }

@@ -4,6 +4,7 @@ mod columns;
 
 use super::assemble::{Entry, Sides, Storage, assemble_distinct, check_size, push, undeclared_triangle};
 use super::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
+use super::bytes::SeenFile;
 use super::compression::Compression;
 use super::nastran_names::choose;
 use super::reader::{MatrixSource, Reader};
@@ -30,6 +31,8 @@ pub(super) struct Dmigs {
     points: Vec<Point>,
     numbers: HashMap<Point, u32>,
     bad: Vec<Diagnostic>,
+    /// Files that were read for these matrices alone, without those that they include.
+    pub files: Vec<SeenFile>,
 }
 
 struct Dmig {
@@ -70,7 +73,7 @@ impl Dmigs {
                 Item::Matrices(lines) => all.cards(lines),
                 _ => Ok(()),
             });
-            read.map_err(|diagnostic| vec![diagnostic])?;
+            all.files.extend(read.map_err(|diagnostic| vec![diagnostic])?.into_iter().take(1));
         }
         let bad = all.take_bad();
         if bad.is_empty() { Ok(all) } else { Err(bad) }
@@ -121,7 +124,6 @@ impl Dmigs {
             });
             let read: Vec<Result<Columns, Diagnostic>> = read.collect();
             self.take(read.into_iter().collect::<Result<_, _>>()?);
-            lines.file.release(parts[0].bytes.start..parts[parts.len() - 1].bytes.end);
         }
         Ok(())
     }
@@ -317,6 +319,10 @@ impl Reader for DmigPunch {
 
     fn recognises(&self, head: &[u8]) -> bool {
         is_bulk_data(head)
+    }
+
+    fn reads_by_itself(&self) -> bool {
+        true
     }
 
     /// Rows are the points that any matrix of the file names which may be one of K and M, ascending: not the

@@ -1,10 +1,12 @@
 //! Sparse matrices in HDF5 files: opening, and finding the group that holds the matrix.
 
+use super::bytes::{InputFile, is_hdf5};
 use super::compression::Compression;
 use super::named_matrices::NamedMatrices;
-use super::reader::{MatrixRole, MatrixSource, Reader, is_hdf5};
+use super::reader::{MatrixRole, MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
+use crate::base::hdf5_file::{by_utf8_name, without_plugins};
 use crate::model::RawMatrix;
 use hdf5_metno::{File, Group};
 
@@ -41,6 +43,10 @@ impl Reader for Hdf5 {
         is_hdf5(head)
     }
 
+    fn reads_by_itself(&self) -> bool {
+        true
+    }
+
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
         let path = source.file.path();
         let read = || {
@@ -49,13 +55,7 @@ impl Reader for Hdf5 {
                 let help = "unpack it: HDF5 compresses inside the file";
                 return Err(vec![Diagnostic::new(Code::FileFormatUnknown, message).with_help(help)]);
             }
-            let file = File::open(path).map_err(|e| {
-                let message = format!("HDF5 file cannot be opened: {e}");
-                vec![
-                    Diagnostic::new(Code::FileUnreadable, message)
-                        .with_help("transfer or write the file again"),
-                ]
-            })?;
+            let file = opened(source.file)?;
             let (name, group) = match source.group {
                 Some(name) => (name.to_owned(), named(&file, name)?),
                 None => search(&file, source.role)?,
@@ -64,6 +64,15 @@ impl Reader for Hdf5 {
         };
         read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
     }
+}
+
+/// Opens a file by the HDF5 library, which loads no plugins.
+fn opened(file: &InputFile) -> Found<File> {
+    without_plugins();
+    by_utf8_name(file.path(), |path| File::open(path)).map_err(|e| {
+        let message = format!("HDF5 file cannot be opened: {e}");
+        vec![Diagnostic::new(Code::FileUnreadable, message).with_help("transfer or write the file again")]
+    })
 }
 
 /// The group that the user named.

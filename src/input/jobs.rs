@@ -17,7 +17,7 @@ mod labelled_lines;
 mod nastran;
 mod rotation_nodes;
 
-use super::bytes::InputFile;
+use super::bytes::{InputFile, SeenFile};
 use super::compression::refuse_packed;
 use super::node_file::{NodeFile, NodeSets, Unresolved};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -73,11 +73,14 @@ pub(super) struct JobModel {
     pub unresolved: Unresolved,
     /// What the part is drawn by.
     pub elements: Elements,
-    /// Role and path of every file that was read.
-    pub files: Vec<(&'static str, PathBuf)>,
+    /// Every file that was read, with its role.
+    pub files: Vec<(&'static str, SeenFile)>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
+
+/// A matrix and the file that it was read from.
+type FromFile = (RawMatrix, SeenFile);
 
 /// All that is wrong with a job.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;

@@ -2,10 +2,10 @@
 //! and forgets them when memory is short, so that a matrix may be larger than that.
 
 use super::assemble::Entry;
-use super::bytes::InputFile;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::numerics::linalg::{CscMatrix, Stored};
 use bytemuck::{AnyBitPattern, NoUninit};
+use memmap2::Mmap;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::marker::PhantomData;
@@ -58,7 +58,7 @@ impl<T: Number> Kept<T> {
             return Ok(Vec::new().into());
         }
         let file = self.out.into_inner().map_err(|e| unwritable(&self.folder, e.error()))?;
-        let map = InputFile::of(&file, &self.folder)?;
+        let map = mapped(&file, &self.folder)?;
         Ok(Stored::Lent(Arc::new(Lent { map, _file: file, numbers: PhantomData })))
     }
 }
@@ -113,9 +113,19 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> Diagnostic {
     Diagnostic::new(Code::OutputUnwritable, message)
 }
 
+// The one exception to `unsafe_code = "deny"` in this room: a memory map is sound only while nobody truncates the file
+// under it. The files of this module have no name: no other program can open them, and nothing here writes to them.
+#[allow(unsafe_code)]
+fn mapped(file: &File, folder: &Path) -> Result<Mmap, Diagnostic> {
+    // SAFETY: the map is read-only and private to this module, and the file has no name.
+    unsafe { Mmap::map(file) }.map_err(|e| {
+        Diagnostic::new(Code::FileUnreadable, format!("file cannot be read: {e}")).in_file(folder)
+    })
+}
+
 /// A file of numbers.
 struct Lent<T> {
-    map: InputFile,
+    map: Mmap,
     /// Open as long as it is mapped.
     _file: File,
     numbers: PhantomData<T>,
@@ -123,6 +133,6 @@ struct Lent<T> {
 
 impl<T: Number> AsRef<[T]> for Lent<T> {
     fn as_ref(&self) -> &[T] {
-        bytemuck::cast_slice(self.map.bytes())
+        bytemuck::cast_slice(&self.map)
     }
 }

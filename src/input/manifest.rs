@@ -72,6 +72,7 @@ impl Walk<'_> {
             geometric_stiffness,
             residual_vectors,
             manifest: Some(self.path.to_path_buf()),
+            manifest_sha256: Some(self.fingerprint()),
             keep_in: None,
         })
     }

@@ -1,7 +1,7 @@
 //! Matrix Market coordinate files, plain or compressed: <https://math.nist.gov/MatrixMarket/formats.html>.
 
-use super::assemble::{Storage, assemble, check_size, undeclared_triangle};
-use super::compression::broken;
+use super::assemble::{Storage, assemble, check_size, refuse_beyond_memory, undeclared_triangle};
+use super::compression::{Compression, broken};
 use super::coordinates::{Blocks, Coordinates, Limits};
 use super::reader::{MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
@@ -30,6 +30,10 @@ impl Reader for MatrixMarket {
         header::has_banner(head)
     }
 
+    fn reads_by_itself(&self) -> bool {
+        true
+    }
+
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
         let path = source.file.path();
         if let Some(group) = source.group {
@@ -44,15 +48,16 @@ impl Reader for MatrixMarket {
 
 fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnostic>> {
     let path = source.file.path();
-    let mut blocks = Blocks::new(source.compression, source.file.bytes());
+    let mut blocks = Blocks::of(source.file, source.compression);
     let Some(first) = blocks.next().map_err(|e| vec![broken(path, &e)])? else {
         return Err(vec![Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes")]);
     };
     let (header, length, lines) = header::parse(&first)?;
     check_size(header.rows, header.cols, header.entries).map_err(|d| vec![d.at_line(lines)])?;
+    refuse_beyond_memory(header.entries.min(possible_entries(source))).map_err(|d| vec![d])?;
     let limits = Limits { n: header.rows as u32, integer: header.integer };
     let mut body = Coordinates::new(limits, Some(header.entries), lines);
-    let newline = body.read(source, blocks, first, length)?;
+    let newline = body.read(path, blocks, first, length)?;
     let mut found = body.bad_lines(newline);
     found.extend(wrong_count(&header, &body));
     found.extend(wrong_triangles(&header, &body));
@@ -66,11 +71,26 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
     assemble(header.rows as usize, body.pieces, storage, body.written, path).map_err(|d| vec![d])
 }
 
+/// Largest number of entries that can stand in the file, whatever it announces.
+fn possible_entries(source: &MatrixSource<'_>) -> u64 {
+    /// Bytes of the shortest line, `1 1 1`, with its end.
+    const SHORTEST_LINE: u64 = 6;
+    /// Deflate does not shrink data further.
+    const GZIP_RATIO: u64 = 1032;
+    let unpacked = match source.compression {
+        Compression::None => source.file.length(),
+        Compression::Gzip => source.file.length().saturating_mul(GZIP_RATIO),
+        Compression::Zstd => u64::MAX,
+    };
+    unpacked / SHORTEST_LINE + 1
+}
+
 fn wrong_count(header: &Header, body: &Coordinates) -> Option<Diagnostic> {
     if body.count == header.entries {
         return None;
     }
-    let message = format!("header announces {} entries, the file has {}", header.entries, body.count);
+    let found = if body.stopped { "more".to_owned() } else { body.count.to_string() };
+    let message = format!("header announces {} entries, the file has {found}", header.entries);
     let diagnostic = Diagnostic::new(Code::MatrixCount, message);
     Some(match body.count > header.entries {
         true => diagnostic.with_help("correct the size line, or write the file again"),

@@ -33,6 +33,7 @@ mod node_files;
 mod npy;
 mod output4;
 mod petsc;
+mod quotes;
 mod read_model;
 mod reader;
 mod readers;

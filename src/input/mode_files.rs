@@ -40,8 +40,14 @@ pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Found<RawModes>
     let bytes = file.bytes();
     let head = &bytes[..bytes.len().min(HEAD)];
     let format = FORMATS.iter().find(|format| (format.recognises)(head))?;
-    let source = SourceFile::new(role, file.path(), file.sha256());
-    Some((format.read)(file).and_then(|table| table.into_modes(file, source)))
+    if let Err(diagnostic) = file.load() {
+        return Some(Err(vec![diagnostic]));
+    }
+    let modes = |table: ModeTable| {
+        let sha256 = file.sha256().map_err(|diagnostic| vec![diagnostic])?;
+        table.into_modes(file, SourceFile::new(role, file.path(), sha256))
+    };
+    Some((format.read)(file).and_then(modes))
 }
 
 /// FB128 at a line.

@@ -34,6 +34,8 @@ pub struct ModelFiles {
     pub residual_vectors: Vec<LoadSource>,
     /// The manifest, when there is one.
     pub manifest: Option<PathBuf>,
+    /// SHA-256 of the manifest as it was parsed, lowercase hex.
+    pub manifest_sha256: Option<String>,
     /// The folder in which the numbers of K and M are kept, in files that go with them, instead of in memory:
     /// those of sorted compressed columns in HDF5. `None`: all are held in memory.
     pub keep_in: Option<PathBuf>,
@@ -240,6 +242,7 @@ impl ModelFiles {
             geometric_stiffness: Vec::new(),
             residual_vectors: Vec::new(),
             manifest: None,
+            manifest_sha256: None,
             keep_in: None,
         })
     }

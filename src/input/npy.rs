@@ -122,6 +122,26 @@ pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     Ok(data.chunks_exact(size).map(decode).collect())
 }
 
+/// Number of values that the header of an array announces; `bytes` are those at its begin.
+///
+/// # Errors
+/// FB301 for what is no header.
+pub(super) fn announced_values(bytes: &[u8]) -> Result<u64, Diagnostic> {
+    let (Header { shape, .. }, _) = described(bytes)?;
+    Ok(shape.iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64)))
+}
+
+/// Bytes of an array by its header, which is within `bytes`; `None` of what is no array.
+pub(super) fn announced_bytes(bytes: &[u8]) -> Option<u64> {
+    let (header, data) = split(bytes).ok()?;
+    let Header { descr, shape, .. } = parse(header)?;
+    let digits = descr.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let letters: u64 = digits.parse().ok()?;
+    let width = if descr.contains('U') { letters.saturating_mul(4) } else { letters };
+    let values = shape.iter().fold(width, |product, &extent| product.saturating_mul(extent as u64));
+    Some(((bytes.len() - data.len()) as u64).saturating_add(values))
+}
+
 /// The text of an array that is one word (`|S3`, `<U3`).
 pub(super) fn read_word(bytes: &[u8]) -> Option<String> {
     let (header, data) = split(bytes).ok()?;

@@ -148,11 +148,6 @@ fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Colum
         for columns in read {
             all.append(&columns?);
         }
-        let ends = |stretch: &Stretch| (stretch.bytes.start, stretch.bytes.end);
-        if let (Some((start, _)), Some((_, end))) = (stretches.first().map(ends), stretches.last().map(ends))
-        {
-            file.release(start..end);
-        }
     }
     Ok(all)
 }

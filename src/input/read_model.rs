@@ -1,6 +1,6 @@
 //! Reads every file of a model and collects all that is wrong with any of them.
 
-use super::bytes::InputFile;
+use super::bytes::{InputFile, SeenFile};
 use super::compression::Compression;
 use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
@@ -8,6 +8,7 @@ use super::mesh::MeshReading;
 use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
 use super::node_file::{NodeFile, NodeSets, Unresolved};
 use super::node_files::read_node_file;
+use super::quotes::without_foreign_quotes;
 use super::reader::{MatrixRole, MatrixSource};
 use super::readers::reader_for;
 use super::row_axes::Turn;
@@ -30,7 +31,7 @@ const FEW_DIGITS: u8 = 10;
 /// # Errors
 /// FB101 to FB106 and FB301 to FB313, all that are found in the file.
 pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMatrix> {
-    read_opened(&InputFile::open(&location.path)?, location.group.as_deref(), role, None)
+    read_opened(&InputFile::open_unread(&location.path)?, location.group.as_deref(), role, None)
 }
 
 /// Reads all files of a model and takes their fingerprints. The model is parsed, not yet checked: sizes,
@@ -38,10 +39,35 @@ pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMat
 ///
 /// # Errors
 /// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric
-/// stiffness, interfaces, mesh.
+/// stiffness, interfaces, mesh; FB132 for files that changed meanwhile, whatever else is wrong with them.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
-    let opened = OpenFiles::new(files);
-    let parsed = Parsed::of(files, &opened);
+    let mut opened = OpenFiles::new(files);
+    let read = read_opened_files(files, &opened);
+    opened.refuse_changed()?;
+    let (model, of_job) = read.map_err(|error| told_to_users(files, error))?;
+    of_job.iter().try_for_each(|(_, file)| file.refuse_changed())?;
+    opened.forget_bytes();
+    let given = files.clone();
+    Ok(RawModel { sources: Sources::later(move || sources(&given, &of_job, &opened)), ..model })
+}
+
+/// The error without quotes of files that the manifest or the deck names elsewhere on the machine.
+fn told_to_users(files: &ModelFiles, error: Error) -> Error {
+    let main = match (&files.manifest, &files.source) {
+        (Some(manifest), _) => manifest,
+        (None, ModelSource::Job(job)) => &job.path,
+        (None, ModelSource::Tables(_)) => return error,
+    };
+    let diagnostics = error.into_diagnostics().into_iter();
+    Error::new(diagnostics.map(|diagnostic| without_foreign_quotes(diagnostic, main)).collect())
+}
+
+/// Role of a file of a job, and the file.
+type JobFileRead = (&'static str, SeenFile);
+
+/// Reads the files of a model, and those of its job, which are named by it.
+fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel, Vec<JobFileRead>)> {
+    let parsed = Parsed::of(files, opened);
     let mut diagnostics = Vec::new();
     if let Some(path) = &files.manifest {
         opened.get(path).map(|_| ()).unwrap_or_else(|found| collect(&mut diagnostics, found));
@@ -66,7 +92,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let interfaces: Vec<NodeSet> = files
         .interfaces
         .iter()
-        .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, &opened, files)))
+        .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
         .collect();
     let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     let mesh = matrices.as_ref().map(|matrices| {
@@ -83,8 +109,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     diagnostics.extend(matrices.diagnostics);
     let (mesh, partly) = mesh.unwrap_or_default();
     diagnostics.extend(partly);
-    let (given, of_job) = (files.clone(), matrices.files);
-    Ok(RawModel {
+    let model = RawModel {
         name: files.name.clone(),
         dimension: files.dimension,
         units: files.units.clone(),
@@ -100,9 +125,10 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
         damping,
         geometric_stiffness,
         allow_implausible: files.allow_implausible,
-        sources: Sources::later(move || sources(&given, &of_job, &opened.fingerprints())),
+        sources: Sources::default(),
         diagnostics,
-    })
+    };
+    Ok((model, matrices.files))
 }
 
 /// Reads nodal masses, `node,mass`: what a multibody package would have imported.
@@ -144,7 +170,7 @@ struct ModelMatrices {
     /// What the part is drawn by.
     elements: Elements,
     /// Files of a job.
-    files: Vec<(&'static str, PathBuf)>,
+    files: Vec<JobFileRead>,
     diagnostics: Vec<Diagnostic>,
 }
 
@@ -167,7 +193,7 @@ impl From<JobModel> for ModelMatrices {
     fn from(job: JobModel) -> Self {
         let path = |role: &str| {
             let file = job.files.iter().find(|(own, _)| *own == role).or(job.files.first());
-            file.map(|(_, path)| path.clone()).unwrap_or_default()
+            file.map(|(_, file)| file.path.clone()).unwrap_or_default()
         };
         Self {
             nodes_path: path("deck"),
@@ -237,7 +263,7 @@ impl ParsedTables {
 impl Parsed {
     fn of(files: &ModelFiles, opened: &OpenFiles) -> Self {
         let matrix = |location: &MatrixLocation, role| {
-            let file = opened.get(&location.path)?;
+            let file = opened.unread(&location.path)?;
             read_opened(file, location.group.as_deref(), role, files.keep_in.as_deref())
                 .map_err(Error::into_diagnostics)
         };
@@ -384,7 +410,13 @@ fn read_opened(
 ) -> Result<RawMatrix> {
     let compression = Compression::of(file.bytes());
     let reader = reader_for(file, compression)?;
-    reader.read(&MatrixSource { file, compression, group, role, keep_in })
+    if !reader.reads_by_itself() {
+        file.load()?;
+    }
+    let read = reader.read(&MatrixSource { file, compression, group, role, keep_in });
+    // What is wrong with a file that changed meanwhile may be wrong for this reason.
+    file.refuse_changed()?;
+    read
 }
 
 /// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass
@@ -484,25 +516,39 @@ impl OpenFiles {
         let mut opened: Vec<(PathBuf, _)> = Vec::new();
         for (_, path) in roles(files) {
             if opened.iter().all(|(known, _)| known != path) {
-                opened.push((path.to_path_buf(), InputFile::open(path)));
+                opened.push((path.to_path_buf(), InputFile::open_unread(path)));
             }
         }
         Self { files: opened }
     }
 
+    /// A file whose bytes are in memory.
     fn get(&self, path: &Path) -> Found<&InputFile> {
+        let file = self.unread(path)?;
+        file.load().map_err(|diagnostic| vec![diagnostic])?;
+        Ok(file)
+    }
+
+    fn unread(&self, path: &Path) -> Found<&InputFile> {
         let (_, file) =
             self.files.iter().find(|(known, _)| known == path).expect("every path of the model is opened");
         file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
     }
 
-    /// Path and SHA-256 of every file that could be opened. One after the other: whoever waits for [`Sources`] to be found
-    /// must not be given other work by the pool, which may ask for the same.
-    fn fingerprints(&self) -> Vec<(&Path, String)> {
-        self.files
-            .iter()
-            .filter_map(|(path, file)| Some((path.as_path(), file.as_ref().ok()?.sha256())))
-            .collect()
+    /// Files that could be opened.
+    fn all(&self) -> impl Iterator<Item = &InputFile> {
+        self.files.iter().filter_map(|(_, file)| file.as_ref().ok())
+    }
+
+    /// # Errors
+    /// FB132 for every file that is no longer the one that was opened.
+    fn refuse_changed(&self) -> Result<()> {
+        let changed: Vec<Diagnostic> = self.all().filter_map(|file| file.refuse_changed().err()).collect();
+        if changed.is_empty() { Ok(()) } else { Err(Error::new(changed)) }
+    }
+
+    fn forget_bytes(&mut self) {
+        self.files.iter_mut().filter_map(|(_, file)| file.as_mut().ok()).for_each(InputFile::forget_bytes);
     }
 }
 
@@ -528,22 +574,30 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles
 }
 
-/// Every file with its fingerprint: the manifest, those of a job, then the others.
+/// Every file with its fingerprint: the manifest, those of a job, then the others. Those of which not all was read are
+/// read one after the other: whoever waits for [`Sources`] to be found must not be given other work by the pool, which
+/// may ask for the same.
+///
+/// # Errors
+/// FB101, FB132.
 fn sources(
     files: &ModelFiles,
-    job: &[(&'static str, PathBuf)],
-    fingerprints: &[(&Path, String)],
-) -> Vec<SourceFile> {
-    let source = |(role, path): (&str, &Path)| {
-        let (_, sha256) = fingerprints.iter().find(|(known, _)| *known == path)?;
-        Some(SourceFile::new(role, path, sha256.clone()))
-    };
-    let of_job = |(role, path): &(&'static str, PathBuf)| {
-        let file = InputFile::open(path).ok()?;
-        Some(SourceFile::new(role, path, file.sha256()))
-    };
+    job: &[JobFileRead],
+    opened: &OpenFiles,
+) -> std::result::Result<Vec<SourceFile>, Diagnostic> {
+    let mut of_tables = Vec::new();
+    for (role, path) in roles(files) {
+        if let Some(file) = opened.all().find(|file| file.path() == path) {
+            let sha256 = file.sha256()?;
+            // The manifest was parsed before the other files were opened.
+            if role == "manifest" && files.manifest_sha256.as_ref().is_some_and(|parsed| *parsed != sha256) {
+                return Err(file.changed("its text is another one"));
+            }
+            of_tables.push(SourceFile::new(role, path, sha256));
+        }
+    }
+    let of_job = job.iter().map(|(role, file)| SourceFile::new(role, &file.path, file.sha256.clone()));
     let (manifest, others): (Vec<_>, Vec<_>) =
-        roles(files).into_iter().partition(|(role, _)| *role == "manifest");
-    let job: Vec<Option<SourceFile>> = job.iter().map(of_job).collect();
-    manifest.into_iter().map(source).chain(job).chain(others.into_iter().map(source)).flatten().collect()
+        of_tables.into_iter().partition(|source| source.role == "manifest");
+    Ok(manifest.into_iter().chain(of_job).chain(others).collect())
 }

@@ -94,19 +94,18 @@ pub trait Reader: Sync {
     /// bytes unless the file is shorter.
     fn recognises(&self, head: &[u8]) -> bool;
 
+    /// True if the reader takes the file piece by piece or by its path; others are given a file whose bytes are in
+    /// memory.
+    fn reads_by_itself(&self) -> bool {
+        false
+    }
+
     /// Reads the matrix: both triangles, zeros dropped, duplicates summed; symmetry of a matrix that is
     /// stored in full is not checked here.
     ///
     /// # Errors
     /// FB103, FB301 to FB313 and FB101 for what the file is not, as many as are found.
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix>;
-}
-
-/// Whether a file that begins with `head` is HDF5: the signature stands at 0 or, after a user block (MATLAB
-/// writes one), at 512, 1024, 2048, ...
-pub(super) fn is_hdf5(head: &[u8]) -> bool {
-    let signed = |&at: &usize| head.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
-    [0, 512, 1024, 2048].iter().any(signed)
 }
 
 /// Number of bytes that [`Reader::recognises`] is shown. HDF5 files may begin with a user block of this size.

@@ -22,7 +22,7 @@ pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz, &Mat5, &P
 /// # Errors
 /// FB102 when neither tells, with what the file seems to be.
 pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&'static dyn Reader> {
-    let head = compression.head(file.bytes(), HEAD);
+    let head = compression.head(file, HEAD);
     let by_content = READERS.iter().find(|reader| reader.recognises(&head));
     let by_name = || {
         let extension = extension(file.path());

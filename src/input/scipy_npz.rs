@@ -1,12 +1,13 @@
 //! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
 //! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
 
-use super::assemble::{Storage, assemble, check_size, push, undeclared_triangle};
+use super::assemble::{Storage, assemble, check_size, push, refuse_beyond_memory, undeclared_triangle};
 use super::compressed::{Compressed, EntryCheck};
 use super::npy;
 use super::reader::{MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
+use crate::base::memory::{left, refuse_beyond};
 use crate::model::RawMatrix;
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -16,6 +17,11 @@ use zip::ZipArchive;
 pub(super) struct ScipyNpz;
 
 const HELP: &str = "write it again: scipy.sparse.save_npz(file, A.tocsc())";
+const MEMORY_HELP: &str = "use a larger machine";
+
+/// Bytes of an array that are unpacked before its header is known to be one: no header of NumPy is longer.
+const HEAD_BYTES: u64 = 1 << 17;
+
 const BOTH_TRIANGLES: &str = "save both triangles: A + scipy.sparse.tril(A, -1).T";
 
 impl Reader for ScipyNpz {
@@ -47,11 +53,19 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
     let &[rows, columns] = shape.as_slice() else {
         return Err(Diagnostic::new(Code::MatrixKind, "`shape` is not two whole numbers").with_help(HELP));
     };
+    // Before anything of that size is unpacked.
+    let entries = archive.count("data")?;
+    let n = check_size(rows.max(0) as u64, columns.max(0) as u64, entries)?;
+    refuse_beyond_memory(entries)?;
     if form == "bsr" {
-        return blocks(&mut archive, &shape, path);
+        return blocks(&mut archive, n, path);
+    }
+    for name in ["indices", "row", "col"] {
+        if archive.has(name) {
+            same_count(entries, archive.count(name)?, name)?;
+        }
     }
     let data = npy::read(&archive.member("data")?)?;
-    let n = check_size(rows.max(0) as u64, columns.max(0) as u64, data.values.len() as u64)?;
     let raw = match form.as_str() {
         "coo" => coordinates(&mut archive, n, &data.values, path)?,
         "csc" | "csr" => {
@@ -80,15 +94,10 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
 
 /// A matrix in blocks of equal size: `data` (blocks x r x c), the block column of each in `indices`, where each
 /// block row begins in `indptr`.
-fn blocks(
-    archive: &mut Archive<'_>,
-    shape: &[i64],
-    path: &Path,
-) -> std::result::Result<RawMatrix, Diagnostic> {
+fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Result<RawMatrix, Diagnostic> {
     let wrong = |code, message: String| Err(Diagnostic::new(code, message).with_help(HELP));
     let npy::Blocks { count, rows, columns, values, digits } = npy::read_blocks(&archive.member("data")?)?;
-    let n = check_size(shape[0].max(0) as u64, shape[1].max(0) as u64, values.len() as u64)?;
-    if rows == 0 || columns == 0 || n % rows != 0 || n % columns != 0 {
+    if rows == 0 || columns == 0 || !n.is_multiple_of(rows) || !n.is_multiple_of(columns) {
         return wrong(
             Code::MatrixCount,
             format!("blocks of {rows} x {columns} do not make up {n} rows and columns"),
@@ -152,6 +161,20 @@ fn coordinates(
     }
 }
 
+/// Refuses indices that are not as many as there are values, before they are unpacked.
+fn same_count(entries: u64, indices: u64, name: &str) -> std::result::Result<(), Diagnostic> {
+    if entries == indices {
+        return Ok(());
+    }
+    let what = match name {
+        "row" => "rows",
+        "col" => "columns",
+        other => other,
+    };
+    let message = format!("{entries} values have {indices} {what}");
+    Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
+}
+
 fn same_length(values: &[f64], indices: &[i64], what: &str) -> std::result::Result<(), Diagnostic> {
     if values.len() == indices.len() {
         return Ok(());
@@ -167,18 +190,45 @@ impl<'a> Archive<'a> {
         ZipArchive::new(Cursor::new(bytes)).map(Self).map_err(|error| damaged(&error))
     }
 
-    /// The bytes of the array `name`, checked by its checksum.
-    fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
-        let mut member = self.0.by_name(&format!("{name}.npy")).map_err(|error| match error {
+    fn open_member(&mut self, name: &str) -> std::result::Result<impl Read + use<'_, 'a>, Diagnostic> {
+        self.0.by_name(&format!("{name}.npy")).map_err(|error| match error {
             zip::result::ZipError::FileNotFound => {
                 let message = format!("archive has no array `{name}`: it is no sparse matrix of SciPy");
                 Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
             }
             error => damaged(&error),
-        })?;
+        })
+    }
+
+    /// The bytes of the array `name`, checked by its checksum.
+    fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
+        let mut member = self.open_member(name)?;
         let mut bytes = Vec::new();
-        member.read_to_end(&mut bytes).map_err(|error| damaged(&error))?;
+        let mut take = |bytes: &mut Vec<u8>, most: u64| {
+            let more = most.saturating_sub(bytes.len() as u64);
+            member.by_ref().take(more).read_to_end(bytes).map_err(|error| damaged(&error)).map(|_| ())
+        };
+        take(&mut bytes, HEAD_BYTES)?;
+        // What is no array is refused by its begin; of an array no more is unpacked than its header announces.
+        if let Some(announced) = npy::announced_bytes(&bytes) {
+            let refused =
+                refuse_beyond(left(), announced as f64, &format!("the array `{name}`"), MEMORY_HELP);
+            refused.map_err(|error| error.first_error().clone())?;
+            take(&mut bytes, announced.saturating_add(1))?;
+        }
         Ok(bytes)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.0.index_for_name(&format!("{name}.npy")).is_some()
+    }
+
+    /// Number of values that the header of the array `name` announces.
+    fn count(&mut self, name: &str) -> std::result::Result<u64, Diagnostic> {
+        let mut member = self.open_member(name)?;
+        let mut bytes = Vec::new();
+        member.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(|error| damaged(&error))?;
+        npy::announced_values(&bytes)
     }
 }
 

@@ -31,7 +31,7 @@ pub enum ImportedColumns {
 /// # Errors
 /// Those of [`read_shapes`]; FB128 and FB306 for files of modes.
 pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<ImportedColumns> {
-    let file = InputFile::open(&location.path)?;
+    let file = InputFile::open_unread(&location.path)?;
     match read_modes(&file, role).filter(|_| location.group.is_none()) {
         Some(modes) => modes.map(ImportedColumns::Modes).map_err(Error::new),
         None => read_shapes(location, counts, role).map(ImportedColumns::Rows),
@@ -44,19 +44,20 @@ pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) ->
 /// # Errors
 /// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.
 pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<RawShapes> {
-    let file = InputFile::open(&location.path)?;
+    let file = InputFile::open_unread(&location.path)?;
     let path = file.path();
-    let array = read(&file, location.group.as_deref())
-        .and_then(|array| oriented(array, counts).map_err(|diagnostic| vec![diagnostic]));
+    let array = read(&file, location.group.as_deref());
+    file.refuse_changed()?;
+    let array = array.and_then(|array| oriented(array, counts).map_err(|diagnostic| vec![diagnostic]));
     let (matrix, digits) =
         array.map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))?;
-    let source = Some(SourceFile::new(role, path, file.sha256()));
+    let source = Some(SourceFile::new(role, path, file.sha256()?));
     Ok(RawShapes { matrix, digits, path: path.to_path_buf(), source })
 }
 
 fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
     let compression = Compression::of(file.bytes());
-    let head = compression.head(file.bytes(), HEAD);
+    let head = compression.head(file, HEAD);
     let packed = compression != Compression::None;
     if !packed && Hdf5.recognises(&head) {
         return hdf5::read_array(file, dataset);
@@ -69,6 +70,7 @@ fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, V
         return matrix_market::read_array(file, compression);
     }
     if !packed && npy::recognises(&head) {
+        file.load().map_err(|diagnostic| vec![diagnostic])?;
         return npy::read(file.bytes()).map_err(|diagnostic| vec![diagnostic]);
     }
     let start = &head[..head.len().min(24)];

@@ -1,6 +1,7 @@
 //! Settings in TOML: reads tables and collects everything that is wrong with them, each with its line.
 
 use super::bytes::InputFile;
+use super::quotes::without_foreign_quotes;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::Fingerprint;
@@ -28,7 +29,7 @@ pub(crate) fn read_toml<T>(
         let line = line_at(file.bytes(), e.valid_up_to());
         Diagnostic::new(syntax, format!("{kind} is not UTF-8 text")).in_file(path).at_line(line)
     })?;
-    let mut tables = Walk { path, text, syntax, found: Vec::new() };
+    let mut tables = Walk { path, text, syntax, line_ends: LineEnds::of(text), found: Vec::new() };
     let (document, errors) = DeTable::parse_recoverable(text);
     for error in &errors {
         let message = error.message().to_owned();
@@ -38,10 +39,7 @@ pub(crate) fn read_toml<T>(
     let read = if errors.is_empty() { walk(&mut tables, document.get_ref()) } else { None };
     match read {
         Some(read) if tables.found.is_empty() => Ok(read),
-        _ => {
-            tables.found.sort_by_key(Diagnostic::line);
-            Err(Error::new(tables.found))
-        }
+        _ => Err(Error::new(tables.told())),
     }
 }
 
@@ -50,15 +48,44 @@ fn line_at(text: &[u8], offset: usize) -> usize {
     1 + text[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
+/// Places of the line ends of a text, ascending.
+struct LineEnds(Vec<usize>);
+
+impl LineEnds {
+    fn of(text: &str) -> Self {
+        Self(memchr::memchr_iter(b'\n', text.as_bytes()).collect())
+    }
+
+    /// The line (from 1) of the byte at `offset`.
+    fn line_at(&self, offset: usize) -> usize {
+        1 + self.0.partition_point(|end| *end < offset)
+    }
+}
+
 /// Reads tables and collects what is wrong with them.
 pub(crate) struct Walk<'a> {
     pub path: &'a Path,
     text: &'a str,
     syntax: Code,
+    line_ends: LineEnds,
     pub found: Vec<Diagnostic>,
 }
 
 impl Walk<'_> {
+    /// Returns the findings in the order of lines, the first of them where there are many.
+    fn told(mut self) -> Vec<Diagnostic> {
+        /// Findings that are told one by one.
+        const SHOWN: usize = 200;
+        self.found.sort_by_key(Diagnostic::line);
+        let more = self.found.len().saturating_sub(SHOWN);
+        self.found.truncate(SHOWN);
+        if more > 0 {
+            let message = format!("{more} more findings are not shown");
+            self.found.push(Diagnostic::new(self.syntax, message).in_file(self.path));
+        }
+        self.found.into_iter().map(|one| without_foreign_quotes(one, self.path)).collect()
+    }
+
     /// SHA-256 of the file.
     pub fn fingerprint(&self) -> String {
         let mut all = Fingerprint::default();
@@ -68,7 +95,7 @@ impl Walk<'_> {
 
     /// A finding about the text at `span`.
     pub fn at(&self, code: Code, span: Range<usize>, message: String) -> Diagnostic {
-        let line = line_at(self.text.as_bytes(), span.start);
+        let line = self.line_ends.line_at(span.start);
         Diagnostic::new(code, message).in_file(self.path).at_line(line)
     }
 

@@ -1,8 +1,8 @@
 //! HDF5 files where the library was built without HDF5: recognised, and refused by name.
 
 use super::array::Array;
-use super::bytes::InputFile;
-use super::reader::{MatrixSource, Reader, is_hdf5};
+use super::bytes::{InputFile, is_hdf5};
+use super::reader::{MatrixSource, Reader};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::model::{Elements, Nodes, RawMatrix};

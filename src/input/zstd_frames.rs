@@ -1,78 +1,73 @@
 //! The unpacked bytes of Zstandard frames, one after the other (RFC 8878).
 
+use super::bytes::{failed, reading_error};
 use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
-use ruzstd::decoding::{FrameDecoder, StreamingDecoder};
+use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 use std::error::Error;
-use std::io::{self, ErrorKind, Read};
-
-/// Magic number and length of a frame that is to be skipped.
-const SKIPPED_HEADER: usize = 8;
+use std::io::{self, BufRead, ErrorKind, Read};
 
 /// Reads all frames of a file, skips those that are to be skipped, and compares the checksum of each that has
 /// one.
-pub(super) struct ZstdFrames<'a> {
-    frame: Option<StreamingDecoder<&'a [u8], FrameDecoder>>,
-    /// What follows the frame, where none is open.
-    rest: &'a [u8],
+pub(super) struct ZstdFrames<R: BufRead> {
+    stored: R,
+    /// The open frame.
+    frame: Option<FrameDecoder>,
 }
 
-impl<'a> ZstdFrames<'a> {
-    pub fn new(bytes: &'a [u8]) -> Self {
-        Self { frame: None, rest: bytes }
+impl<R: BufRead> ZstdFrames<R> {
+    pub fn new(stored: R) -> Self {
+        Self { stored, frame: None }
     }
 
     /// Opens the next frame with contents; there is none at the end of the file.
-    fn open(&mut self) -> io::Result<()> {
-        while !self.rest.is_empty() {
-            match StreamingDecoder::new(self.rest) {
-                Ok(frame) => {
-                    self.frame = Some(frame);
-                    return Ok(());
-                }
+    fn open(&mut self) -> io::Result<Option<FrameDecoder>> {
+        while !self.stored.fill_buf()?.is_empty() {
+            let mut frame = FrameDecoder::new();
+            match frame.init(&mut self.stored) {
+                Ok(()) => return Ok(Some(frame)),
                 Err(FrameDecoderError::ReadFrameHeaderError(ReadFrameHeaderError::SkipFrame {
                     length,
                     ..
                 })) => {
-                    let end = SKIPPED_HEADER + length as usize;
-                    self.rest = self.rest.get(end..).ok_or(ErrorKind::UnexpectedEof)?;
+                    let length = u64::from(length);
+                    if io::copy(&mut self.stored.by_ref().take(length), &mut io::sink())? < length {
+                        return Err(ErrorKind::UnexpectedEof.into());
+                    }
                 }
                 Err(error) => return Err(of_file(error)),
             }
         }
-        Ok(())
-    }
-
-    /// Leaves a frame that was read to its end.
-    fn close(&mut self, frame: StreamingDecoder<&'a [u8], FrameDecoder>) -> io::Result<()> {
-        let (rest, decoder) = frame.into_parts();
-        let stored = decoder.get_checksum_from_data();
-        if stored.is_some() && stored != decoder.get_calculated_checksum() {
-            return Err(io::Error::new(ErrorKind::InvalidData, "the checksum of a Zstandard frame differs"));
-        }
-        self.rest = rest;
-        Ok(())
+        Ok(None)
     }
 }
 
-impl Read for ZstdFrames<'_> {
+/// Leaves a frame that was read to its end.
+fn close(frame: &FrameDecoder) -> io::Result<()> {
+    let stored = frame.get_checksum_from_data();
+    if stored.is_some() && stored != frame.get_calculated_checksum() {
+        return Err(io::Error::new(ErrorKind::InvalidData, "the checksum of a Zstandard frame differs"));
+    }
+    Ok(())
+}
+
+impl<R: BufRead> Read for ZstdFrames<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         if buffer.is_empty() {
             return Ok(0);
         }
         loop {
-            if self.frame.is_none() {
-                self.open()?;
+            let opened = self.frame.take().map_or_else(|| self.open(), |frame| Ok(Some(frame)))?;
+            let Some(mut frame) = opened else { return Ok(0) };
+            while frame.can_collect() == 0 && !frame.is_finished() {
+                let one = BlockDecodingStrategy::UptoBlocks(1);
+                frame.decode_blocks(&mut self.stored, one).map_err(of_file)?;
             }
-            let Some(mut frame) = self.frame.take() else { return Ok(0) };
-            let count = frame.read(buffer).map_err(|error| {
-                // The decoder wraps what it says about blocks.
-                error.into_inner().map_or(ErrorKind::InvalidData.into(), of_file)
-            })?;
+            let count = frame.read(buffer)?;
             if count > 0 {
                 self.frame = Some(frame);
                 return Ok(count);
             }
-            self.close(frame)?;
+            close(&frame)?;
         }
     }
 }
@@ -82,6 +77,9 @@ fn of_file(error: impl Into<Box<dyn Error + Send + Sync>>) -> io::Error {
     let error = error.into();
     let mut cause: Option<&(dyn Error + 'static)> = Some(&*error);
     while let Some(one) = cause {
+        if let Some(diagnostic) = one.downcast_ref::<io::Error>().and_then(reading_error) {
+            return failed(diagnostic);
+        }
         let ended = one.downcast_ref::<io::Error>().map(io::Error::kind) == Some(ErrorKind::UnexpectedEof);
         if ended {
             return ErrorKind::UnexpectedEof.into();

@@ -156,7 +156,7 @@ fn check_body(
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     stop_on_error(&mut found)?;
     // Now, while the ordering library has not ended; the files need not stay open.
-    let _ = model.sources().len();
+    model.find_sources()?;
     Ok(CheckedModel { model, diagnostics: found, plausibility })
 }
 

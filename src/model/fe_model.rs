@@ -7,6 +7,7 @@ use super::{
     BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, NodeSet, Nodes, Rows,
     SurfaceMesh,
 };
+use crate::base::diagnostic::Diagnostic;
 use crate::base::provenance::{SourceFile, Sources};
 use crate::base::units::UnitSystem;
 use crate::numerics::linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};
@@ -227,6 +228,14 @@ impl FeModel {
     /// Named node sets.
     pub fn interfaces(&self) -> &[NodeSet] {
         &self.interfaces
+    }
+
+    /// Takes the fingerprints of the files of the model that were not taken while reading.
+    ///
+    /// # Errors
+    /// FB101, FB132 for a file that is no longer the one that was read.
+    pub(super) fn find_sources(&self) -> Result<(), Diagnostic> {
+        self.sources.find()
     }
 
     /// Files it was read from.

@@ -3,6 +3,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod bombs;
 mod deck_names;
 mod empty_rows;
 mod general_models;

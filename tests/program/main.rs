@@ -12,6 +12,7 @@ mod command_line;
 mod comparison_coverage;
 mod docs_generated;
 mod front_door;
+mod hostile_files;
 #[cfg(unix)]
 mod how_to;
 mod interruption;

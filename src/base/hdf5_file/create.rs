@@ -1,5 +1,7 @@
 //! Making HDF5 files whose bytes depend on nothing but what is in them.
 
+use super::names::by_utf8_name;
+use super::plugins::without_plugins;
 use hdf5::file::LibraryVersion;
 use hdf5::plist::group_create::{AttrCreationOrder, LinkCreationOrder};
 use hdf5::types::VarLenUnicode;
@@ -14,14 +16,17 @@ pub(crate) fn library_version() -> String {
 
 /// An empty file at a temporary `path`.
 pub(crate) fn create(path: &Path) -> hdf5::Result<hdf5::File> {
-    hdf5::File::with_options()
-        // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else
-        // knows the file, and a process started meanwhile would inherit a lock and hold it on the finished
-        // file.
-        .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
-        // Time stamps would make equal bodies differ.
-        .with_fcpl(|p| p.obj_track_times(false))
-        .create(path)
+    without_plugins();
+    by_utf8_name(path, |path| {
+        hdf5::File::with_options()
+            // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else
+            // knows the file, and a process started meanwhile would inherit a lock and hold it on the finished
+            // file.
+            .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
+            // Time stamps would make equal bodies differ.
+            .with_fcpl(|p| p.obj_track_times(false))
+            .create(path)
+    })
 }
 
 /// Makes a group that keeps the order of its members and attributes, and no time stamps.

@@ -18,7 +18,7 @@ const LOOKS: u64 = 4;
 
 /// Position of the first global heap whose objects do not fit into it, or whose objects have been looked at too often
 /// because heaps lie in each other; `None`: all are sound.
-pub(super) fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
+pub(crate) fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
     let end = file.seek(SeekFrom::End(0))?;
     let mut looks = LOOKS * end.div_ceil(HEADER);
     for position in collections(file)? {

@@ -1,6 +1,8 @@
 //! Opening HDF5 files that may do harm.
 
 use super::heap;
+use super::names::by_utf8_name;
+use super::plugins::without_plugins;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::read_files::note_read;
@@ -29,9 +31,11 @@ pub(crate) fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5:
         let why = format!("the text heap at byte {position} is damaged");
         return Err(unreadable(foreign, why));
     }
+    without_plugins();
     // Without a lock: no file of this program changes once it has its name, and some file systems know no
     // locks.
-    let opened = hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path);
+    let opened =
+        by_utf8_name(path, |path| hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path));
     let file = opened.map_err(|e| unreadable(foreign, e.to_string()))?;
     // The check of the heaps knows 8-byte sizes only; nothing else is in use.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());

@@ -2,7 +2,7 @@
 //!
 //! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
 
-use crate::base::memory::or_go_without;
+use crate::base::memory::{left, or_go_without};
 use hdf5::dataset::Layout;
 use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5::{IndexType, IterationOrder, LinkType};
@@ -159,8 +159,12 @@ pub(super) fn storage(
     }
     let bytes = dataset.storage_size();
     let most = if layout == Layout::Chunked { bytes.saturating_mul(HIGHEST_COMPRESSION) } else { bytes };
-    if (elements as u64).saturating_mul(size as u64) > most {
+    let unpacked = (elements as u64).saturating_mul(size as u64);
+    if unpacked > most {
         return Err(format!("expected stored data for {elements} values, found {bytes} bytes"));
+    }
+    if left().is_some_and(|left| unpacked > left) {
+        return Err(format!("expected an array that fits into memory, found {elements} values"));
     }
     let Some(left) = stored.left.checked_sub(bytes) else {
         return Err(format!(

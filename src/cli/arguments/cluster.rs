@@ -101,6 +101,9 @@ pub struct BatchArguments {
     /// Report about all bodies, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
+    /// Let options of the list name programs to start (--mpiexec, --python); without it such a list is refused
+    #[arg(long)]
+    pub allow_programs: bool,
     /// How to print.
     #[command(flatten)]
     pub printing: Printing,
@@ -121,7 +124,8 @@ pub struct EngineArguments {
     /// Words that start MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
     #[arg(long, value_name = "WORDS")]
     pub mpiexec: Option<String>,
-    /// Python with petsc4py and slepc4py [default: FLEXBODY_PYTHON, else python3 or /usr/bin/python3]
+    /// Python with petsc4py and slepc4py, started by -I: without PYTHONPATH and packages of the current folder
+    /// [default: FLEXBODY_PYTHON, else python3 or /usr/bin/python3]
     #[arg(long, value_name = "PYTHON")]
     pub python: Option<PathBuf>,
     /// Folder that --engine slepc works in and that stays

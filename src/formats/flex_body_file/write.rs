@@ -21,10 +21,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// See [`OutputSlot::prepare`]; also [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot
-/// take.
+/// take, where an open file has no name in UTF-8.
 pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
     let slot = OutputSlot::prepare(path)?;
-    if slot.temporary().to_str().is_none() {
+    if cfg!(not(unix)) && slot.temporary().to_str().is_none() {
         let message = format!("cannot write {}: HDF5 needs a path in UTF-8", slot.path().display());
         return Err(Diagnostic::new(Code::OutputUnwritable, message).into());
     }

@@ -25,8 +25,7 @@ pub(super) struct Apart {
 }
 
 impl Apart {
-    /// Finds the names of continuations of a file that stand apart from the line that ends with their name. Pages
-    /// of the file are given back once they were gone through.
+    /// Finds the names of continuations of a file that stand apart from the line that ends with their name.
     pub(super) fn of(file: &InputFile) -> Self {
         let mut names = HashSet::new();
         let mut before: &[u8] = b"";
@@ -108,9 +107,7 @@ impl Apart {
 
 /// Gives the lines that are not empty, without comments.
 fn each_line<'f>(file: &'f InputFile, mut take: impl FnMut(&'f [u8])) {
-    let mut given = 0;
     for (_, range) in Lines::of(file.bytes(), 0) {
-        file.release_up_to(range.start, &mut given);
         let line = without_comment(file.bytes()[range].trim_ascii_end());
         if !line.is_empty() {
             take(line);

@@ -26,11 +26,11 @@ pub(in crate::input) struct Part {
 
 impl<'a> MatrixLines<'a> {
     /// Those from a byte of the file on that begins a line with so many lines `above`; `None` where that line
-    /// begins another card. Pages of the file are given back once they were gone through.
+    /// begins another card.
     pub(super) fn at(file: &'a InputFile, start: usize, above: usize) -> Option<Self> {
         let bytes = file.bytes();
         let (mut parts, mut last_line): (Vec<Part>, usize) = (Vec::new(), above);
-        let (mut at, mut given) = (start, start);
+        let mut at = start;
         while at < bytes.len() {
             let end = memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1);
             let line = &bytes[at..end];
@@ -50,7 +50,6 @@ impl<'a> MatrixLines<'a> {
             }
             at = end;
             last_line += 1;
-            file.release_up_to(at, &mut given);
         }
         (!parts.is_empty()).then_some(Self { file, parts, last_line })
     }

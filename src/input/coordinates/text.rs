@@ -1,61 +1,69 @@
 //! Text in blocks that end at line ends, so that no more of a file than two blocks need be in memory.
 
 use super::{Compression, Read};
-use std::borrow::Cow;
+use crate::input::bytes::InputFile;
 
-/// Bytes per block. Unpacked blocks are allocated over and over: larger ones would be fresh pages each time.
+/// Bytes per block. Larger blocks would be fresh pages each time.
 const BLOCK: usize = 8 << 20;
+
+/// Bytes that the first block has at the begin: it grows with what there is, for most files are small.
+const FIRST_BLOCK: usize = 1 << 16;
 
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
-/// Gives a file block by block.
-pub(in crate::input) enum Blocks<'a> {
-    /// The rest of a file as it lies on disk.
-    Plain { rest: &'a [u8], newline: bool },
-    /// A compressed file; `carry` is the begin of the next line.
-    Packed { stream: Box<dyn Read + Send + 'a>, carry: Vec<u8>, newline: bool },
+/// Gives a text block by block.
+pub(in crate::input) struct Blocks<'a> {
+    stream: Box<dyn Read + Send + 'a>,
+    /// Begin of the next line, which was read with the last block.
+    carry: Vec<u8>,
+    /// Memory of a block that is not needed any more.
+    spare: Vec<u8>,
+    newline: bool,
 }
 
 impl<'a> Blocks<'a> {
-    pub(in crate::input) fn new(compression: Compression, bytes: &'a [u8]) -> Self {
-        match compression {
-            Compression::None => Self::Plain { rest: bytes, newline: true },
-            _ => Self::Packed { stream: compression.stream(bytes), carry: Vec::new(), newline: true },
-        }
+    /// The unpacked text of a file.
+    pub(in crate::input) fn of(file: &'a InputFile, compression: Compression) -> Self {
+        Self::new(compression.stream_of(file))
+    }
+
+    fn new(stream: Box<dyn Read + Send + 'a>) -> Self {
+        Self { stream, carry: Vec::new(), spare: Vec::new(), newline: true }
     }
 
     /// The next block: it ends at a line end, or at the end of the file, or (a line longer than a block)
     /// anywhere.
-    pub(in crate::input) fn next(&mut self) -> std::io::Result<Option<Cow<'a, [u8]>>> {
-        let (block, newline) = match self {
-            Self::Plain { rest, newline } => {
-                let end = whole_lines(&rest[..BLOCK.min(rest.len())], rest.len() <= BLOCK);
-                let (block, after) = rest.split_at(end);
-                *rest = after;
-                (Cow::Borrowed(block), newline)
+    pub(in crate::input) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
+        let mut block = std::mem::take(&mut self.spare);
+        let (mut filled, mut ends) = (self.carry.len(), false);
+        block.resize(block.len().clamp(FIRST_BLOCK.max(filled), BLOCK.max(filled)), 0);
+        block[..filled].copy_from_slice(&self.carry);
+        self.carry.clear();
+        while !ends && filled < BLOCK {
+            if filled == block.len() {
+                block.resize((2 * filled).min(BLOCK), 0);
             }
-            Self::Packed { stream, carry, newline } => {
-                let mut block = Vec::with_capacity(BLOCK);
-                block.append(carry);
-                let missing = BLOCK.saturating_sub(block.len()) as u64;
-                stream.by_ref().take(missing).read_to_end(&mut block)?;
-                let end = whole_lines(&block, block.len() < BLOCK);
-                carry.extend_from_slice(&block[end..]);
-                block.truncate(end);
-                (Cow::Owned(block), newline)
-            }
-        };
+            let count = self.stream.read(&mut block[filled..])?;
+            filled += count;
+            ends = count == 0;
+        }
+        let end = whole_lines(&block[..filled], ends);
+        self.carry.extend_from_slice(&block[end..filled]);
+        block.truncate(end);
         let Some(&last) = block.last() else { return Ok(None) };
-        *newline = last == b'\n';
+        self.newline = last == b'\n';
         Ok(Some(block))
+    }
+
+    /// Takes the memory of a block that is not needed any more.
+    pub(in crate::input) fn take_back(&mut self, block: Vec<u8>) {
+        self.spare = block;
     }
 
     /// Whether what was given so far ends with a line end.
     pub(in crate::input) fn ends_with_newline(&self) -> bool {
-        match self {
-            Self::Plain { newline, .. } | Self::Packed { newline, .. } => *newline,
-        }
+        self.newline
     }
 }
 
@@ -114,7 +122,7 @@ mod tests {
         let packed =
             ruzstd::encoding::compress_to_vec(text.as_bytes(), ruzstd::encoding::CompressionLevel::Fastest);
         for (compression, bytes) in [(Compression::None, text.as_bytes()), (Compression::Zstd, &packed)] {
-            let mut blocks = Blocks::new(compression, bytes);
+            let mut blocks = Blocks::new(compression.stream(bytes));
             let mut at = 0;
             while let Some(block) = blocks.next().unwrap() {
                 for piece in line_aligned(&block) {
@@ -122,6 +130,7 @@ mod tests {
                     at += piece.len();
                     assert!(piece.ends_with(b"\n") || at == text.len());
                 }
+                blocks.take_back(block);
             }
             assert_eq!(at, text.len());
             assert!(!blocks.ends_with_newline());

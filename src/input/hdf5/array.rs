@@ -1,8 +1,8 @@
 //! A dense array in an HDF5 file: the dataset that is named, or the only one with two extents.
 
 use super::members::Members;
-use super::values::{Found, Numbers};
-use super::{DEPTH, GROUPS, layout};
+use super::values::{Found, Numbers, refuse_beyond_memory};
+use super::{DEPTH, GROUPS, layout, opened};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::input::array::Array;
@@ -10,10 +10,7 @@ use hdf5_metno::{File, Group};
 
 /// Reads the dataset `name`, or the only array of the file.
 pub(in crate::input) fn read_array(file: &InputFile, name: Option<&str>) -> Found<Array> {
-    let opened = File::open(file.path()).map_err(|e| {
-        let message = format!("HDF5 file cannot be opened: {e}");
-        vec![Diagnostic::new(Code::FileUnreadable, message).with_help("transfer or write the file again")]
-    })?;
+    let opened = opened(file)?;
     let numbers = match name {
         Some(name) => named(&opened, name)?,
         None => search(&opened)?,
@@ -28,6 +25,7 @@ pub(in crate::input) fn read_array(file: &InputFile, name: Option<&str>) -> Foun
         }
     };
     let single = numbers.is_single_precision();
+    refuse_beyond_memory(rows.saturating_mul(cols), &numbers.name)?;
     let values = numbers.dataset.read_raw::<f64>().map_err(|e| {
         let message = format!("dataset {} cannot be read: {e}", numbers.name);
         vec![Diagnostic::new(Code::FileUnreadable, message).with_help("write the file again")]

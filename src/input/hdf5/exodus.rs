@@ -2,12 +2,13 @@
 //! `node_num_map`, `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`, `connect1`, ....
 
 use super::members::Members;
-use super::values::{Found, Numbers, Vector, names_of, text_of};
+use super::opened;
+use super::values::{Found, Heaps, Numbers, Vector, names_of, refuse_beyond_memory, text_of};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::input::upright_order::in_order_of_shape;
 use crate::model::{ElementShape, Elements, Nodes};
-use hdf5_metno::{File, Group};
+use hdf5_metno::Group;
 
 const HELP: &str = "give an Exodus mesh in netCDF-4, or a table with the columns node, x, y, z";
 
@@ -19,12 +20,9 @@ type NamedSets = Vec<(String, Vec<i64>)>;
 /// # Errors
 /// FB101 for a file that cannot be opened, FB115 for what is no such mesh.
 pub(in crate::input) fn read_exodus(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)> {
-    let opened = File::open(file.path()).map_err(|e| {
-        let message = format!("HDF5 file cannot be opened: {e}");
-        vec![Diagnostic::new(Code::FileUnreadable, message).with_help("transfer or write the file again")]
-    })?;
+    let opened = opened(file)?;
     let root = opened.group("/").map_err(|e| wrong(format!("file cannot be read: {e}")))?;
-    let mesh = Mesh { members: Members::of(&root), root, bytes: file.bytes() };
+    let mesh = Mesh { members: Members::of(&root), root, heaps: Heaps::of(file) };
     // What is wrong with a dataset is said of nodes here, not of matrices.
     mesh.read().map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
 }
@@ -36,7 +34,7 @@ fn wrong(message: String) -> Vec<Diagnostic> {
 struct Mesh<'f> {
     root: Group,
     members: Members,
-    bytes: &'f [u8],
+    heaps: Heaps<'f>,
 }
 
 impl Mesh<'_> {
@@ -92,6 +90,7 @@ impl Mesh<'_> {
         let &[_, columns] = numbers.dataset.shape().as_slice() else {
             return Err(wrong(format!("dataset {} does not have one row for each axis", numbers.name)));
         };
+        refuse_beyond_memory(numbers.dataset.size(), &numbers.name)?;
         let values = numbers.dataset.read_raw::<f64>();
         let values = values.map_err(|e| wrong(format!("dataset {} cannot be read: {e}", numbers.name)))?;
         Ok(values.chunks(columns.max(1)).map(<[f64]>::to_vec).collect())
@@ -103,7 +102,7 @@ impl Mesh<'_> {
         for dataset in (1..).map(|k| format!("connect{k}")).take_while(|dataset| self.has(dataset)) {
             let opened = Numbers::open(&self.root, &self.members, "", &dataset)?;
             let kind = opened.dataset.attr("elem_type").ok();
-            let kind = kind.and_then(|kind| text_of(&kind, self.bytes)).unwrap_or_default();
+            let kind = kind.and_then(|kind| text_of(&kind, &self.heaps)).unwrap_or_default();
             for places in self.rows_of(&dataset)? {
                 let whole = |place: &f64| (place.fract() == 0.0).then_some(*place as i64);
                 let nodes = nodes_at(&dataset, ids, places.iter().map(whole))?;

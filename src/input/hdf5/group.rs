@@ -3,10 +3,10 @@
 
 use super::super::assemble::{
     ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, assembled, check_size, push,
-    undeclared_triangle,
+    refuse_beyond_memory, undeclared_triangle,
 };
 use super::members::{Members, POINTERS};
-use super::values::{Found, Vector, integers_of, text_of, truth_of};
+use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::InputFile;
 use crate::input::lent::KeptColumns;
@@ -126,7 +126,6 @@ impl GroupReader<'_> {
         let values = self.vector(values)?;
         let indices = self.vector(indices)?;
         let pointers = self.vector(pointers)?;
-        let pointer_values = pointers.integers(0..pointers.len)?;
         let Some(majors) = pointers.len.checked_sub(1) else {
             return Err(vec![self.layout(&format!("has an empty {}", pointers.name))]);
         };
@@ -138,6 +137,9 @@ impl GroupReader<'_> {
                 format!("{} has {} values, expected {} for {n} columns", pointers.name, pointers.len, n + 1);
             return Err(vec![Diagnostic::new(Code::MatrixCount, message)]);
         }
+        let one = |diagnostic| vec![diagnostic];
+        refuse_beyond_memory(if self.keep_in.is_some() { 0 } else { entries as u64 }).map_err(one)?;
+        let pointer_values = pointers.integers(0..pointers.len)?;
         let ascending = pointer_values.is_sorted() && pointer_values[0] == 0;
         if !ascending || pointer_values[n] != entries as i64 {
             let message =
@@ -195,6 +197,7 @@ impl GroupReader<'_> {
         let entries = self.same_length(&values, &row_indices)?;
         self.same_length(&values, &column_indices)?;
         let n = check_size(rows, cols, entries as u64).map_err(|d| vec![d])?;
+        refuse_beyond_memory(entries as u64).map_err(|d| vec![d])?;
         let mut pieces = Vec::new();
         let both = [&row_indices, &column_indices];
         let sides =
@@ -278,7 +281,7 @@ impl GroupReader<'_> {
         let word = match truth_of(&attribute) {
             Some(true) => return Ok(Declared::Symmetric),
             Some(false) => return Ok(Declared::No),
-            None => text_of(&attribute, self.file.bytes()),
+            None => text_of(&attribute, &Heaps::of(self.file)),
         };
         let help = "it may be true, false, \"lower\" or \"upper\"";
         let refuse = |what: String| {

@@ -2,8 +2,12 @@
 
 use super::members::Members;
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::hdf5_file::first_broken_heap;
+use crate::base::memory::{left, refuse_beyond};
+use crate::input::InputFile;
 use hdf5_metno::types::{FixedAscii, FixedUnicode, FloatSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
 use hdf5_metno::{Attribute, Dataset, Group, Hyperslab, SliceOrIndex};
+use std::cell::OnceCell;
 use std::ops::Range;
 
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
@@ -11,6 +15,9 @@ pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 /// More than this many values per stored byte no filter reaches on real data (deflate: 1032): the rest of the
 /// dataset is not in the file.
 const RATIO: u64 = 1100;
+
+/// Values of a chunk that may be more than those of its dataset.
+const SMALL_CHUNK: u64 = 1 << 20;
 
 /// Type of the numbers of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,10 +121,27 @@ fn check_stored(dataset: &Dataset) -> Result<(), String> {
     let declared =
         dataset.shape().iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
     let stored = dataset.storage_size();
-    match declared > stored.saturating_mul(RATIO) {
-        true => Err(format!("declares {declared} values, but only {stored} bytes are stored")),
-        false => Ok(()),
+    if declared > stored.saturating_mul(RATIO) {
+        return Err(format!("declares {declared} values, but only {stored} bytes are stored"));
     }
+    // The library unpacks whole chunks.
+    let chunk = dataset.chunk().unwrap_or_default();
+    let values = chunk.iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
+    if values > declared.max(SMALL_CHUNK) {
+        return Err(format!("has chunks of {values} values for {declared} values"));
+    }
+    Ok(())
+}
+
+/// Refuses so many values where they do not fit the memory that is left.
+///
+/// # Errors
+/// FB601.
+pub(super) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
+    let what = format!("reading {values} values of the dataset {name}");
+    let needed = values as f64 * size_of::<f64>() as f64;
+    let refused = refuse_beyond(left(), needed, &what, "use a larger machine");
+    refused.map_err(|error| error.into_diagnostics())
 }
 
 /// A list of numbers in the file.
@@ -180,6 +204,7 @@ impl Vector {
         if range.is_empty() {
             return Ok(Vec::new());
         }
+        refuse_beyond_memory(range.len(), &self.name)?;
         let slab: Vec<SliceOrIndex> = (0..self.dimensions)
             .map(|d| if d == self.axis { range.clone().into() } else { SliceOrIndex::Index(0) })
             .collect();
@@ -220,17 +245,35 @@ pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
     }
 }
 
-/// A short text, whichever of the string types of HDF5 it has; `bytes` are those of the file.
-pub(super) fn text_of(attribute: &Attribute, bytes: &[u8]) -> Option<String> {
+/// The global heaps of a file, where texts of variable length lie. The HDF5 library walks damaged ones without end.
+pub(super) struct Heaps<'f> {
+    file: &'f InputFile,
+    are_sound: OnceCell<bool>,
+}
+
+impl<'f> Heaps<'f> {
+    pub(super) fn of(file: &'f InputFile) -> Self {
+        Self { file, are_sound: OnceCell::new() }
+    }
+
+    /// True if walking the heaps comes to an end; the file is looked through at the first call.
+    fn are_sound(&self) -> bool {
+        let look = || first_broken_heap(&mut self.file.reader()).is_ok_and(|broken| broken.is_none());
+        *self.are_sound.get_or_init(look)
+    }
+}
+
+/// A short text, whichever of the string types of HDF5 it has; `heaps` are those of the file.
+pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String> {
     // A null dataspace has no value.
     if !attribute.is_scalar() && attribute.shape() != [1] {
         return None;
     }
     let text = match attribute.dtype().ok()?.to_descriptor().ok()? {
-        TypeDescriptor::VarLenUnicode if heaps_end(bytes) => {
+        TypeDescriptor::VarLenUnicode if heaps.are_sound() => {
             attribute.read_raw::<VarLenUnicode>().ok()?.first()?.as_bytes().to_vec()
         }
-        TypeDescriptor::VarLenAscii if heaps_end(bytes) => {
+        TypeDescriptor::VarLenAscii if heaps.are_sound() => {
             attribute.read_raw::<VarLenAscii>().ok()?.first()?.as_bytes().to_vec()
         }
         TypeDescriptor::FixedAscii(_) => {
@@ -242,34 +285,4 @@ pub(super) fn text_of(attribute: &Attribute, bytes: &[u8]) -> Option<String> {
         _ => return None,
     };
     String::from_utf8(text).ok().map(|text| text.trim().to_owned())
-}
-
-/// Whether walking the global heaps of a file, where texts of variable length lie, comes to an end. The HDF5
-/// library walks them without end when a damaged object has no length.
-fn heaps_end(bytes: &[u8]) -> bool {
-    const SIGNATURE_AND_VERSION: &[u8] = b"GCOL\x01\0\0\0";
-    let mut heaps = bytes.windows(8).enumerate().filter(|(_, window)| *window == SIGNATURE_AND_VERSION);
-    heaps.all(|(at, _)| heap_ends(&bytes[at..]).is_some())
-}
-
-/// HDF5 file format specification, III.E: signature and version (8 bytes), size of the heap (8), then
-/// objects: index (2), references (2), reserved (4), size (8), contents in multiples of 8. Index 0 is the
-/// free space, whose size counts its own head.
-fn heap_ends(heap: &[u8]) -> Option<()> {
-    let number = |at: usize| {
-        let bytes: [u8; 8] = heap.get(at..at + 8)?.try_into().ok()?;
-        usize::try_from(u64::from_le_bytes(bytes)).ok()
-    };
-    let end = number(8).filter(|end| *end <= heap.len())?;
-    let mut at = 16;
-    while end - at >= 16 {
-        let size = number(at + 8)?;
-        let free = heap[at..at + 2] == [0, 0];
-        let step = if free { size } else { size.checked_next_multiple_of(8)?.checked_add(16)? };
-        if step < 16 || step > end - at {
-            return None;
-        }
-        at += step;
-    }
-    Some(())
 }

@@ -9,8 +9,9 @@ use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
 use super::deck_mesh::DeckMesh;
 use super::labelled_lines::{has_labels, labelled};
-use super::{Found, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
+use super::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::input::bytes::SeenFile;
 use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
 use crate::model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
@@ -47,7 +48,7 @@ impl JobReader for Abaqus {
             (Err(missing), None) => return Err(missing),
         };
         let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
-        let deck_files = deck.paths().map(|path| ("deck", path.to_path_buf()));
+        let deck_files = deck.seen()?.into_iter();
         Ok(JobModel {
             stiffness: rows.stiffness,
             mass: rows.mass,
@@ -79,8 +80,8 @@ struct Rows {
     labels: Vec<DofLabel>,
     stiffness: RawMatrix,
     mass: RawMatrix,
-    /// Role and path of the files.
-    files: Vec<(&'static str, PathBuf)>,
+    /// The files with their roles.
+    files: Vec<(&'static str, SeenFile)>,
     /// FB119, of matrices that are condensed.
     condensed: Option<Diagnostic>,
 }
@@ -93,14 +94,14 @@ impl Rows {
         } else {
             numbered(mesh, deck, [stiffness, mass])?
         };
-        let files = vec![("stiffness", stiffness.clone()), ("mass", mass.clone())];
-        let [stiffness, mass] = matrices;
+        let [(stiffness, stiffness_file), (mass, mass_file)] = matrices;
+        let files = vec![("stiffness", stiffness_file), ("mass", mass_file)];
         Ok(Self { labels, stiffness, mass, files, condensed: None })
     }
 
     /// FB111 for rows whose nodes are not in the deck, or stand along the axes of a `*TRANSFORM`.
     fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Found<Self> {
-        let Substructure { labels, stiffness, mass } = Substructure::read(file)?;
+        let Substructure { labels, stiffness, mass, seen } = Substructure::read(file)?;
         let nodes: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
         if let Some(node) = nodes.iter().find(|node| !mesh.nodes.contains_key(node)) {
             let message = format!(
@@ -115,7 +116,7 @@ impl Rows {
             return Err(vec![refused]);
         }
         let condensed = Some(condensed(nodes.len(), file));
-        Ok(Self { labels, stiffness, mass, files: vec![("matrices", file.to_path_buf())], condensed })
+        Ok(Self { labels, stiffness, mass, files: vec![("matrices", seen)], condensed })
     }
 }
 
@@ -181,11 +182,11 @@ fn numbered(
     mesh: &DeckMesh,
     deck: &Path,
     [stiffness, mass]: [&PathBuf; 2],
-) -> Found<(Vec<DofLabel>, [RawMatrix; 2])> {
+) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let labels = labels(mesh, deck)?;
     let n = labels.len();
     let read = |path: &Path, role| {
-        let file = CoordinateFile::read(path, role, u32::MAX)?;
+        let file = CoordinateFile::read(path, u32::MAX)?;
         // Rows without mass at the end of the matrix are not written.
         let fits = if role == MatrixRole::Mass { file.rows() <= n } else { file.rows() == n };
         if fits { file.into_matrix(n) } else { Err(vec![other_rows(mesh, n, file.rows(), path)]) }

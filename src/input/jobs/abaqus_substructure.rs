@@ -6,6 +6,7 @@ use super::deck::{Card, Deck, fields};
 use super::{Found, both, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Storage, assemble, check_size};
+use crate::input::bytes::SeenFile;
 use crate::input::coordinates::{excerpt, line_aligned, lines, real};
 use crate::input::digits::{COUNTED, written_digits};
 use crate::input::table::integer;
@@ -20,6 +21,8 @@ pub(super) struct Substructure {
     pub labels: Vec<DofLabel>,
     pub stiffness: RawMatrix,
     pub mass: RawMatrix,
+    /// The file that has them.
+    pub seen: SeenFile,
 }
 
 /// The file that the last request of a deck for the matrices of a substructure names, and which of several it
@@ -58,7 +61,8 @@ impl Substructure {
         let storage = if element.parameter("UNSYM").is_some() { Storage::Full } else { Storage::Triangle };
         let stiffness = file.matrix("STIFFNESS", labels.len(), storage);
         let (stiffness, mass) = both(stiffness, file.matrix("MASS", labels.len(), Storage::Triangle))?;
-        Ok(Self { labels, stiffness, mass })
+        let (_, seen) = deck.seen()?.swap_remove(0);
+        Ok(Self { labels, stiffness, mass, seen })
     }
 }
 

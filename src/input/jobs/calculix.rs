@@ -9,9 +9,8 @@ use super::expanded::{Once, label_once};
 use super::rotation_nodes::rotation_nodes;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::bytes::InputFile;
+use crate::input::bytes::{InputFile, SeenFile};
 use crate::input::coordinates::excerpt;
-use crate::input::reader::MatrixRole;
 use crate::input::table::integer;
 use crate::model::{DofLabel, GivenRows, Nodes};
 use std::collections::BTreeMap;
@@ -48,14 +47,14 @@ impl JobReader for Calculix {
         }
         let deck = Deck::read(path)?;
         let mesh = DeckMesh::of(&deck)?;
-        let labels = read_labels(&dof)?;
+        let (labels, dofs_file) = read_labels(&dof)?;
         let rotations = rotation_nodes(&deck, &mesh, &labels)?;
         let means = reference_places(&deck, &mesh)?;
         let n = labels.len();
-        let read = |file, role| CoordinateFile::read(file, role, n as u32)?.into_matrix(n);
+        let read = |file| CoordinateFile::read(file, n as u32)?.into_matrix(n);
         // One after the other: each is read by all threads, and the entries of only one are held.
-        let stiffness = read(&sti, MatrixRole::Stiffness);
-        let (stiffness, mass) = both(stiffness, read(&mas, MatrixRole::Mass))?;
+        let stiffness = read(&sti);
+        let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
         let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
         let label = |own: &DofLabel| match rotations.get(&own.node) {
             Some(reference) => DofLabel { node: *reference, direction: own.direction + 3 },
@@ -70,9 +69,8 @@ impl JobReader for Calculix {
         let (ids, positions) = nodes.into_iter().unzip();
         let mut diagnostics = mesh.notes.clone();
         diagnostics.extend(placed_note(&means, &dofs, path));
-        let mut files: Vec<(&'static str, _)> =
-            deck.paths().map(|path| ("deck", path.to_path_buf())).collect();
-        files.extend([("stiffness", sti), ("mass", mas), ("dofs", dof)]);
+        let mut files = deck.seen()?;
+        files.extend([("stiffness", stiffness_file), ("mass", mass_file), ("dofs", dofs_file)]);
         Ok(JobModel {
             stiffness,
             mass,
@@ -89,7 +87,7 @@ impl JobReader for Calculix {
 }
 
 /// Labels of the rows: lines `node.direction`.
-fn read_labels(path: &Path) -> Found<Vec<DofLabel>> {
+fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
     let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut labels = Vec::with_capacity(file.bytes().len() / 6);
     for (k, line) in file.bytes().split(|&b| b == b'\n').enumerate() {
@@ -110,5 +108,5 @@ fn read_labels(path: &Path) -> Found<Vec<DofLabel>> {
         };
         labels.push(label);
     }
-    Ok(labels)
+    Ok((labels, file.seen().map_err(|diagnostic| vec![diagnostic])?))
 }

@@ -1,19 +1,17 @@
 //! Matrices as lines `row column value` without a header, as CalculiX and Abaqus write them.
 
-use super::Found;
+use super::{Found, FromFile};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
-use crate::input::bytes::InputFile;
+use crate::input::bytes::{InputFile, SeenFile};
 use crate::input::compression::Compression;
 use crate::input::coordinates::{Blocks, Coordinates, Limits};
-use crate::input::reader::{MatrixRole, MatrixSource};
-use crate::model::RawMatrix;
 use rayon::prelude::*;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// The entries of a file, in its order.
 pub(super) struct CoordinateFile {
-    path: PathBuf,
+    seen: SeenFile,
     pieces: Vec<Vec<Entry>>,
     count: u64,
     written: u8,
@@ -25,13 +23,20 @@ impl CoordinateFile {
     /// Reads a file whose indices are at most `n`.
     ///
     /// # Errors
-    /// FB101, FB103, FB106, and FB301, FB303, FB306 for its lines.
-    pub(super) fn read(path: &Path, role: MatrixRole, n: u32) -> Found<Self> {
-        let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
+    /// FB101, FB103, FB106, FB132, and FB301, FB303, FB306 for its lines.
+    pub(super) fn read(path: &Path, n: u32) -> Found<Self> {
+        let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
+        let read = Self::read_opened(&file, n);
+        // What is wrong with a file that changed meanwhile may be wrong for this reason.
+        file.refuse_changed().map_err(|diagnostic| vec![diagnostic])?;
+        read
+    }
+
+    fn read_opened(file: &InputFile, n: u32) -> Found<Self> {
+        let path = file.path();
         let compression = Compression::of(file.bytes());
-        let source = MatrixSource { file: &file, compression, group: None, role, keep_in: None };
         let in_file = |found: Vec<Diagnostic>| found.into_iter().map(|d| d.in_file(path)).collect::<Vec<_>>();
-        let mut blocks = Blocks::new(compression, file.bytes());
+        let mut blocks = Blocks::of(file, compression);
         let mut body = Coordinates::new(Limits { n, integer: false }, None, 0);
         let first = blocks.next().map_err(|e| vec![crate::input::compression::broken(path, &e)])?;
         let Some(first) = first else {
@@ -39,13 +44,14 @@ impl CoordinateFile {
                 Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes").in_file(path),
             ]);
         };
-        let newline = body.read(&source, blocks, first, 0).map_err(in_file)?;
+        let newline = body.read(path, blocks, first, 0).map_err(in_file)?;
         let found = body.bad_lines(newline);
         if !found.is_empty() {
             return Err(in_file(found));
         }
         let (sides, count) = (body.sides(), body.count);
-        Ok(Self { path: path.to_path_buf(), pieces: body.pieces, count, written: body.written, sides })
+        let seen = file.seen().map_err(|diagnostic| vec![diagnostic])?;
+        Ok(Self { seen, pieces: body.pieces, count, written: body.written, sides })
     }
 
     /// Number of rows that its indices ask for.
@@ -58,10 +64,11 @@ impl CoordinateFile {
     ///
     /// # Errors
     /// FB301 for more rows than entries can fill, FB306, FB312.
-    pub(super) fn into_matrix(self, n: usize) -> Found<RawMatrix> {
-        let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&self.path)];
+    pub(super) fn into_matrix(self, n: usize) -> Found<FromFile> {
+        let path = &self.seen.path;
+        let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];
         check_size(n as u64, n as u64, self.count).map_err(in_file)?;
-        assemble(n, self.pieces, Storage::of(self.sides), self.written, &self.path)
-            .map_err(|diagnostic| vec![diagnostic])
+        let raw = assemble(n, self.pieces, Storage::of(self.sides), self.written, path);
+        Ok((raw.map_err(|diagnostic| vec![diagnostic])?, self.seen))
     }
 }

@@ -2,13 +2,16 @@
 
 use super::Found;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::bytes::InputFile;
+use crate::input::bytes::{InputFile, SeenFile};
 use crate::input::coordinates::excerpt;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// Files that include one another deeper than this include themselves.
 const DEEPEST: usize = 20;
+
+/// Files that a deck may include, each counted as often as it is included.
+const MOST_FILES: usize = 1000;
 
 /// A deck with everything that it includes.
 pub(super) struct Deck {
@@ -63,9 +66,18 @@ impl Deck {
         &self.cards
     }
 
+    /// Path of the main file.
+    pub(super) fn path(&self) -> Option<&Path> {
+        self.files.first().map(InputFile::path)
+    }
+
     /// The files of the deck, the main one first.
-    pub(super) fn paths(&self) -> impl Iterator<Item = &Path> {
-        self.files.iter().map(InputFile::path)
+    ///
+    /// # Errors
+    /// FB132.
+    pub(super) fn seen(&self) -> Found<Vec<(&'static str, SeenFile)>> {
+        let seen = |file: &InputFile| Ok(("deck", file.seen()?));
+        self.files.iter().map(seen).collect::<Result<_, Diagnostic>>().map_err(|diagnostic| vec![diagnostic])
     }
 
     /// What stands below a card as it is written, comments included, and the number of its first line.
@@ -94,8 +106,9 @@ impl Deck {
 
     fn include(&mut self, path: &Path, depth: usize) -> Result<(), Diagnostic> {
         let file = InputFile::open(path)?;
-        if depth > DEEPEST {
-            let message = format!("files include one another more than {DEEPEST} levels deep");
+        if depth > DEEPEST || self.files.len() >= MOST_FILES {
+            let message =
+                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
             return Err(Diagnostic::new(Code::DeckSyntax, message)
                 .in_file(path)
                 .with_help("a file includes itself: take the *INCLUDE out"));

@@ -245,7 +245,7 @@ impl Reading<'_> {
         if self.bad_count > self.bad.len() {
             let message = format!("{} more lines are bad", self.bad_count - self.bad.len());
             self.bad.extend(
-                self.deck.paths().next().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
+                self.deck.path().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
             );
         }
         self.bad

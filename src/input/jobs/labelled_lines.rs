@@ -2,11 +2,12 @@
 //! or LABELS: `node, direction, node, direction, value`. Their rows are the labels in ascending order.
 
 use super::deck::fields;
-use super::{Found, both};
+use super::{Found, FromFile, both};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::assemble::{Entry, Sides, Storage, assemble, check_size};
-use crate::input::bytes::InputFile;
-use crate::input::coordinates::{excerpt, line_aligned, lines, most_entries, real};
+use crate::input::bytes::{InputFile, SeenFile};
+use crate::input::compression::Compression;
+use crate::input::coordinates::{Blocks, excerpt, line_aligned, lines, most_entries, real};
 use crate::input::digits::{COUNTED, written_digits};
 use crate::input::recent::Recent;
 use crate::input::table::integer;
@@ -17,28 +18,30 @@ use std::path::Path;
 /// Bad lines of a file that are told one by one.
 const SHOWN: usize = 5;
 
-/// Pieces of a file that are read before its pages are given back.
-const PIECES_AT_ONCE: usize = 64;
-
 /// Two matrices and the labels of their rows.
 ///
 /// # Errors
-/// FB101, FB103, FB303 for their lines, and those of [`assemble`].
-pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [RawMatrix; 2])> {
-    let (k, m) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
+/// FB101, FB132, FB301 for their lines, and those of [`assemble`].
+pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
+    let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
     let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);
     let mut labels: Vec<DofLabel> = all.copied().collect();
     labels.sort_unstable();
     labels.dedup();
     let (k, m) = both(k.into_matrix(&labels, paths[0]), m.into_matrix(&labels, paths[1]))?;
-    Ok((labels, [k, m]))
+    Ok((labels, [(k, k_file), (m, m_file)]))
 }
 
 /// Whether the first line of data of a matrix names nodes and directions: it has fields with commas.
 pub(super) fn has_labels(path: &Path) -> Found<bool> {
-    let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
-    let mut lines = file.bytes().split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
-    Ok(lines.find(|line| is_data(line)).is_some_and(|line| line.contains(&b',')))
+    let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
+    let mut blocks = Blocks::of(&file, Compression::None);
+    while let Some(block) = blocks.next().map_err(|e| vec![file.failed(&e)])? {
+        if let Some(line) = lines(&block).find(|line| is_data(line)) {
+            return Ok(line.contains(&b','));
+        }
+    }
+    Ok(false)
 }
 
 fn is_data(line: &[u8]) -> bool {
@@ -51,19 +54,20 @@ struct LabelledLines {
 }
 
 impl LabelledLines {
-    fn read(path: &Path) -> Found<Self> {
-        let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
-        let texts: Vec<&[u8]> = line_aligned(file.bytes()).collect();
-        let mut pieces = Vec::with_capacity(texts.len());
-        let mut given = 0;
-        for some in texts.chunks(PIECES_AT_ONCE) {
-            pieces.par_extend(some.par_iter().map(|text| Piece::parse(text)));
-            let read: usize = some.iter().map(|text| text.len()).sum();
-            file.release(given..given + read);
-            given += read;
+    fn read(path: &Path) -> Found<(Self, SeenFile)> {
+        let one = |diagnostic| vec![diagnostic];
+        let file = InputFile::open_unread(path).map_err(one)?;
+        let mut blocks = Blocks::of(&file, Compression::None);
+        let mut pieces = Vec::new();
+        while let Some(block) = blocks.next().map_err(|e| one(file.failed(&e)))? {
+            let texts: Vec<&[u8]> = line_aligned(&block).collect();
+            pieces.par_extend(texts.into_par_iter().map(Piece::parse));
+            blocks.take_back(block);
         }
+        // What is wrong with a file that changed meanwhile may be wrong for this reason.
+        file.refuse_changed().map_err(one)?;
         let bad = bad_lines(&pieces, path);
-        if bad.is_empty() { Ok(Self { pieces }) } else { Err(bad) }
+        if bad.is_empty() { Ok((Self { pieces }, file.seen().map_err(one)?)) } else { Err(bad) }
     }
 
     /// The matrix whose rows have the ascending `labels`.
@@ -191,7 +195,7 @@ mod tests {
         assert!(text.len() > 3 << 20);
         let path = folder.path().join("K.mtx");
         std::fs::write(&path, text).expect("written");
-        let (labels, [k, m]) = labelled([&path, &path]).expect("read");
+        let (labels, [(k, _), (m, _)]) = labelled([&path, &path]).expect("read");
         assert_eq!(labels.len(), 3 * ids.len());
         assert!(labels.is_sorted());
         assert_eq!((k.matrix.nnz(), k.digits), (9 * ids.len(), m.digits));

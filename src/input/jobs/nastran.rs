@@ -15,15 +15,18 @@ mod systems;
 use super::{Found, JobFile, JobModel, JobReader, condensed};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::is_bulk_data;
-use crate::input::bytes::InputFile;
+use crate::input::bytes::{InputFile, SeenFile};
 use crate::input::node_file::{NodeFile, Unresolved};
 use crate::model::{Elements, NodeAxes as Axes, Nodes};
 use bulk::Bulk;
 use elimination::Places;
 use matrices::Matrices;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use systems::Systems;
+
+/// Bytes by which a deck is told: comments may stand above its first card.
+const DECK_HEAD: usize = 1 << 20;
 
 /// The reader of Nastran jobs.
 pub(super) struct Nastran;
@@ -38,7 +41,7 @@ impl JobReader for Nastran {
     }
 
     fn recognises(&self, path: &Path) -> bool {
-        InputFile::open(path).is_ok_and(|file| is_bulk_data(file.bytes()))
+        InputFile::open_unread(path).is_ok_and(|file| is_bulk_data(&file.first_bytes(DECK_HEAD)))
     }
 
     fn names_matrices(&self) -> bool {
@@ -64,9 +67,9 @@ impl JobReader for Nastran {
             diagnostics.push(condensed(matrices.grids(&bulk), &matrices.stiffness.path));
         }
         let sets = bulk.sets.of(&bulk.grids);
-        let mut files: Vec<(&'static str, PathBuf)> =
-            bulk.files.iter().map(|path| ("deck", path.clone())).collect();
-        files.extend(matrices.files.iter().map(|path| ("matrices", path.clone())));
+        let mut files: Vec<(&'static str, SeenFile)> =
+            bulk.files.iter().map(|file| ("deck", file.clone())).collect();
+        files.extend(matrices.files.iter().map(|file| ("matrices", file.clone())));
         let given_rows = matrices.given_rows(axes);
         let unresolved = Unresolved::new();
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;

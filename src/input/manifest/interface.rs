@@ -23,6 +23,9 @@ pub(super) const INTERFACE: &[&str] = &[
     "reference_node",
 ];
 
+/// Interfaces of a body: each takes sixteen entries of its file, which has at most 100,000.
+const MOST_INTERFACES: usize = 6000;
+
 /// Keys of [`INTERFACE`] that say which nodes it has.
 const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane", "nearest"];
 
@@ -36,6 +39,12 @@ impl Walk<'_> {
             self.mistyped("interface", value, "a list of tables: write [[interface]]");
             return None;
         };
+        if list.len() > MOST_INTERFACES {
+            let message =
+                format!("the manifest has {} interfaces, a body has at most {MOST_INTERFACES}", list.len());
+            self.complain(Code::ManifestSyntax, value.span(), message);
+            return None;
+        }
         let mut names = HashSet::new();
         let mut interfaces = Vec::new();
         for item in list.iter() {

@@ -2,6 +2,7 @@
 
 use super::HELP;
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::memory::{left, refuse_beyond};
 use std::io::{ErrorKind, Read};
 
 pub(in crate::input) type Found<T> = std::result::Result<T, Diagnostic>;
@@ -59,8 +60,9 @@ impl<'a> Elements<'a> {
     /// The next element.
     ///
     /// # Errors
-    /// FB103 for damaged packed bytes, FB304 where the variable ends within it.
-    pub(super) fn next(&mut self) -> Found<Numbers> {
+    /// FB103 for damaged packed bytes, FB304 where the variable ends within it or the element has more than `most`
+    /// bytes, FB601.
+    pub(super) fn next(&mut self, most: u64) -> Found<Numbers> {
         let tag: [u8; 8] = self.take(8)?.try_into().expect("eight bytes were read");
         let [kind, length] = self.order.two(&tag);
         // Up to four bytes stand in the tag itself.
@@ -71,6 +73,13 @@ impl<'a> Elements<'a> {
             })?;
             return Ok(Numbers { kind: kind & 0xffff, bytes: bytes.to_vec(), order: self.order });
         }
+        if u64::from(length) > most {
+            let message = format!("a variable has {length} bytes where its extents leave {most} at the most");
+            return Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP));
+        }
+        let what = "reading a variable";
+        refuse_beyond(left(), f64::from(length), what, "use a larger machine")
+            .map_err(|error| error.first_error().clone())?;
         let bytes = self.take(u64::from(length))?;
         let padding = u64::from(length).next_multiple_of(8) - u64::from(length);
         // The last element of a file may lack it.

@@ -3,10 +3,13 @@
 use super::HELP;
 use super::elements::{Elements, Found, Numbers, Order};
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::assemble::check_size;
+use crate::input::assemble::{check_size, most_entries_of};
 use crate::input::compressed::Compressed;
 use crate::model::RawMatrix;
 use std::path::Path;
+
+/// Bytes that flags, extents and the name of a variable may have each.
+const HEAD_BYTES: u64 = 1 << 16;
 
 const REAL: &str = "save a matrix of real numbers: K = sparse(real(K)); save('FILE.mat', 'K')";
 const BOTH_TRIANGLES: &str = "save both triangles: K + tril(K, -1)'";
@@ -73,7 +76,8 @@ impl<'a> Variable<'a> {
 
     /// Flags, extents and name.
     fn head(elements: &mut Elements<'a>) -> Found<[Numbers; 3]> {
-        let head = [elements.next()?, elements.next()?, elements.next()?];
+        let mut next = || elements.next(HEAD_BYTES);
+        let head = [next()?, next()?, next()?];
         if head[0].len() < 2 || !head[0].is_whole() || !head[1].is_whole() {
             let message = "a variable does not begin with its flags and extents";
             return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
@@ -94,12 +98,23 @@ impl<'a> Variable<'a> {
                 return Err(Diagnostic::new(Code::MatrixKind, message).with_help(REAL));
             }
             (Kind::Sparse, None) => {
-                self.sparse([elements.next()?, elements.next()?, elements.next()?], path)?
+                let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
+                let pointers = self.columns.saturating_add(1).saturating_mul(8);
+                let own = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
+                self.sparse(own, path)?
             }
-            (Kind::Full, None) => self.full(&elements.next()?, path)?,
+            (Kind::Full, None) => {
+                let places = self.rows.saturating_mul(self.columns);
+                self.full(&elements.next(places.saturating_mul(8))?, path)?
+            }
         };
         elements.finish()?;
         Ok(RawMatrix { digits: if self.single { raw.digits.min(7) } else { raw.digits }, ..raw })
+    }
+
+    /// Largest number of entries that a matrix of this size may have.
+    fn most_entries(&self) -> u64 {
+        most_entries_of(self.columns).min(u64::MAX / 8)
     }
 
     fn sparse(&self, [indices, pointers, values]: [Numbers; 3], path: &Path) -> Found<RawMatrix> {

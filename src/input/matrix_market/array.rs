@@ -2,6 +2,7 @@
 
 use super::header::{has_banner, size};
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::memory::{left, refuse_beyond};
 use crate::input::InputFile;
 use crate::input::array::Array;
 use crate::input::compression::{Compression, broken};
@@ -18,7 +19,7 @@ type Found<T> = Result<T, Vec<Diagnostic>>;
 /// Reads an array of real numbers.
 pub(in crate::input) fn read_array(file: &InputFile, compression: Compression) -> Found<Array> {
     let damaged = |e: std::io::Error| vec![broken(file.path(), &e)];
-    let mut blocks = Blocks::new(compression, file.bytes());
+    let mut blocks = Blocks::of(file, compression);
     let mut reading = Reading::default();
     while let Some(block) = blocks.next().map_err(damaged)? {
         for line in block.split(|&b| b == b'\n') {
@@ -83,10 +84,13 @@ impl Reading {
             };
             self.size = extents.and_then(|(rows, cols)| Some((rows, cols, rows.checked_mul(cols)?)));
             let message = || format!("size line is `{}`, expected rows and columns", excerpt(line));
-            return self
-                .size
-                .map(|_| ())
-                .ok_or_else(|| Diagnostic::new(Code::MatrixSyntax, message()).with_help(HELP));
+            let Some((_, _, count)) = self.size else {
+                return Err(Diagnostic::new(Code::MatrixSyntax, message()).with_help(HELP));
+            };
+            let (what, needed) =
+                (format!("an array of {count} values"), count as f64 * size_of::<f64>() as f64);
+            let refused = refuse_beyond(left(), needed, &what, "use a larger machine");
+            return refused.map_err(|error| error.first_error().clone());
         };
         fields.try_for_each(|field| {
             let value = real(field).ok_or_else(|| {

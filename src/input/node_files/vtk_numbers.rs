@@ -1,5 +1,6 @@
 //! Numbers in files of VTK: their types, and how the XML form packs them.
 
+use crate::base::memory::left;
 use std::io::{Error, ErrorKind, Read};
 
 /// Why an array cannot be read, as the end of a sentence about it.
@@ -81,14 +82,22 @@ pub(super) struct Packing {
 }
 
 impl Packing {
-    /// The bytes of the array that begins the stream.
-    pub(super) fn unpack(self, mut stream: impl Read) -> Unpacked<Vec<u8>> {
+    /// The bytes of the array that begins the stream, at most `most`.
+    pub(super) fn unpack(self, mut stream: impl Read, most: u64) -> Unpacked<Vec<u8>> {
         if !self.zlib {
             let length = self.header(&mut stream)?;
             return exactly(&mut stream, length);
         }
         let [blocks, size, last] =
             [self.header(&mut stream)?, self.header(&mut stream)?, self.header(&mut stream)?];
+        let whole = if last == 0 { blocks } else { blocks.saturating_sub(1) };
+        let total = whole.saturating_mul(size).saturating_add(last);
+        if total > most {
+            return Err(format!("unpacks to {total} bytes, {most} are expected"));
+        }
+        if left().is_some_and(|left| total > left) {
+            return Err(format!("unpacks to {total} bytes, more than fit the memory"));
+        }
         let lengths = blocks.checked_mul(self.header_bytes as u64).ok_or(ENDS)?;
         let lengths = exactly(&mut stream, lengths)?;
         let mut unpacked = Vec::new();

@@ -46,6 +46,8 @@ struct Mesh<'a> {
     packing: Packing,
     /// Number of points.
     points: u64,
+    /// Number of cells, where the piece says it.
+    cells: Option<u64>,
 }
 
 impl<'a> Mesh<'a> {
@@ -74,13 +76,14 @@ impl<'a> Mesh<'a> {
         };
         let points = piece.number("NumberOfPoints").or_else(|| extent(piece));
         let points = points.ok_or("the piece does not say how many points it has")?;
-        Ok(Self { elements, packing, points })
+        let cells = piece.number("NumberOfCells");
+        Ok(Self { elements, packing, points, cells })
     }
 
     /// The coordinates of the points.
     fn places(&self) -> Unpacked<Vec<[f64; 3]>> {
         let array = self.arrays("Points").next().ok_or("file has no array of points")?;
-        let numbers = self.numbers(array)?;
+        let numbers = self.numbers(array, self.points.saturating_mul(3))?;
         let (count, found) = (self.points, numbers.len());
         if array.number("NumberOfComponents") != Some(3) || count.checked_mul(3) != Some(found as u64) {
             return Err(format!("file says {count} points, and has {found} numbers for them"));
@@ -124,8 +127,10 @@ impl<'a> Mesh<'a> {
         let array = |name: &str| self.arrays("Cells").find(|array| array.attribute("Name") == Some(name));
         let all = [array("connectivity"), array("offsets"), array("types")];
         let [Some(connectivity), Some(offsets), Some(types)] = all else { return Ok(Elements::default()) };
-        let [connectivity, offsets, types] = [connectivity, offsets, types].map(|own| self.numbers(own));
-        elements_of(&connectivity?, &offsets?, &types?, ids)
+        let Some(cells) = self.cells else { return Ok(Elements::default()) };
+        let [offsets, types] = [self.numbers(offsets, cells)?, self.numbers(types, cells)?];
+        let points = offsets.last().map_or(0, |last| *last as u64);
+        elements_of(&self.numbers(connectivity, points)?, &offsets, &types, ids)
     }
 
     /// The arrays at the points with one whole number for each.
@@ -134,7 +139,7 @@ impl<'a> Mesh<'a> {
     }
 
     fn list(&self, array: &Element<'_>) -> Unpacked<Vec<f64>> {
-        let values = self.numbers(array)?;
+        let values = self.numbers(array, self.points)?;
         if values.len() as u64 == self.points {
             return Ok(values);
         }
@@ -147,16 +152,17 @@ impl<'a> Mesh<'a> {
         self.elements.iter().filter(move |own| own.name == "DataArray" && own.parent == parent)
     }
 
-    /// The numbers of an array.
-    fn numbers(&self, array: &Element<'_>) -> Unpacked<Vec<f64>> {
+    /// The numbers of an array, which has `most` of them at the most where it is compressed.
+    fn numbers(&self, array: &Element<'_>, most: u64) -> Unpacked<Vec<f64>> {
         let name = array.attribute("Name").unwrap_or("Points");
         let within = |what: String| format!("array `{name}` {what}");
         let kind = array.attribute("type").unwrap_or_default();
         let kind = NumberType::named(kind).ok_or_else(|| within(format!("has numbers of type `{kind}`")))?;
+        let most = most.saturating_mul(kind.bytes() as u64);
         let bytes = match array.attribute("format") {
             Some("ascii") => return ascii(array.content).map_err(within),
-            Some("binary") => self.packing.unpack(Base64::new(array.content)),
-            Some("appended") => self.appended(array),
+            Some("binary") => self.packing.unpack(Base64::new(array.content), most),
+            Some("appended") => self.appended(array, most),
             other => Err(format!("has the format `{}`, which is not read", other.unwrap_or_default())),
         };
         let bytes = bytes.map_err(within)?;
@@ -166,7 +172,7 @@ impl<'a> Mesh<'a> {
         Ok(kind.decode(&bytes, self.packing.big_endian))
     }
 
-    fn appended(&self, array: &Element<'_>) -> Unpacked<Vec<u8>> {
+    fn appended(&self, array: &Element<'_>, most: u64) -> Unpacked<Vec<u8>> {
         let data = self.elements.iter().find(|element| element.name == "AppendedData");
         let data = data.ok_or("is appended, but the file has no appended data")?;
         // The data begin behind an underscore.
@@ -175,8 +181,8 @@ impl<'a> Mesh<'a> {
         let own = offset.and_then(|offset| content.get(offset..));
         let own = own.ok_or("begins behind the end of the file: it may be cut off")?;
         match data.attribute("encoding") {
-            Some("raw") => self.packing.unpack(own),
-            Some("base64") | None => self.packing.unpack(Base64::new(own)),
+            Some("raw") => self.packing.unpack(own, most),
+            Some("base64") | None => self.packing.unpack(Base64::new(own), most),
             Some(other) => Err(format!("is encoded by `{other}`, which is not read")),
         }
     }

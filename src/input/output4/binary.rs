@@ -32,13 +32,13 @@ impl Binary {
         ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(own)
     }
 
-    /// Where the columns of the matrices stand. Pages of the file are given back once they were gone through.
+    /// Where the columns of the matrices stand.
     ///
     /// # Errors
     /// FB301, FB303, FB304 for records that are none of a matrix.
     pub(super) fn contents(self, file: &InputFile) -> Result<Vec<Stored>, Diagnostic> {
         let bytes = file.bytes();
-        let (mut at, mut given, mut all) = (0, 0, Vec::new());
+        let (mut at, mut all) = (0, Vec::new());
         while at < bytes.len() {
             let (record, next) = self.record(bytes, at).ok_or_else(|| cut_off("a header"))?;
             let [columns, rows, form, kind] = [0, 1, 2, 3].map(|k| self.integer(record, k).unwrap_or(0));
@@ -56,7 +56,6 @@ impl Binary {
                 at = next;
                 let Column::Number(column) = column else { break };
                 stored.add(column, record.len() / size, bytes, 0);
-                file.release_up_to(at, &mut given);
             }
             all.push(stored);
         }

@@ -67,14 +67,13 @@ fn format(text: &[u8]) -> Option<Format> {
     ((1..=100).contains(&format.per_line) && (8..=100).contains(&format.width)).then_some(format)
 }
 
-/// Where the columns of the matrices stand, and how their numbers are written. Pages of the file are given
-/// back once they were gone through.
+/// Where the columns of the matrices stand, and how their numbers are written.
 ///
 /// # Errors
 /// FB301, FB303, FB304 for lines that are none of a matrix.
 pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagnostic> {
     let mut text = Text { rest: file.bytes(), line: 0 };
-    let (mut all, mut given) = (Vec::new(), 0);
+    let mut all = Vec::new();
     while let Some(line) = text.next_line() {
         if line.is_empty() {
             continue;
@@ -92,7 +91,6 @@ pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagno
             };
             let end = file.bytes().len() - text.rest.len();
             stored.add(column, values, start..end, above);
-            file.release_up_to(end, &mut given);
         }
         all.push((stored, heading.format));
     }

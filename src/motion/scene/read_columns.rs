@@ -78,8 +78,16 @@ impl HistoryFiles {
         };
         let mut read = self.read.borrow_mut();
         if read.iter().all(|other| other.path != path) {
-            let source = SourceFile::new("history", &path, file.sha256());
-            read.push(SeriesFile { path, source });
+            match file.sha256() {
+                Ok(sha256) => {
+                    let source = SourceFile::new("history", &path, sha256);
+                    read.push(SeriesFile { path, source });
+                }
+                Err(changed) => {
+                    walk.found.push(changed);
+                    return None;
+                }
+            }
         }
         Some(file)
     }

@@ -7,6 +7,7 @@ use super::sets::SetLines;
 use super::systems::{Definition, Grid, Kind, SystemCard};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::input::bulk_cards::{Card, Item, components, read_deck, whole};
+use crate::input::bytes::SeenFile;
 use crate::input::coordinates::excerpt;
 use crate::input::dmig::Dmigs;
 use crate::input::jobs::Found;
@@ -34,7 +35,8 @@ struct Members {
 /// A deck.
 #[derive(Default)]
 pub(super) struct Bulk {
-    pub files: Vec<PathBuf>,
+    /// The main file first.
+    pub files: Vec<SeenFile>,
     /// The files of the cards.
     pub card_files: Vec<PathBuf>,
     pub grids: BTreeMap<i64, Grid>,

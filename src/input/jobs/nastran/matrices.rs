@@ -5,6 +5,7 @@ use super::bulk::Bulk;
 use super::elimination::{Elimination, Followers, Places};
 use super::outputs::{Outputs, Read, choose_pair, no_files, no_pair};
 use crate::base::diagnostic::{Code, Diagnostic};
+use crate::input::bytes::SeenFile;
 use crate::input::dmig::{Dmigs, Point, label};
 use crate::input::jobs::{Found, JobFile, both, siblings};
 use crate::input::row_axes::Turn;
@@ -19,7 +20,7 @@ pub(super) struct Matrices {
     pub mass: RawMatrix,
     pub labels: Vec<DofLabel>,
     /// Files beside the deck that they were read from.
-    pub files: Vec<PathBuf>,
+    pub files: Vec<SeenFile>,
     /// Number of rows of the files.
     n_given: usize,
     /// Rows that follow others by constraints of the deck, where the files have them.
@@ -39,14 +40,14 @@ impl Matrices {
         if !names.is_empty() && !bulk.has_elements {
             let pair = choose_pair(&names, &dmigs.candidates(), stated)
                 .map_err(|pairs| no_pair(&names, &pairs, stated, path))?;
-            return Self::of_dmigs(bulk, dmigs, pair, Vec::new(), places);
+            return Self::of_dmigs(bulk, dmigs, pair, places);
         }
         let (punches, outputs) = files_beside(bulk, job)?;
         let punched = Dmigs::of(&punches)?;
         let outputs = Outputs::of(outputs)?;
         let punch_pair = choose_pair(&punched.names(), &punched.candidates(), stated);
         match (punch_pair, choose_pair(&outputs.names, &outputs.fitting(bulk), stated)) {
-            (Ok(pair), Err(_)) => Self::of_dmigs(bulk, punched, pair, punches, places),
+            (Ok(pair), Err(_)) => Self::of_dmigs(bulk, punched, pair, places),
             (Err(_), Ok(pair)) => Self::new(bulk, outputs.matrices(bulk, pair)?, places),
             (punch_pair, output_pair) => {
                 let names = [punched.names(), outputs.names].concat();
@@ -60,13 +61,7 @@ impl Matrices {
         }
     }
 
-    fn of_dmigs(
-        bulk: &Bulk,
-        mut dmigs: Dmigs,
-        (k, m): (usize, usize),
-        files: Vec<PathBuf>,
-        places: &Places<'_>,
-    ) -> Found<Self> {
+    fn of_dmigs(bulk: &Bulk, mut dmigs: Dmigs, (k, m): (usize, usize), places: &Places<'_>) -> Found<Self> {
         let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
         // Rows that others follow have to be there, also where they are zero.
         let followers = followers(bulk, |point| points.contains(point), places)?;
@@ -80,6 +75,7 @@ impl Matrices {
         let points: Vec<Point> = points.into_iter().collect();
         let mut matrix = |at| dmigs.take_matrix(at, &points).map_err(|diagnostic| vec![diagnostic]);
         let (stiffness, mass) = both(matrix(k), matrix(m))?;
+        let files = dmigs.files;
         Self::new(bulk, Read { stiffness, mass, points, files }, places)
     }
 

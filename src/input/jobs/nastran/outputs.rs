@@ -3,7 +3,7 @@
 use super::bulk::Bulk;
 use super::rows;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::input::bytes::InputFile;
+use crate::input::bytes::{InputFile, SeenFile};
 use crate::input::dmig::Point;
 use crate::input::jobs::{Beside, Found, beginning_alike, both, missing};
 use crate::input::nastran_names::{named_pair, pair};
@@ -20,7 +20,7 @@ pub(super) struct Read {
     /// Points of the rows, ascending.
     pub points: Vec<Point>,
     /// Files beside the deck that they were read from.
-    pub files: Vec<PathBuf>,
+    pub files: Vec<SeenFile>,
 }
 
 /// The OUTPUT4 files beside a deck.
@@ -71,8 +71,10 @@ impl Outputs {
         }
         let points = rows::points(bulk, rows, &self.names[k], &stiffness.path);
         let points = points.map_err(|diagnostic| vec![diagnostic])?;
-        let mut files = vec![stiffness.path.clone()];
-        files.extend((mass.path != stiffness.path).then(|| mass.path.clone()));
+        let [k_file, m_file] = [k, m].map(|name| self.places[name].0);
+        let mut files = vec![self.files[k_file].0.seen()];
+        files.extend((m_file != k_file).then(|| self.files[m_file].0.seen()));
+        let files = files.into_iter().collect::<Result<_, _>>().map_err(|diagnostic| vec![diagnostic])?;
         Ok(Read { stiffness, mass, points, files })
     }
 }
