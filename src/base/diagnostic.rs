@@ -219,6 +219,7 @@ codes! {
     CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
     WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
     Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
+    Forked = "FB606", Error, Resources, "process has none of the threads that it computes with", "start processes by `spawn` or `forkserver`, or fork before the first work";
     // FB7xx: flex-body files and checkpoints
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
@@ -285,7 +286,10 @@ pub fn codes_markdown() -> String {
          | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
          | 4 | not enough memory or disk |\n\
          | 70 | a bug of ours |\n\
-         | 130 | interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left |\n\n\
+         | 130 | interrupted (Ctrl-C), told to end (SIGTERM) or left by its terminal (SIGHUP); no unfinished file is left |\n\n\
+         Other signals that end a program end this one too, after its unfinished files: a shell tells 128 + the number\n\
+         of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
+         is, and the files that they would have replaced are there ([README](../README.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
          `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",

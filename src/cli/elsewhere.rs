@@ -80,7 +80,7 @@ impl Elsewhere {
                     index_bytes: 4,
                     model: ModelReference::default(),
                 };
-                let prepared = in_made_folder(folder, || prepare(model, &asked, folder)?.commit())?;
+                let prepared = in_made_folder(folder, || prepare(model, &asked, folder)?.keep())?;
                 watch(Event::Phase("SLEPc"));
                 engine.run(&python, folder)?;
                 read_found(folder, &prepared, model, false)?

@@ -79,7 +79,8 @@ impl Engine {
     /// [`EngineMissing`](Code::EngineMissing).
     pub fn check(&self) -> Result<String> {
         let program = self.mpiexec.first().map_or("", String::as_str);
-        let version = Command::new(program).arg("--version").stdin(Stdio::null()).output();
+        let mut version = Command::new(program);
+        let version = children::output(version.arg("--version").stdin(Stdio::null()));
         version.map_err(|e| missing(program, &e))?;
         self.find_python()
     }
@@ -115,12 +116,12 @@ fn missing(program: &str, error: &std::io::Error) -> Diagnostic {
 fn probe(python: &str) -> std::io::Result<Output> {
     let mut command = Command::new(python);
     command.args(["-", "--probe"]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = command.spawn()?;
+    let mut child = children::start(&mut command)?;
     if let Some(mut input) = child.stdin.take() {
         // A program that does not read it says itself what it is.
         let _ = input.write_all(DRIVER_SOURCE.as_bytes());
     }
-    child.wait_with_output()
+    children::output_of(child)
 }
 
 /// What a program said about its failure: its own message where it has one, else its last line.
