@@ -12,7 +12,7 @@ use crate::base::output::{abandon_unfinished, abandon_unfinished_soon};
 use libc::{c_int, sigaction, siginfo_t};
 use signal_hook::iterator::Signals;
 use std::io::{IsTerminal, Write};
-use std::sync::OnceLock;
+use std::sync::{OnceLock, mpsc};
 use std::time::Duration;
 
 /// Seconds that programs which this one has started have to end themselves before they are killed.
@@ -46,13 +46,29 @@ static BEFORE: [OnceLock<sigaction>; CRASHES.len()] = [const { OnceLock::new() }
 /// Handles the signals from here on. Where no handler can be set the work is done all the same: what an interruption
 /// then leaves is removed by the next run.
 pub(super) fn handle() {
-    let signals: Vec<c_int> = ending().into_iter().filter(|&signal| is_default(signal)).collect();
-    if let Ok(mut signals) = Signals::new(signals) {
-        let wait = move || signals.forever().for_each(|signal| ended_by(signal));
-        // Without the thread a signal is noted, and nobody ends the program: the handlers go with their owner.
-        let _ = std::thread::Builder::new().name("signals".to_owned()).spawn(wait);
+    let (ready, is_ready) = mpsc::channel();
+    let wait = move || wait_for_signal(&ready);
+    if std::thread::Builder::new().name("signals".to_owned()).spawn(wait).is_ok() {
+        // The thread ends without a word where it cannot set its handlers.
+        let _ = is_ready.recv();
     }
     handle_crashes();
+}
+
+/// Sets the handlers, says so, and ends the program at the first signal.
+fn wait_for_signal(ready: &mpsc::Sender<()>) {
+    let asked: Vec<c_int> = ending().into_iter().filter(|&signal| is_default(signal)).collect();
+    match Signals::new(&asked) {
+        Ok(mut signals) => {
+            // The caller waits for it.
+            let _ = ready.send(());
+            if let Some(signal) = signals.forever().next() {
+                ended_by(signal);
+            }
+        }
+        // Handlers without their owner would ignore the signals.
+        Err(_) => asked.into_iter().for_each(by_default),
+    }
 }
 
 /// Every signal whose default is the end of the program, without [`CRASHES`].
@@ -125,14 +141,22 @@ fn send(signal: c_int, processes: &[u32]) {
     }
 }
 
+/// Leaves a signal to the system again.
+fn by_default(signal: c_int) {
+    // SAFETY: sets how a signal is handled.
+    unsafe {
+        libc::signal(signal, libc::SIG_DFL);
+    }
+}
+
 /// Does what the system does with this signal by default, which is the end of the process.
 fn as_by_default(signal: c_int) -> ! {
-    // SAFETY: sets how a signal is handled, lets it through to this thread, and sends it to it.
+    by_default(signal);
+    // SAFETY: lets a signal through to this thread, and sends it to it.
     unsafe {
         let mut this: libc::sigset_t = std::mem::zeroed();
         libc::sigemptyset(&mut this);
         libc::sigaddset(&mut this, signal);
-        libc::signal(signal, libc::SIG_DFL);
         libc::pthread_sigmask(libc::SIG_UNBLOCK, &this, std::ptr::null_mut());
         libc::raise(signal);
         // Only where the signal does not end the process after all.
