@@ -1,7 +1,7 @@
 //! The end of the program before its work is done: by a signal, or at a contradiction of its own.
-#![allow(unsafe_code)] // a call of the C library that ends the process
 
 use super::arguments::Arguments;
+use super::exit::end;
 use super::output::tell_bug;
 #[cfg(unix)]
 use super::signals;
@@ -10,17 +10,6 @@ use crate::base::output::abandon_unfinished_soon;
 use std::panic::PanicHookInfo;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-
-/// Ends the process at once: other threads may be inside HDF5, whose own end waits for them or crashes.
-pub fn end(code: ExitCode) -> ! {
-    #[cfg(unix)]
-    // SAFETY: ends the process.
-    unsafe {
-        libc::_exit(code as i32)
-    }
-    #[cfg(not(unix))]
-    std::process::exit(code as i32)
-}
 
 /// Sees to it that the process, which runs this command and nothing else, leaves no unfinished file however it ends.
 pub fn end_without_unfinished_files(arguments: &'static Arguments) {

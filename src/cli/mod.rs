@@ -12,6 +12,7 @@ mod convert;
 mod doctor;
 mod elsewhere;
 mod ending;
+mod exit;
 mod export;
 mod import;
 mod inspect;
@@ -34,6 +35,7 @@ mod view;
 mod watcher;
 
 pub use arguments::Arguments;
-pub use ending::{end, end_without_unfinished_files};
+pub use ending::end_without_unfinished_files;
+pub use exit::end;
 pub use output::{parse, run};
 pub use resources::use_threads;

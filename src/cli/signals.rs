@@ -5,7 +5,7 @@
 //! in the background have it, stay as they are. SIGPIPE and SIGXFSZ are errors of the write.
 #![allow(unsafe_code)] // calls of the C library that ask for, set and raise signals
 
-use super::ending::end;
+use super::exit::end;
 use crate::base::children;
 use crate::base::error::ExitCode;
 use crate::base::output::{abandon_unfinished, abandon_unfinished_soon};

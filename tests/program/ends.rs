@@ -19,7 +19,7 @@ use tempfile::TempDir;
 fn program(folder: &Path) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", "ulimit -c 0; exec \"$@\"", "sh"]).current_dir(folder);
-    command.arg(std::env::var_os("FLEXBODY").unwrap_or_else(|| env!("CARGO_BIN_EXE_flexbody").into()));
+    command.arg(crate::support::program::program());
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }
@@ -156,7 +156,7 @@ fn batch_in_work() -> (TempDir, Child) {
     long_model(folder.path());
     let body = |name: &str| {
         format!(
-            "[[body]]\nmodel = \"model/model.toml\"\noutput = \"{name}.h5\"\nmemory = 1\noptions = [\"--modes\", \"100\"]\n"
+            "[[body]]\nmodel = \"model/model.toml\"\noutput = \"{name}.h5\"\nmemory = 1_000_000_000\noptions = [\"--modes\", \"100\"]\n"
         )
     };
     let list = format!("parallel = 2\n{}{}{}", body("a"), body("b"), body("c"));

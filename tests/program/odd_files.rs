@@ -2,7 +2,7 @@
 //! program says so before the work, waits for nothing, and keeps what a file had.
 #![cfg(unix)]
 
-use crate::support::program::{fixtures, members};
+use crate::support::program::{fixtures, members, program};
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::Path;
@@ -16,7 +16,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Runs `flexbody` with these words in `folder`, with 2 GiB of address space.
 fn run(folder: &Path, words: &str) -> Output {
     let mut command = Command::new("sh");
-    command.args(["-c", "ulimit -v 2097152; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_flexbody")]);
+    command.args(["-c", "ulimit -v 2097152; exec \"$@\"", "sh"]).arg(program());
     command.args(words.split(' ')).current_dir(folder);
     let mut child = command
         .stdin(Stdio::null())
@@ -222,11 +222,8 @@ fn an_output_keeps_the_mode_of_the_file_that_it_replaces() {
     }
     // A file that is made has the mode that the umask leaves.
     let made = Command::new("sh")
-        .args([
-            "-c",
-            "umask 027; exec \"$0\" inspect body.h5 --report made.html",
-            env!("CARGO_BIN_EXE_flexbody"),
-        ])
+        .args(["-c", "umask 027; exec \"$0\" inspect body.h5 --report made.html"])
+        .arg(program())
         .current_dir(path)
         .output()
         .expect("the program");
@@ -264,7 +261,7 @@ fn so_many_threads_that_no_machine_has_them_are_no_fault() {
         .expect("written");
     let ended = run(path, "batch list.toml");
     assert!(ended.status.success(), "{}", said(&ended));
-    let ended = Command::new(env!("CARGO_BIN_EXE_flexbody"))
+    let ended = Command::new(program())
         .args(["convert", "model.toml", "--modes", "4", "-o", "other.h5"])
         .env("RAYON_NUM_THREADS", "1000000")
         .current_dir(path)
