@@ -9,31 +9,32 @@ use std::io::Write;
 #[global_allocator]
 static ALLOCATOR: process::Allocator = process::Allocator;
 
+/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread
+/// grows during it, up to a limit that may be small, and ends the process by a signal where there is no memory left.
 fn main() -> std::process::ExitCode {
+    const STACK: usize = 8 << 20;
     keep_freed_memory();
     process::prepare();
-    let arguments: &'static Arguments = match parse(&std::env::args_os().collect::<Vec<_>>()) {
-        Ok(arguments) => Box::leak(Box::new(arguments)),
-        Err(code) => return std::process::ExitCode::from(code as u8),
-    };
-    end_without_unfinished_files(arguments);
-    std::process::ExitCode::from(work(arguments) as u8)
-}
-
-/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread
-/// grows during it and ends the process by a signal where there is no memory left.
-fn work(arguments: &'static Arguments) -> ExitCode {
-    const STACK: usize = 8 << 20;
     let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
-    match worker.spawn(|| run(arguments)) {
-        // A thread that panics ends the process.
+    let code = match worker.spawn(command) {
+        // A panic ends the process.
         Ok(worker) => worker.join().unwrap_or(ExitCode::Bug),
         Err(error) => {
             let message = format!("not enough memory: no thread can be started: {error}");
             let _ = writeln!(std::io::stderr(), "{}", Diagnostic::new(Code::MemoryShort, message));
             ExitCode::Resources
         }
-    }
+    };
+    std::process::ExitCode::from(code as u8)
+}
+
+fn command() -> ExitCode {
+    let arguments: &'static Arguments = match parse(&std::env::args_os().collect::<Vec<_>>()) {
+        Ok(arguments) => Box::leak(Box::new(arguments)),
+        Err(code) => return code,
+    };
+    end_without_unfinished_files(arguments);
+    run(arguments)
 }
 
 /// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by

@@ -90,6 +90,7 @@ codes! {
     DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
     JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all nodes (of Nastran KGG and MGG) where it matters how the inertia changes with the deformation";
     DeckReference = "FB120", Note, Done, "reference node of a distributing coupling lies at the mean of its nodes", "nothing to do; an averaging interface of the nodes has their rotation as well";
+    OutputForbidden = "FB121", Error, BadInput, "output may not be written there", "choose another folder, or change the permissions of the folder or the file";
     MeshPartial = "FB124", Note, Done, "surface to draw the body by is not whole", "nothing to do for the results; connectors and springs are not drawn";
     MeshForeign = "FB125", Error, BadInput, "mesh is not that of the nodes", "give the mesh that the matrices were computed on, in the same units, or leave `mesh` out";
     ModesDiffer = "FB127", Warning, Done, "modes of the file are not those of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";

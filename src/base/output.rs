@@ -258,12 +258,12 @@ impl OutputSlot {
     /// # Errors
     /// [`OutputNotFile`](Code::OutputNotFile) when `path` is a folder, a device, empty or a circle of links;
     /// [`OutputFolderMissing`](Code::OutputFolderMissing) when the folder does not exist;
-    /// [`OutputUnwritable`](Code::OutputUnwritable) when `path` is a write-protected file, or no file can be
-    /// made in the folder.
+    /// [`OutputForbidden`](Code::OutputForbidden) when `path` is a write-protected file, or no file may be made in
+    /// the folder; [`OutputUnwritable`](Code::OutputUnwritable) when none can be made there.
     pub fn prepare(path: impl AsRef<Path>) -> Result<Self> {
         let asked = path.as_ref().to_path_buf();
         let target = target_of(&asked)?;
-        let unwritable = |why: String| fail(Code::OutputUnwritable, &asked, why);
+        let unwritable = |e: std::io::Error, why: String| fail(code_of(&e), &asked, why);
         let folder = folder_of(&target);
         match std::fs::metadata(folder) {
             Ok(meta) if meta.is_dir() => {}
@@ -275,7 +275,10 @@ impl OutputSlot {
                 let why = format!("folder {} does not exist", folder.display());
                 return Err(fail(Code::OutputFolderMissing, &asked, why));
             }
-            Err(e) => return Err(unwritable(format!("folder {}: {e}", folder.display()))),
+            Err(e) => {
+                let why = format!("folder {}: {e}", folder.display());
+                return Err(unwritable(e, why));
+            }
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
@@ -480,9 +483,12 @@ fn target_of(asked: &Path) -> Result<PathBuf> {
     match std::fs::metadata(asked) {
         Ok(meta) if !meta.is_file() => Err(not_a_file("it is not a regular file")),
         Ok(meta) if meta.permissions().readonly() => {
-            Err(fail(Code::OutputUnwritable, asked, "the existing file is write-protected".to_owned()))
+            Err(fail(Code::OutputForbidden, asked, "the existing file is write-protected".to_owned()))
         }
-        Ok(_) => std::fs::canonicalize(asked).map_err(|e| fail(Code::OutputUnwritable, asked, e.to_string())),
+        Ok(_) => std::fs::canonicalize(asked).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => not_a_file("the file that it leads to has been removed"),
+            _ => io(asked, &e),
+        }),
         // A name that is too long: the temporary file, whose own is short, would not show it.
         Err(e) if e.kind() == ErrorKind::InvalidFilename => Err(not_a_file(&e.to_string())),
         Err(_) => followed(asked).map_err(|e| not_a_file(&e.to_string())),
@@ -498,9 +504,14 @@ fn fail(code: Code, path: &Path, why: String) -> Error {
 }
 
 fn io(path: &Path, error: &std::io::Error) -> Error {
-    let code = match error.kind() {
+    fail(code_of(error), path, error.to_string())
+}
+
+/// The code of an output that cannot be made or written for this reason.
+pub(crate) fn code_of(error: &std::io::Error) -> Code {
+    match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Code::DiskShort,
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Code::OutputForbidden,
         _ => Code::OutputUnwritable,
-    };
-    fail(code, path, error.to_string())
+    }
 }

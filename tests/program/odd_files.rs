@@ -204,6 +204,30 @@ fn names_that_are_too_long_are_refused_before_the_work() {
     assert!(!members(path).iter().any(|name| name.starts_with(".flexbody")));
 }
 
+/// What may not be written is a matter of the user (exit code 2), not of the disk (4).
+#[test]
+fn outputs_that_may_not_be_written_are_refused_before_the_work() {
+    let folder = folder();
+    let path = folder.path();
+    fs::write(path.join("K.mtx"), "nothing to read").expect("written");
+    fs::write(path.join("old.h5"), "old").expect("written");
+    fs::set_permissions(path.join("old.h5"), Permissions::from_mode(0o444)).expect("a mode");
+    for (output, code) in [("old.h5", "FB121"), ("/proc/new.h5", "FB1"), ("/dev/stdout", "FB107")] {
+        let ended = run(path, &format!("convert model.toml -o {output}"));
+        assert!(said(&ended).contains(&format!("error[{code}")), "{output}: {}", said(&ended));
+    }
+    // A stream that is a file without a name.
+    let words = "exec \"$0\" convert model.toml -o /dev/stdout > gone; ";
+    let ended = Command::new("sh")
+        .args(["-c", &format!("exec 3> gone; rm gone; {}", words.replace("> gone", ">&3"))])
+        .arg(program())
+        .current_dir(path)
+        .output()
+        .expect("the program");
+    assert_eq!(ended.status.code(), Some(2), "{}", said(&ended));
+    assert!(said(&ended).contains("error[FB107]"), "{}", said(&ended));
+}
+
 #[test]
 fn an_output_keeps_the_mode_of_the_file_that_it_replaces() {
     let folder = folder();
