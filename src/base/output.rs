@@ -104,7 +104,7 @@ pub fn abandon_unfinished() -> Option<ExitCode> {
     abandon(book())
 }
 
-/// Does the work of [`abandon_unfinished`] without memory: allocates nothing and does not wait for long, since the
+/// Does the work of `abandon_unfinished` without memory: allocates nothing and does not wait for long, since the
 /// thread that is out of memory may hold the list itself. The next run removes the files that then stay.
 pub fn abandon_unfinished_soon() {
     for _ in 0..100 {
