@@ -78,6 +78,9 @@ echo "   $size bytes"
 # Without anything from outside: no environment, and no file but its own.
 env -i "$static" doctor | sed 's/^/   /'
 
+step "it ends as it should: signals, a panic, results that cannot be printed"
+FLEXBODY="$static" cargo test --locked --test program -- --include-ignored ends::
+
 step "its results are those of the ordinary build"
 for model in connecting_rod bracket_hex20 frame_beams; do
     for program in ordinary static; do

@@ -184,8 +184,7 @@ pub use base::error::{Error, ExitCode, Result};
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod program {
-    pub use crate::base::children::processes;
     pub use crate::base::memory::goes_without;
-    pub use crate::base::output::{abandon_unfinished, abandon_unfinished_soon};
-    pub use crate::cli::{Arguments, parse, run, tell_bug};
+    pub use crate::base::output::abandon_unfinished_soon;
+    pub use crate::cli::{Arguments, end, end_without_unfinished_files, parse, run, use_threads};
 }

@@ -2,45 +2,39 @@
 
 mod process;
 
-use flexbody::program::{Arguments, abandon_unfinished, parse, processes, run, tell_bug};
+use flexbody::program::{Arguments, end_without_unfinished_files, parse, run};
 use flexbody::{Code, Diagnostic, ExitCode};
-use std::io::{IsTerminal, Write};
+use std::io::Write;
 
 #[global_allocator]
 static ALLOCATOR: process::Allocator = process::Allocator;
 
+/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread
+/// grows during it, up to a limit that may be small, and ends the process by a signal where there is no memory left.
 fn main() -> std::process::ExitCode {
+    const STACK: usize = 8 << 20;
     keep_freed_memory();
     process::prepare();
-    let arguments = match parse(&std::env::args_os().collect::<Vec<_>>()) {
-        Ok(arguments) => arguments,
-        Err(code) => return std::process::ExitCode::from(code as u8),
+    let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
+    let code = match worker.spawn(command) {
+        // A panic ends the process.
+        Ok(worker) => worker.join().unwrap_or(ExitCode::Bug),
+        Err(error) => {
+            let message = format!("not enough memory: no thread can be started: {error}");
+            let _ = writeln!(std::io::stderr(), "{}", Diagnostic::new(Code::MemoryShort, message));
+            ExitCode::Resources
+        }
     };
-    // Where no handler can be set the work is done all the same: an interruption then leaves a temporary
-    // file, which the next run removes.
-    let ignored = process::Ignored::now();
-    let _ = ctrlc::set_handler(interrupted);
-    // A run of hours goes on when its terminal closes.
-    ignored.again();
-    std::process::ExitCode::from(work(arguments) as u8)
+    std::process::ExitCode::from(code as u8)
 }
 
-/// Runs the command on a thread of its own: its stack is there before the work, while that of the main thread
-/// grows during it and ends the process by a signal where there is no memory left.
-fn work(arguments: Arguments) -> ExitCode {
-    const STACK: usize = 8 << 20;
-    std::thread::scope(|scope| {
-        let worker = std::thread::Builder::new().name("flexbody".to_owned()).stack_size(STACK);
-        match worker.spawn_scoped(scope, || run(&arguments)) {
-            // The panic itself has been printed; this says what it means and what to do.
-            Ok(worker) => worker.join().unwrap_or_else(|_| tell_bug(&arguments)),
-            Err(error) => {
-                let message = format!("not enough memory: no thread can be started: {error}");
-                eprintln!("{}", Diagnostic::new(Code::MemoryShort, message));
-                ExitCode::Resources
-            }
-        }
-    })
+fn command() -> ExitCode {
+    let arguments: &'static Arguments = match parse(&std::env::args_os().collect::<Vec<_>>()) {
+        Ok(arguments) => Box::leak(Box::new(arguments)),
+        Err(code) => return code,
+    };
+    end_without_unfinished_files(arguments);
+    run(arguments)
 }
 
 /// Tells the allocator to keep freed blocks for later ones: given back to the system, they come again page by
@@ -58,15 +52,4 @@ fn keep_freed_memory() {
             libmimalloc_sys::mi_option_set(PURGE_DELAY.0, -1);
         }
     }
-}
-
-/// Ctrl-C, or SIGTERM: ends the process at once, whatever it is doing, and the programs that it waits for.
-fn interrupted() {
-    process::interrupt(&processes());
-    abandon_unfinished();
-    let mut stderr = std::io::stderr();
-    // A progress bar may stand on the line.
-    let line_end = if stderr.is_terminal() { "\n" } else { "" };
-    let _ = writeln!(stderr, "{line_end}interrupted: no unfinished file is left");
-    process::end(ExitCode::Interrupted);
 }

@@ -1,9 +1,9 @@
 //! What the program asks of its process: limits that give errors instead of signals, and an end without
 //! memory.
-#![allow(unsafe_code)] // an allocator, and calls of the C library that set and end a process
+#![allow(unsafe_code)] // an allocator, and calls of the C library that set limits of a process
 
 use flexbody::ExitCode;
-use flexbody::program::{abandon_unfinished_soon, goes_without};
+use flexbody::program::{abandon_unfinished_soon, end, goes_without};
 use mimalloc::MiMalloc;
 use std::alloc::{GlobalAlloc, Layout};
 use std::cell::Cell;
@@ -103,63 +103,6 @@ fn tell(text: &[u8]) {
 #[cfg(not(unix))]
 fn tell(text: &[u8]) {
     let _ = std::io::Write::write_all(&mut std::io::stderr(), text);
-}
-
-/// Asks other processes to end, as an interruption does: they leave nothing unfinished either.
-pub fn interrupt(processes: &[u32]) {
-    #[cfg(unix)]
-    for &process in processes {
-        // SAFETY: sends a signal to a program that this one has started; none is there to hear it when it has
-        // just ended, which is as well.
-        let _ = unsafe { libc::kill(process.cast_signed() as libc::pid_t, libc::SIGTERM) };
-    }
-    #[cfg(not(unix))]
-    let _ = processes;
-}
-
-/// Ends the process at once: other threads may be inside HDF5, whose own end waits for them or crashes.
-pub fn end(code: ExitCode) -> ! {
-    #[cfg(unix)]
-    // SAFETY: ends the process.
-    unsafe {
-        libc::_exit(code as i32)
-    }
-    #[cfg(not(unix))]
-    std::process::exit(code as i32)
-}
-
-/// The signals of an interruption that this process was started to ignore, as `nohup` and jobs in the background are.
-pub struct Ignored(#[cfg(unix)] Vec<libc::c_int>);
-
-impl Ignored {
-    /// Those of SIGHUP, SIGINT and SIGTERM that are ignored now.
-    pub fn now() -> Self {
-        #[cfg(unix)]
-        {
-            let is_ignored = |signal: &libc::c_int| {
-                // SAFETY: asks how a signal is handled, into a structure that zeros are valid for.
-                unsafe {
-                    let mut action: libc::sigaction = std::mem::zeroed();
-                    libc::sigaction(*signal, std::ptr::null(), &mut action) == 0
-                        && action.sa_sigaction == libc::SIG_IGN
-                }
-            };
-            Self([libc::SIGHUP, libc::SIGINT, libc::SIGTERM].into_iter().filter(is_ignored).collect())
-        }
-        #[cfg(not(unix))]
-        Self()
-    }
-
-    /// Ignores these again, where a handler has taken their place.
-    pub fn again(&self) {
-        #[cfg(unix)]
-        for &signal in &self.0 {
-            // SAFETY: sets how a signal is handled; the handler that was set before is never called for it.
-            unsafe {
-                libc::signal(signal, libc::SIG_IGN);
-            }
-        }
-    }
 }
 
 /// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files

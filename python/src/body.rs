@@ -6,7 +6,7 @@ use crate::errors::{diagnostics, warn};
 use crate::report::{loads, report};
 use crate::scene::{Motion, Scene, Selection, cases_of};
 use crate::trade::{Trade, options as trade_options};
-use crate::work::{brief, run};
+use crate::work::{alone, brief, run};
 use flexbody::{Diagnostic, FlexBody, Matrix};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -432,7 +432,7 @@ impl Body {
 /// was changed since it was written.
 #[pyfunction]
 pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Body> {
-    Ok(Body::new(brief(py, || FlexBody::read(&path))?, Vec::new()))
+    Ok(Body::new(alone(py, || FlexBody::read(&path))?, Vec::new()))
 }
 
 /// Formats that `Body.export` writes: name to the programs that read it.

@@ -3,7 +3,7 @@
 use crate::arrays::{Kept, shaped, triples, vector};
 use crate::errors::{diagnostics, warn};
 use crate::report::report;
-use crate::work::brief;
+use crate::work::{alone, brief};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -22,7 +22,7 @@ impl Scene {
     #[new]
     #[pyo3(signature = (path, case=None))]
     fn new(py: Python<'_>, path: PathBuf, case: Option<String>) -> PyResult<Self> {
-        let inner = brief(py, || match &case {
+        let inner = alone(py, || match &case {
             Some(case) => flexbody::Scene::read_case(&path, case),
             None => flexbody::Scene::read(&path),
         })?;
@@ -32,7 +32,7 @@ impl Scene {
     /// All load cases of a scene file, in its order; of a file without cases that is one scene.
     #[staticmethod]
     fn cases(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Scene>> {
-        let cases = brief(py, || flexbody::Scene::read_cases(&path))?;
+        let cases = alone(py, || flexbody::Scene::read_cases(&path))?;
         Ok(cases.into_iter().map(|inner| Self { inner }).collect())
     }
 
@@ -54,7 +54,7 @@ impl Scene {
             return Ok(scene.get().inner.clone());
         }
         let path: PathBuf = given.extract()?;
-        brief(py, || flexbody::Scene::read(&path))
+        alone(py, || flexbody::Scene::read(&path))
     }
 }
 
@@ -70,7 +70,7 @@ pub fn cases_of(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<Vec<flexbo
         return Ok(scenes.iter().map(|scene| scene.get().inner.clone()).collect());
     }
     let path: PathBuf = given.extract()?;
-    brief(py, || flexbody::Scene::read_cases(&path))
+    alone(py, || flexbody::Scene::read_cases(&path))
 }
 
 /// Which terms and modes a body needs in a scene.

@@ -1,12 +1,13 @@
 //! Long work: on a thread of its own, without the lock of the interpreter, and stopped by Ctrl-C.
 
 use crate::errors::{bug, exception};
-use flexbody::{Listener, Result};
+use flexbody::program::use_threads;
+use flexbody::{Code, Diagnostic, Listener, Result};
 use pyo3::prelude::*;
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
@@ -16,6 +17,26 @@ const INTERVAL: Duration = Duration::from_millis(50);
 /// Stack of the thread, as that of the program.
 const STACK: usize = 8 << 20;
 
+/// Process whose threads compute; 0 before the first work.
+static OWNER: AtomicU32 = AtomicU32::new(0);
+
+/// Starts the threads that compute, once. A process that was forked after that has none of them, and would wait for ever
+/// for their results: it gets an exception.
+fn start_threads(py: Python<'_>) -> PyResult<()> {
+    let own = std::process::id();
+    match OWNER.compare_exchange(0, own, Ordering::SeqCst, Ordering::SeqCst) {
+        Ok(_) => {
+            py.detach(|| use_threads(None));
+            Ok(())
+        }
+        Err(owner) if owner == own => Ok(()),
+        Err(owner) => {
+            let message = format!("process {own} was forked from {owner} after the first work of that");
+            Err(exception(py, &Diagnostic::new(Code::Forked, message).into()))
+        }
+    }
+}
+
 /// Does `work` on a thread of its own, while other threads of Python go on.
 ///
 /// Where Python has an exception for a signal (KeyboardInterrupt), the caller gets it at once. The work hears
@@ -24,6 +45,7 @@ pub fn run<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(Listener<'_>) -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
+    start_threads(py)?;
     let stopped = Arc::new(AtomicBool::new(false));
     let (send, mut receive) = sync_channel(1);
     let told = Arc::clone(&stopped);
@@ -49,8 +71,15 @@ pub fn run<T: Send + 'static>(
     }
 }
 
-/// Does short work, such as reading and writing a file, without the lock of the interpreter.
+/// Does short work that may take several threads, such as writing a file, without the lock of the interpreter.
 pub fn brief<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
+    start_threads(py)?;
+    alone(py, work)
+}
+
+/// Does short work on this thread alone, such as reading a file, without the lock of the interpreter. A process that was
+/// forked can do it, too.
+pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
     match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
         Ok(done) => done.map_err(|error| exception(py, &error)),
         Err(_) => Err(bug(py)),

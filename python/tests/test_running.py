@@ -122,8 +122,42 @@ def test_exit_codes_of_the_command(tmp_path: Path) -> None:
     assert run("compare", tmp_path / "cube.flex.h5", tmp_path / "cube.flex.h5").returncode == 0
 
 
+FORKED = """
+import os, sys, flexbody
+def child(work):
+    sys.stdout.flush()
+    pid = os.fork()
+    if pid == 0:
+        try:
+            print(work(), flush=True)
+        except flexbody.FlexbodyError as error:
+            print(type(error).__name__, *error.codes, flush=True)
+        os._exit(0)
+    os.waitpid(pid, 0)
+model, body = sys.argv[1:]
+convert = lambda: flexbody.convert(model, modes=4).n_modes
+child(convert)
+print(convert())
+flexbody.convert(model, modes=4).write(body)
+child(convert)
+child(lambda: flexbody.read_model(model).name)
+child(lambda: flexbody.read(body).write(body))
+child(lambda: flexbody.read(body).n_modes)
+child(lambda: len(flexbody.read(body).equations_of_motion().mass_matrix([0.0] * 4)))
+print(convert())
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="fork of Unix")
+def test_work_after_a_fork_is_refused(tmp_path: Path) -> None:
+    words = [sys.executable, "-W", "ignore", "-c", FORKED, MODELS / "cube_hex8" / "model.toml", tmp_path / "body.flex.h5"]
+    done = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
+    refused = "ResourceError FB606"
+    assert done.stdout.split("\n")[:-1] == ["4", "4", refused, refused, refused, "4", "10", "4"]
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of Unix")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGXCPU])
 def test_an_interrupted_command_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
     words = ["convert", str(LONG), "-o", str(tmp_path / "gear.flex.h5"), "--modes", "400", "--allow-long"]
     process = subprocess.Popen([sys.executable, "-m", "flexbody", *words], stderr=subprocess.PIPE, text=True)
@@ -132,5 +166,6 @@ def test_an_interrupted_command_leaves_nothing(tmp_path: Path, number: signal.Si
         time.sleep(0.01)
     process.send_signal(number)
     _, said = process.communicate(timeout=60)
-    assert process.returncode == 130 and "interrupted: no unfinished file is left" in said
+    code = 130 if number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) else -number
+    assert process.returncode == code and said.endswith(": no unfinished file is left\n")
     assert list(tmp_path.iterdir()) == []

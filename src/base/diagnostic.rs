@@ -91,6 +91,7 @@ codes! {
     DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
     JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all nodes (of Nastran KGG and MGG) where it matters how the inertia changes with the deformation";
     DeckReference = "FB120", Note, Done, "reference node of a distributing coupling lies at the mean of its nodes", "nothing to do; an averaging interface of the nodes has their rotation as well";
+    OutputForbidden = "FB121", Error, Resources, "output may not be written there", "choose another folder, or change the permissions of the folder or the file";
     MeshPartial = "FB124", Note, Done, "surface to draw the body by is not whole", "nothing to do for the results; connectors and springs are not drawn";
     MeshForeign = "FB125", Error, BadInput, "mesh is not that of the nodes", "give the mesh that the matrices were computed on, in the same units, or leave `mesh` out";
     ModesDiffer = "FB127", Warning, Done, "modes of the file are not those of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";
@@ -222,6 +223,7 @@ codes! {
     CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
     WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
     Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
+    Forked = "FB606", Error, Resources, "process has none of the threads that it computes with", "start processes by `spawn` or `forkserver`, or fork before the first work";
     // FB7xx: flex-body files and checkpoints
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
@@ -286,9 +288,12 @@ pub fn codes_markdown() -> String {
          | 1 | a check failed or a tolerance was exceeded; the inputs themselves were readable |\n\
          | 2 | bad input or usage |\n\
          | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
-         | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB104) |\n\
+         | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB121) |\n\
          | 70 | a bug of ours |\n\
-         | 130 | interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left |\n\n\
+         | 130 | interrupted (Ctrl-C), told to end (SIGTERM) or left by its terminal (SIGHUP); no unfinished file is left |\n\n\
+         Other signals that end a program end this one too, after its unfinished files: a shell tells 128 + the number\n\
+         of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
+         is, and the files that they would have replaced are there ([README](../README.md#output-files)).\n\n\
          A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
          `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
          | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",

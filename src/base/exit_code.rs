@@ -16,6 +16,6 @@ pub enum ExitCode {
     Resources = 4,
     /// A bug of ours.
     Bug = 70,
-    /// Interrupted (Ctrl-C) or told to end (SIGTERM); no unfinished file is left.
+    /// Interrupted (Ctrl-C), told to end (SIGTERM) or left by its terminal (SIGHUP); no unfinished file is left.
     Interrupted = 130,
 }

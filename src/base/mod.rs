@@ -5,6 +5,7 @@ pub mod children;
 pub mod diagnostic;
 pub mod error;
 mod exit_code;
+mod file_mode;
 #[cfg(feature = "hdf5")]
 pub(crate) mod hdf5_file;
 pub mod memory;

@@ -3,13 +3,21 @@
 //! A temporary file is locked as long as its process lives. A later run removes those in its output folders
 //! that nobody holds: what a process left that was killed. Several outputs of one run appear together, see
 //! [`OutputSlot::commit_all`].
+//!
+//! In a run of the program ([`begin_run`]) outputs that have their names are still taken back where the run ends
+//! otherwise than with its results: the files that stood there before get their names again. [`end_run`] makes them
+//! final; from there on the exit code is known, and a signal no longer changes it.
 
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, ExitCode, Result};
+#[cfg(unix)]
+use crate::base::file_mode::WORKING_MODE;
+use crate::base::file_mode::take_over;
 use crate::base::read_files::{followed, refuse_read};
-use std::fs::{File, OpenOptions};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 use tempfile::TempPath;
@@ -28,56 +36,114 @@ pub struct OutputSlot {
     asked: PathBuf,
     target: PathBuf,
     temporary: Temporary,
+    /// Properties of the file that stood there when the slot was made.
+    replaced: Option<Metadata>,
 }
 
-/// What this process knows of its temporary files, for the case that it is interrupted.
+/// The temporary files and the outputs of this process, for the case that it is interrupted.
 #[derive(Debug)]
 struct Book {
-    /// Those that exist.
+    /// Temporary files that exist.
     unfinished: Vec<PathBuf>,
     /// Folders that were searched for what killed processes left.
     swept: Vec<PathBuf>,
+    /// Outputs of the run that have their names and can still be taken back.
+    placed: Vec<Placed>,
+    run: Run,
 }
 
-static BOOK: Mutex<Book> = Mutex::new(Book { unfinished: Vec::new(), swept: Vec::new() });
+/// State of the run of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Run {
+    /// The library is used without the program: outputs are final at once.
+    None,
+    Going,
+    /// The outputs are final, and the process ends with this code.
+    Ended(ExitCode),
+}
+
+static BOOK: Mutex<Book> =
+    Mutex::new(Book { unfinished: Vec::new(), swept: Vec::new(), placed: Vec::new(), run: Run::None });
+
+/// True from the moment on at which the unfinished files are removed; the book is then locked for ever.
+static IS_ABANDONED: AtomicBool = AtomicBool::new(false);
 
 fn book() -> MutexGuard<'static, Book> {
     BOOK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes the temporary file of every slot, for a process that ends at once: from here on it can neither
-/// reserve nor finish an output file, and a thread that tries to waits for the end. Outputs that are being
-/// put in place together are waited for.
-pub fn abandon_unfinished() {
-    abandon(book());
+/// Begins a run of the program: from here on outputs can be taken back until [`end_run`].
+pub fn begin_run() {
+    book().run = Run::Going;
 }
 
-/// The same for a process without memory, which allocates nothing and does not wait for long: the thread that
-/// is out of memory may hold the list itself. What then stays is removed by the next run.
+/// Waits for ever in a process that an interruption is ending, so that nothing more is printed.
+pub fn stand_by() {
+    drop(book());
+}
+
+/// Ends the run: the exit code of the process is `code`, and its outputs are final. Where the run `has_results` no
+/// more, they are taken back: what stood in their places before is there again.
+pub fn end_run(code: ExitCode, has_results: bool) {
+    let mut book = book();
+    if has_results {
+        book.placed.iter().for_each(Placed::forget_old);
+    } else {
+        book.take_back();
+    }
+    book.placed.clear();
+    book.run = Run::Ended(code);
+}
+
+/// Removes the temporary file of every slot and takes outputs back, for a process that ends at once: from here on it
+/// can neither reserve nor finish an output file, and a thread that tries to waits for the end. Outputs that are
+/// being put in place together are waited for.
+///
+/// Returns the exit code of a run that has ended already: its outputs are final, and nothing is left to do.
+pub fn abandon_unfinished() -> Option<ExitCode> {
+    abandon(book())
+}
+
+/// Does the work of `abandon_unfinished` without memory: allocates nothing and does not wait for long, since the
+/// thread that is out of memory may hold the list itself. The next run removes the files that then stay.
 pub fn abandon_unfinished_soon() {
     for _ in 0..100 {
-        match BOOK.try_lock() {
-            Ok(book) => return abandon(book),
-            Err(TryLockError::Poisoned(poisoned)) => return abandon(poisoned.into_inner()),
-            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(10)),
+        if IS_ABANDONED.load(Ordering::SeqCst) {
+            return;
         }
+        let book = match BOOK.try_lock() {
+            Ok(book) => book,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                std::thread::sleep(Duration::from_millis(10));
+                continue;
+            }
+        };
+        abandon(book);
+        return;
     }
 }
 
-fn abandon(book: MutexGuard<'_, Book>) {
+fn abandon(book: MutexGuard<'_, Book>) -> Option<ExitCode> {
+    if let Run::Ended(code) = book.run {
+        return Some(code);
+    }
+    book.take_back();
     for file in &book.unfinished {
         // Nothing is left to do about a file that cannot be removed.
         let _ = std::fs::remove_file(file);
     }
+    IS_ABANDONED.store(true, Ordering::SeqCst);
     std::mem::forget(book);
+    None
 }
 
 /// A temporary file that the [`Book`] knows as long as it exists, and that is locked as long as this process
 /// lives.
 #[derive(Debug)]
 struct Temporary {
-    path: Option<TempPath>,
-    file: File,
+    /// Both are there until it is finished.
+    parts: Option<(TempPath, File)>,
 }
 
 impl Temporary {
@@ -89,20 +155,28 @@ impl Temporary {
             let (file, path) = builder.tempfile_in(folder)?.into_parts();
             if lock(&file) && is_at(&file, &path) {
                 book.unfinished.push(path.to_path_buf());
-                return Ok(Self { path: Some(path), file });
+                return Ok(Self { parts: Some((path, file)) });
             }
         }
         Err(std::io::Error::other("temporary files vanish as soon as they are made"))
     }
 
     fn path(&self) -> &Path {
-        self.path.as_ref().expect("there until it is finished")
+        &self.parts.as_ref().expect("there until it is finished").0
+    }
+
+    fn file(&self) -> &File {
+        &self.parts.as_ref().expect("there until it is finished").1
+    }
+
+    fn take(&mut self) -> (TempPath, File) {
+        self.parts.take().expect("there until it is finished")
     }
 }
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        if let Some(path) = self.path.take() {
+        if let Some((path, _file)) = self.parts.take() {
             let mut book = book();
             book.forget(&path);
             drop(path); // removes the file, while nobody abandons
@@ -111,6 +185,12 @@ impl Drop for Temporary {
 }
 
 impl Book {
+    /// Gives the files that stood there before their names again, the last one first: an output may have been put
+    /// in the place of another one of the same run.
+    fn take_back(&self) {
+        self.placed.iter().rev().for_each(Placed::put_back);
+    }
+
     fn forget(&mut self, path: &Path) {
         self.unfinished.retain(|other| other != path);
     }
@@ -178,12 +258,12 @@ impl OutputSlot {
     /// # Errors
     /// [`OutputNotFile`](Code::OutputNotFile) when `path` is a folder, a device, empty or a circle of links;
     /// [`OutputFolderMissing`](Code::OutputFolderMissing) when the folder does not exist;
-    /// [`OutputUnwritable`](Code::OutputUnwritable) when `path` is a write-protected file, or no file can be
-    /// made in the folder.
+    /// [`OutputForbidden`](Code::OutputForbidden) when `path` is a write-protected file, or no file may be made in
+    /// the folder; [`OutputUnwritable`](Code::OutputUnwritable) when none can be made there.
     pub fn prepare(path: impl AsRef<Path>) -> Result<Self> {
         let asked = path.as_ref().to_path_buf();
         let target = target_of(&asked)?;
-        let unwritable = |why: String| fail(Code::OutputUnwritable, &asked, why);
+        let unwritable = |e: std::io::Error, why: String| fail(code_of(&e), &asked, why);
         let folder = folder_of(&target);
         match std::fs::metadata(folder) {
             Ok(meta) if meta.is_dir() => {}
@@ -195,15 +275,23 @@ impl OutputSlot {
                 let why = format!("folder {} does not exist", folder.display());
                 return Err(fail(Code::OutputFolderMissing, &asked, why));
             }
-            Err(e) => return Err(unwritable(format!("folder {}: {e}", folder.display()))),
+            Err(e) => {
+                let why = format!("folder {}: {e}", folder.display());
+                return Err(unwritable(e, why));
+            }
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
-        // Temporary files are private by default; this one becomes the output: mode 666 less the umask.
+        // Temporary files are private by default. A new output has mode 666 less the umask; one that replaces a file
+        // gets the mode of that at the end, and nobody else reads it before.
+        let replaced = std::fs::metadata(&target).ok();
         #[cfg(unix)]
-        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(match replaced {
+            Some(_) => WORKING_MODE,
+            None => 0o666,
+        }));
         let temporary = Temporary::make(&builder, folder).map_err(|e| io(&asked, &e))?;
-        Ok(Self { asked, target, temporary })
+        Ok(Self { asked, target, temporary, replaced })
     }
 
     /// The path as the user gave it.
@@ -251,21 +339,38 @@ impl OutputSlot {
         Self::commit_all([self])
     }
 
+    /// Does the work of [`OutputSlot::commit_all`] for files that stay however the run ends: a checkpoint, the ledger of
+    /// a batch, the folder of a cluster.
+    ///
+    /// # Errors
+    /// Every error of [`OutputSlot::commit_all`].
+    pub fn keep_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
+        Self::place(slots, Lasting::Final)
+    }
+
     /// Makes the temporary files the outputs, all of them or none: every file is on the disk before the first
     /// gets its name, and a signal that ends the program waits until all have theirs. Where one cannot be put
-    /// in place, what stood in the places of the others before comes back, on file systems with hard links.
+    /// in place, what stood in the places of the others before comes back, on file systems with hard links; so it does
+    /// where a run of the program ends without results after this.
     ///
     /// # Errors
     /// Every error of [`OutputSlot::write`]; [`Usage`](Code::Usage) where one would replace a file that the run read.
     pub fn commit_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
+        Self::place(slots, Lasting::UntilEndOfRun)
+    }
+
+    fn place(slots: impl IntoIterator<Item = Self>, lasting: Lasting) -> Result<()> {
         let mut slots: Vec<Self> = slots.into_iter().collect();
         for slot in &slots {
             refuse_read(&slot.asked)?;
         }
         for slot in &slots {
-            slot.temporary.file.sync_all().map_err(|e| slot.failure(&e))?;
+            if let Some(replaced) = std::fs::metadata(&slot.target).ok().or_else(|| slot.replaced.clone()) {
+                take_over(slot.temporary.file(), &replaced);
+            }
+            slot.temporary.file().sync_all().map_err(|e| slot.failure(&e))?;
         }
-        let placed = place_all(&mut slots);
+        let placed = place_all(&mut slots, lasting);
         // The renames themselves are durable once the folders are synced; where folders cannot be opened they
         // are so already or cannot be made so, and the files are in place either way.
         let mut folders: Vec<&Path> = slots.iter().map(|slot| folder_of(&slot.target)).collect();
@@ -279,56 +384,83 @@ impl OutputSlot {
     }
 
     /// Another name for the file that stands in the place, for the case that it has to come back.
-    fn keep_old(&self) -> Option<PathBuf> {
+    fn keep_old(&self) -> Option<Old> {
         let mut name = self.temporary.path().file_name()?.to_os_string();
         name.push(SUFFIX);
-        let old = self.temporary.path().with_file_name(name);
-        std::fs::hard_link(&self.target, &old).is_ok().then_some(old)
+        let path = self.temporary.path().with_file_name(name);
+        std::fs::hard_link(&self.target, &path).ok()?;
+        // A shared lock keeps other runs from removing it as abandoned, and no reader from the file.
+        let lock = File::open(&path).ok().filter(|file| file.try_lock_shared().is_ok());
+        Some(Old { path, _lock: lock })
     }
 }
 
+/// How long an output that has its name can be taken back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lasting {
+    Final,
+    UntilEndOfRun,
+}
+
+/// Another name of a file that an output has replaced.
+#[derive(Debug)]
+struct Old {
+    path: PathBuf,
+    _lock: Option<File>,
+}
+
 /// An output in its place, and what is needed to undo that.
+#[derive(Debug)]
 struct Placed {
     target: PathBuf,
-    /// Another name of the file that stood there before.
-    old: Option<PathBuf>,
+    /// The output itself, locked: a file that another process has put there since is not touched.
+    file: File,
+    old: Option<Old>,
     replaced: bool,
 }
 
 /// Renames all files, or puts back what stood there before.
-fn place_all(slots: &mut [OutputSlot]) -> Result<()> {
+fn place_all(slots: &mut [OutputSlot], lasting: Lasting) -> Result<()> {
     // Held until the end: who abandons the unfinished waits for it.
     let mut book = book();
-    let several = slots.len() > 1;
+    let is_final = lasting == Lasting::Final || book.run != Run::Going;
+    let is_undoable = slots.len() > 1 || !is_final;
     let mut placed: Vec<Placed> = Vec::with_capacity(slots.len());
     for slot in slots {
         let replaced = slot.target.exists();
-        let old = several.then(|| slot.keep_old()).flatten();
-        let path = slot.temporary.path.take().expect("there until it is finished");
+        let old = is_undoable.then(|| slot.keep_old()).flatten();
+        let (path, file) = slot.temporary.take();
         book.forget(&path);
         let renamed = path.persist(&slot.target);
-        let done = Placed { target: slot.target.clone(), old, replaced };
+        let done = Placed { target: slot.target.clone(), file, old, replaced };
         if let Err(e) = renamed {
             done.forget_old();
-            placed.iter().for_each(Placed::put_back);
+            placed.iter().rev().for_each(Placed::put_back);
             return Err(slot.failure(&e.error));
         }
         placed.push(done);
     }
-    placed.iter().for_each(Placed::forget_old);
+    if is_final {
+        placed.iter().for_each(Placed::forget_old);
+    } else {
+        book.placed.append(&mut placed);
+    }
     Ok(())
 }
 
 impl Placed {
     fn forget_old(&self) {
         // One that stays is removed by the next run.
-        let _ = self.old.as_ref().map(std::fs::remove_file);
+        let _ = self.old.as_ref().map(|old| std::fs::remove_file(&old.path));
     }
 
     /// Undoes the rename. What cannot be undone stays as it is; the error of the run is told all the same.
     fn put_back(&self) {
+        if !is_at(&self.file, &self.target) {
+            return self.forget_old();
+        }
         let _ = match &self.old {
-            Some(old) => std::fs::rename(old, &self.target),
+            Some(old) => std::fs::rename(&old.path, &self.target),
             None if !self.replaced => std::fs::remove_file(&self.target),
             None => Ok(()),
         };
@@ -351,9 +483,14 @@ fn target_of(asked: &Path) -> Result<PathBuf> {
     match std::fs::metadata(asked) {
         Ok(meta) if !meta.is_file() => Err(not_a_file("it is not a regular file")),
         Ok(meta) if meta.permissions().readonly() => {
-            Err(fail(Code::OutputUnwritable, asked, "the existing file is write-protected".to_owned()))
+            Err(fail(Code::OutputForbidden, asked, "the existing file is write-protected".to_owned()))
         }
-        Ok(_) => std::fs::canonicalize(asked).map_err(|e| fail(Code::OutputUnwritable, asked, e.to_string())),
+        Ok(_) => std::fs::canonicalize(asked).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => not_a_file("the file that it leads to has been removed"),
+            _ => io(asked, &e),
+        }),
+        // A name that is too long: the temporary file, whose own is short, would not show it.
+        Err(e) if e.kind() == ErrorKind::InvalidFilename => Err(not_a_file(&e.to_string())),
         Err(_) => followed(asked).map_err(|e| not_a_file(&e.to_string())),
     }
 }
@@ -367,9 +504,14 @@ fn fail(code: Code, path: &Path, why: String) -> Error {
 }
 
 fn io(path: &Path, error: &std::io::Error) -> Error {
-    let code = match error.kind() {
+    fail(code_of(error), path, error.to_string())
+}
+
+/// The code of an output that cannot be made or written for this reason.
+pub(crate) fn code_of(error: &std::io::Error) -> Code {
+    match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Code::DiskShort,
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Code::OutputForbidden,
         _ => Code::OutputUnwritable,
-    };
-    fail(code, path, error.to_string())
+    }
 }

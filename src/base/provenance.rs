@@ -1,7 +1,7 @@
 //! What a result was made from: fingerprints of the input files and the generator's name.
 
 use crate::base::diagnostic::Diagnostic;
-use std::fs::File;
+use crate::base::read_files::open_regular;
 use std::io::Read;
 use std::ops::Deref;
 use std::path::Path;
@@ -115,7 +115,7 @@ pub fn sha256_hex(bytes: &[u8]) -> String {
 /// # Errors
 /// Those of reading it.
 pub fn sha256_of_file(path: &Path) -> std::io::Result<String> {
-    let (mut file, mut fingerprint) = (File::open(path)?, Fingerprint::default());
+    let (mut file, mut fingerprint) = (open_regular(path)?, Fingerprint::default());
     let mut piece = vec![0; 1 << 20];
     loop {
         match file.read(&mut piece)? {

@@ -6,6 +6,8 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -80,6 +82,35 @@ impl FileIdentity {
     pub fn is_same(&self, other: &Self) -> bool {
         self.path == other.path || (self.file.is_some() && self.file == other.file)
     }
+}
+
+/// Opens a regular file. A pipe is refused at once, where opening it would wait for its writer, and so is a device,
+/// which may never end.
+///
+/// # Errors
+/// Those of opening it, and [`ErrorKind::InvalidInput`] where it is something else.
+pub fn open_regular(path: &Path) -> std::io::Result<File> {
+    let meta = std::fs::metadata(path)?;
+    if meta.is_dir() {
+        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder"));
+    }
+    if !meta.is_file() {
+        return Err(Error::new(ErrorKind::InvalidInput, "it is not a regular file (a pipe or a device)"));
+    }
+    File::open(path)
+}
+
+/// Reads a regular file of at most `most` bytes as text.
+///
+/// # Errors
+/// Those of [`open_regular`] and of reading; [`ErrorKind::FileTooLarge`] where it is longer.
+pub fn read_text(path: &Path, most: u64) -> std::io::Result<String> {
+    let mut text = String::new();
+    open_regular(path)?.take(most + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > most {
+        return Err(Error::new(ErrorKind::FileTooLarge, format!("it has more than {most} bytes")));
+    }
+    Ok(text)
 }
 
 /// The file that an output path stands for: symbolic links are followed, to a file that does not exist yet as

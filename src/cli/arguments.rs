@@ -22,7 +22,8 @@ use std::path::PathBuf;
 #[command(version, about, max_term_width = 100, disable_help_subcommand = false)]
 #[command(
     after_help = "Exit codes: 0 done; 1 a check or tolerance failed; 2 bad input or usage; 3 no trustworthy \
-    numerical result; 4 not enough memory or disk, or an output that may not be written; 70 internal error; 130 interrupted, no unfinished file is left. Codes of all messages: docs/codes.md."
+    numerical result; 4 not enough memory or disk, or an output that may not be written; 70 internal error; 130 interrupted (SIGINT, SIGTERM, SIGHUP). Other signals: 128 + number. \
+    With 0 all outputs are in their places, with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/codes.md."
 )]
 pub struct Arguments {
     /// What to do.
@@ -270,7 +271,7 @@ pub struct TradeArguments {
     /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads; all results but the times do not depend on it [default: all processors]
+    /// Threads, at most four for each processor or 64; all results but the times do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// How to print.
@@ -315,7 +316,7 @@ pub struct SelectArguments {
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads; results do not depend on it [default: all processors]
+    /// Threads, at most four for each processor or 64; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// How to print.
@@ -345,7 +346,7 @@ pub struct SimulateArguments {
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads; results do not depend on it [default: all processors]
+    /// Threads, at most four for each processor or 64; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// How to print.
@@ -463,7 +464,7 @@ pub struct ConvertArguments {
     /// Who finds the modes.
     #[command(flatten)]
     pub engine: EngineArguments,
-    /// Threads; results do not depend on it [default: all processors]
+    /// Threads, at most four for each processor or 64; results do not depend on it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
     /// Print all that is known of the body instead of a summary

@@ -5,11 +5,11 @@ use super::arguments::{Arguments, Command, ConvertArguments};
 use super::convert::{model_files, wanted};
 use super::outcome::Outcome;
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
-use super::resources::memory_left;
+use super::resources::{for_threads, memory_left};
 use super::watcher::Watcher;
 use crate::base::children;
 use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
+use crate::base::error::{Error, ExitCode, Result};
 use crate::base::output::OutputSlot;
 use crate::base::progress::Event;
 use crate::body::basis::ModeSettings;
@@ -28,6 +28,9 @@ use std::time::Instant;
 
 /// Threads of a conversion where the list says nothing.
 const THREADS: u16 = 1;
+
+/// Most conversions at a time, whatever the list says: each takes a thread, a process and two pipes of this one.
+const MOST_PARALLEL: usize = 1024;
 
 /// Bytes that reading a body of another program takes: such files are small.
 const IMPORT: u64 = 500_000_000;
@@ -52,12 +55,10 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
         list.bodies.iter().zip(&parsed).try_for_each(|(body, (_, own))| refuse_programs(body, own))?;
     }
     let mut ledger = Ledger::of(&arguments.list);
+    ledger.reserve()?;
     let budget = Budget {
         memory: memory_left(arguments.memory_limit).unwrap_or(u64::MAX),
-        parallel: list.parallel.unwrap_or_else(|| {
-            let processors = std::thread::available_parallelism().map_or(1, usize::from);
-            (processors / usize::from(list.threads.unwrap_or(THREADS))).max(1)
-        }),
+        parallel: parallel(&list).min(MOST_PARALLEL),
     };
     let mut rows: Vec<BatchRow> = Vec::new();
     let mut waiting: Vec<(usize, Body)> = Vec::new();
@@ -96,6 +97,12 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
     });
     let (text, json) = (facts.render(Format::Text), facts.render(Format::Json));
     Ok(Outcome { text, json, passed: failed.is_none(), diagnostics: failed.into_iter().collect() })
+}
+
+/// Conversions at a time: as the list says, or as many as there are processors for their threads.
+fn parallel(list: &BatchList) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    list.parallel.unwrap_or_else(|| (processors / usize::from(list.threads.unwrap_or(THREADS))).max(1))
 }
 
 /// No output of the list, and no report, may replace an input of any of its bodies or another output.
@@ -173,7 +180,7 @@ fn need(body: &BatchBody, converted: &ConvertArguments, watcher: &Watcher) -> Re
     watcher.hear(Event::Phase("estimating"));
     let model = FeModel::from_raw(read_model(&model_files(converted)?)?)?.model;
     let settings = ModeSettings { wanted: wanted(converted, model.units()), ..ModeSettings::default() };
-    conversion_bytes(&model, &settings)
+    for_threads(converted.threads, || conversion_bytes(&model, &settings))
 }
 
 fn empty_row(body: &BatchBody) -> BatchRow {
@@ -230,11 +237,15 @@ fn work(
                 let (index, body) = waiting.remove(next);
                 running.push(body.need);
                 let (program, ended) = (program.clone(), ended.clone());
-                let limit = budget.limit(body.need);
-                scope.spawn(move || {
-                    // Somebody always listens: this thread ends before the loop does.
-                    let _ = ended.send(convert(&program, index, body, limit));
-                });
+                let (need, limit) = (body.need, budget.limit(body.need));
+                // The loop hears of it: it waits for as many as run.
+                let work = move || drop(ended.send(convert(&program, index, body, limit)));
+                if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, work) {
+                    running.pop();
+                    rows[index].error = Some(format!("it cannot be started: {error}"));
+                    rows[index].exit_code = ExitCode::Resources as i32;
+                    rows[index].memory_estimate_bytes = need;
+                }
             }
             if running.is_empty() {
                 return Ok(());

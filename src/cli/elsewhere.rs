@@ -2,8 +2,9 @@
 
 use super::arguments::ConvertArguments;
 use super::arguments::{EngineName, SolverName};
-use crate::base::diagnostic::{Code, Diagnostic};
+use crate::base::diagnostic::Diagnostic;
 use crate::base::error::{Error, Result};
+use crate::base::output::code_of;
 use crate::base::progress::{Event, Watch};
 use crate::body::basis::{BasisChoice, ModeSettings};
 use crate::cluster::{Engine, ModelReference, PrepareSettings, Prepared, Solver, prepare, read_found};
@@ -80,7 +81,7 @@ impl Elsewhere {
                     index_bytes: 4,
                     model: ModelReference::default(),
                 };
-                let prepared = in_made_folder(folder, || prepare(model, &asked, folder)?.commit())?;
+                let prepared = in_made_folder(folder, || prepare(model, &asked, folder)?.keep())?;
                 watch(Event::Phase("SLEPc"));
                 engine.run(&python, folder)?;
                 read_found(folder, &prepared, model, false)?
@@ -109,7 +110,7 @@ pub(super) fn in_made_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T>)
     let is_new = !folder.exists();
     std::fs::create_dir_all(folder).map_err(|e| {
         let message = format!("cannot make the folder {}: {e}", folder.display());
-        Error::from(Diagnostic::new(Code::OutputUnwritable, message))
+        Error::from(Diagnostic::new(code_of(&e), message))
     })?;
     let done = work();
     if done.is_err() && is_new {

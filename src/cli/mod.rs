@@ -11,6 +11,8 @@ mod completions;
 mod convert;
 mod doctor;
 mod elsewhere;
+mod ending;
+mod exit;
 mod export;
 mod import;
 mod inspect;
@@ -23,6 +25,8 @@ mod recipe;
 mod resources;
 mod response;
 mod select;
+#[cfg(unix)]
+mod signals;
 mod simulate;
 mod terminal;
 mod trade;
@@ -31,4 +35,7 @@ mod view;
 mod watcher;
 
 pub use arguments::Arguments;
-pub use output::{parse, run, tell_bug};
+pub use ending::end_without_unfinished_files;
+pub use exit::end;
+pub use output::{parse, run};
+pub use resources::use_threads;

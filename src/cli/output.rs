@@ -11,7 +11,8 @@ use super::{
 use crate::base::diagnostic::{Code, Diagnostic, Severity};
 use crate::base::error::{ExitCode, Result};
 use crate::base::memory::tell_left;
-use crate::base::read_files::begin_run;
+use crate::base::output::{begin_run, end_run, stand_by};
+use crate::base::read_files;
 use crate::report::output_json;
 use clap::{CommandFactory, Parser};
 use std::ffi::OsString;
@@ -65,11 +66,16 @@ pub fn run(arguments: &Arguments) -> ExitCode {
         _ => None,
     });
     let (name, printing) = command_of(arguments);
+    read_files::begin_run();
     begin_run();
     tell_left(|| memory_left(None));
     // In a thread of the pool: from any other one every loop in parallel is handed over, and waited for asleep.
     let outcome = rayon::scope(|_| outcome_of(arguments));
-    finish(Some(name), printing, outcome)
+    stand_by();
+    let has_outcome = outcome.is_ok();
+    let code = finish(Some(name), printing, outcome);
+    end_run(code, has_outcome && matches!(code, ExitCode::Done | ExitCode::CheckFailed));
+    code
 }
 
 fn outcome_of(arguments: &Arguments) -> Result<Outcome> {
@@ -119,7 +125,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
 }
 
 /// Tells that the program stopped at a contradiction of its own.
-pub fn tell_bug(arguments: &Arguments) -> ExitCode {
+pub(super) fn tell_bug(arguments: &Arguments) -> ExitCode {
     let (name, printing) = command_of(arguments);
     let message = "the program stopped at a contradiction of its own";
     finish(Some(name), printing, Err(Diagnostic::new(Code::Internal, message).into()))

@@ -8,6 +8,9 @@ use std::fmt::Write;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+/// Environment variable for tests of that end: the program panics when the phase begins that it names.
+const PANIC_AT: &str = "FLEXBODY_TEST_PANIC";
+
 /// Listens to a job: shows a bar for the current phase and adds up the time of each.
 pub(super) struct Watcher {
     bar: ProgressBar,
@@ -48,6 +51,7 @@ impl Watcher {
     pub(super) fn hear(&self, event: Event<'_>) {
         match event {
             Event::Phase(name) => {
+                assert!(std::env::var_os(PANIC_AT).is_none_or(|at| at != name), "{PANIC_AT} is {name}");
                 self.close();
                 self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).name = name.to_owned();
                 self.bar.set_message(name.to_owned());

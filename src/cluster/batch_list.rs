@@ -2,9 +2,12 @@
 
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
-use crate::base::read_files::note_read;
+use crate::base::read_files::{note_read, read_text};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
+
+/// Most bytes of a list: some hundred thousand bodies.
+const MOST: u64 = 64 << 20;
 
 /// Bodies to make, and what the machine may give them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -44,7 +47,7 @@ pub struct BatchBody {
 pub fn read_batch_list(path: &Path) -> Result<BatchList> {
     let wrong = |message: String| Error::from(Diagnostic::new(Code::BatchSyntax, message).in_file(path));
     note_read(path);
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(format!("the list cannot be read: {e}")))?;
+    let text = read_text(path, MOST).map_err(|e| wrong(format!("the list cannot be read: {e}")))?;
     let mut list: BatchList = toml::from_str(&text).map_err(|e| {
         let line = e.span().map_or(1, |span| 1 + text[..span.start].matches('\n').count());
         let found = Diagnostic::new(Code::BatchSyntax, e.message().to_owned());

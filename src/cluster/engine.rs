@@ -83,7 +83,8 @@ impl Engine {
     /// [`EngineMissing`](Code::EngineMissing).
     pub fn check(&self) -> Result<String> {
         let program = self.mpiexec.first().map_or("", String::as_str);
-        let version = Command::new(program).arg("--version").stdin(Stdio::null()).output();
+        let mut version = Command::new(program);
+        let version = children::output(version.arg("--version").stdin(Stdio::null()));
         version.map_err(|e| missing(program, &e))?;
         self.find_python()
     }
@@ -129,12 +130,12 @@ fn probe(python: &str) -> std::io::Result<Output> {
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
-    let mut child = command.spawn()?;
+    let mut child = children::start(&mut command)?;
     if let Some(mut input) = child.stdin.take() {
         // A program that does not read it says itself what it is.
         let _ = input.write_all(DRIVER_SOURCE.as_bytes());
     }
-    child.wait_with_output()
+    children::output_of(child)
 }
 
 /// What a program said about its failure: its own message where it has one, else its last line.

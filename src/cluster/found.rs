@@ -10,13 +10,12 @@ use super::sealed;
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::{SourceFile, sha256_of_file};
-use crate::base::read_files::note_read;
+use crate::base::read_files::{note_read, open_regular};
 use crate::body::basis::{CountElsewhere, SolvedModes, rigid_modes};
 use crate::model::FeModel;
 use faer::{Mat, MatRef};
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -197,7 +196,7 @@ impl Vectors<'_> {
             return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
         }
         note_read(self.path);
-        let file = File::open(self.path).map_err(failed)?;
+        let file = open_regular(self.path).map_err(failed)?;
         columns(BufReader::with_capacity(1 << 20, file), (n, count), index, place)
             .map_err(failed)?
             .ok_or_else(|| unreadable(format!("file does not hold {count} vectors of {n} finite numbers")))

@@ -50,6 +50,14 @@ impl Ledger {
         (body.inputs == inputs && is_there()).then_some(body)
     }
 
+    /// Makes sure before the work that the ledger can be written.
+    ///
+    /// # Errors
+    /// Those of [`OutputSlot::prepare`].
+    pub fn reserve(&self) -> Result<()> {
+        OutputSlot::prepare(&self.path).map(drop)
+    }
+
     /// Writes down that a body was made.
     ///
     /// # Errors
@@ -57,7 +65,9 @@ impl Ledger {
     pub fn add(&mut self, output: &Path, inputs: String, told: serde_json::Value) -> Result<()> {
         let Ok(sha) = sha256_of_file(output) else { return Ok(()) };
         self.done.insert(output.display().to_string(), DoneBody { inputs, output: sha, told });
-        OutputSlot::prepare(&self.path)?.write(sealed::seal(FORMAT, &self.done).as_bytes())
+        let slot = OutputSlot::prepare(&self.path)?;
+        slot.fill(sealed::seal(FORMAT, &self.done).as_bytes())?;
+        OutputSlot::keep_all([slot])
     }
 }
 

@@ -52,6 +52,15 @@ impl Preparation {
         OutputSlot::commit_all(self.slots)?;
         Ok(self.prepared)
     }
+
+    /// Gives all files their names, for a folder that stays where the run fails: another one goes on from it.
+    ///
+    /// # Errors
+    /// Every error of [`OutputSlot::commit_all`].
+    pub fn keep(self) -> Result<Prepared> {
+        OutputSlot::keep_all(self.slots)?;
+        Ok(self.prepared)
+    }
 }
 
 /// Writes what a cluster needs to find the modes of `model` into `folder`, which exists. K and M are written

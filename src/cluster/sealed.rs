@@ -4,13 +4,16 @@
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::provenance::sha256_hex;
-use crate::base::read_files::note_read;
+use crate::base::read_files::{note_read, read_text};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Version of the files that this program and its driver write.
 const VERSION: u32 = 1;
+
+/// Most bytes of such a file: ledgers of some hundred thousand bodies.
+const MOST: u64 = 1 << 30;
 
 #[derive(Serialize, Deserialize)]
 struct Head {
@@ -43,7 +46,7 @@ pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> 
 /// [`ClusterChanged`](Code::ClusterChanged) where its digest is another.
 pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
-    let text = std::fs::read_to_string(path).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    let text = read_text(path, MOST).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
     let not_ours = || unreadable(format!("file is no `{format}`"));
     let (head, body) = text.split_once('\n').ok_or_else(not_ours)?;
     let head: Head = serde_json::from_str(head).map_err(|_| not_ours())?;

@@ -94,7 +94,7 @@ mod unix {
         std::fs::write(&path, "reference").unwrap();
         std::fs::set_permissions(&path, PermissionsExt::from_mode(0o444)).unwrap();
         let error = flex_body_file::prepare_output(&path).unwrap_err();
-        assert!(error.has(Code::OutputUnwritable), "{error}");
+        assert!(error.has(Code::OutputForbidden), "{error}");
         assert_eq!(members(folder.path()), ["body.flex.h5"]);
     }
 

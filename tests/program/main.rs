@@ -11,6 +11,7 @@ mod cluster;
 mod command_line;
 mod comparison_coverage;
 mod docs_generated;
+mod ends;
 mod front_door;
 mod hostile_files;
 #[cfg(unix)]
@@ -20,6 +21,7 @@ mod json_output;
 mod kept_in_files;
 mod licences;
 mod limits;
+mod odd_files;
 mod replaced_inputs;
 mod report;
 mod report_comparison;

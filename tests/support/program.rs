@@ -7,6 +7,11 @@ pub fn fixtures() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures")
 }
 
+/// The program: that of this build, or the one that `FLEXBODY` names.
+pub fn program() -> PathBuf {
+    std::env::var_os("FLEXBODY").map_or_else(|| env!("CARGO_BIN_EXE_flexbody").into(), PathBuf::from)
+}
+
 /// Runs `flexbody` with `words` in `folder`.
 pub fn flexbody(folder: &Path, words: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_flexbody"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
 
@@ -11,18 +10,7 @@ from ._flexbody import run_command
 
 def main() -> int:
     """Runs the command line of this process and returns the exit code."""
-
-    def ended(number: int, frame: object) -> None:
-        raise KeyboardInterrupt
-
-    # Both leave no unfinished file.
-    signal.signal(signal.SIGINT, ended)
-    signal.signal(signal.SIGTERM, ended)
-    try:
-        return run_command(["flexbody", *sys.argv[1:]])
-    except KeyboardInterrupt:
-        line_end = "\n" if sys.stderr.isatty() else ""
-        sys.stderr.write(f"{line_end}interrupted: no unfinished file is left\n")
-        sys.stderr.flush()
-        # At once: the work goes on until the process has ended.
-        os._exit(130)
+    # The program handles signals that Python does not: a KeyboardInterrupt would wait for the end of the work.
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    return run_command(["flexbody", *sys.argv[1:]])

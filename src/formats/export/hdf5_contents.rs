@@ -3,6 +3,7 @@
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::Result;
 use crate::base::hdf5_file::{create, make, put_text};
+use crate::base::output::OutputSlot;
 use faer::Mat;
 use hdf5::types::{FixedAscii, FixedUnicode, TypeDescriptor};
 use hdf5_metno as hdf5;
@@ -120,10 +121,11 @@ fn array<T: hdf5::H5Type>(
 /// [`OutputUnwritable`](Code::OutputUnwritable) where there is no place for temporary files.
 pub(crate) fn hdf5_bytes(root: &[Hdf5Entry]) -> Result<Vec<u8>> {
     let make_bytes = || -> std::result::Result<Vec<u8>, String> {
-        let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
-        let path = folder.path().join("export.h5");
-        fill(root, &path).map_err(|e| e.to_string())?;
-        std::fs::read(&path).map_err(|e| e.to_string())
+        let name = format!("flexbody-export-{}.h5", std::process::id());
+        // The slot is never committed: its temporary file goes with it, also where a signal ends the program.
+        let slot = OutputSlot::prepare(std::env::temp_dir().join(name)).map_err(|e| e.to_string())?;
+        fill(root, slot.temporary()).map_err(|e| e.to_string())?;
+        std::fs::read(slot.temporary()).map_err(|e| e.to_string())
     };
     make_bytes().map_err(|why| {
         let message = format!("no HDF5 file in the folder for temporary files: {why}");

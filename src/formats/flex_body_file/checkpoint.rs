@@ -34,7 +34,7 @@ pub struct Checkpoint {
 /// as it was.
 pub fn write_checkpoint(snapshot: &Snapshot, model: &str, slot: OutputSlot) -> Result<()> {
     fill(snapshot, model, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))?;
-    slot.commit()
+    OutputSlot::keep_all([slot])
 }
 
 fn fill(snapshot: &Snapshot, model: &str, path: &Path) -> hdf5::Result<()> {

@@ -1,0 +1,45 @@
+//! The end of the program before its work is done: by a signal, or at a contradiction of its own.
+
+use super::arguments::Arguments;
+use super::exit::end;
+use super::output::tell_bug;
+#[cfg(unix)]
+use super::signals;
+use crate::base::error::ExitCode;
+use crate::base::output::abandon_unfinished_soon;
+use std::panic::PanicHookInfo;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Sees to it that the process, which runs this command and nothing else, leaves no unfinished file however it ends.
+pub fn end_without_unfinished_files(arguments: &'static Arguments) {
+    #[cfg(unix)]
+    signals::handle();
+    #[cfg(not(unix))]
+    let _ = ctrlc::set_handler(interrupted);
+    let print = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| panicked(panic, &print, arguments)));
+}
+
+/// Ends the program with exit code 70 at a panic on whatever thread. The program that is handed out has no tables for
+/// unwinding, and would end by SIGABRT after this.
+fn panicked(panic: &PanicHookInfo<'_>, print: &dyn Fn(&PanicHookInfo<'_>), arguments: &Arguments) {
+    static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
+    if HAS_BEGUN.swap(true, Ordering::SeqCst) {
+        // Another thread ends the program, or this one panics for the second time.
+        std::thread::sleep(Duration::from_secs(10));
+        end(ExitCode::Bug);
+    }
+    print(panic);
+    abandon_unfinished_soon();
+    end(tell_bug(arguments))
+}
+
+/// Ends the process at Ctrl-C, whatever it is doing.
+#[cfg(not(unix))]
+fn interrupted() {
+    use std::io::Write;
+    let ended = crate::base::output::abandon_unfinished();
+    let _ = writeln!(std::io::stderr(), "interrupted: no unfinished file is left");
+    end(ended.unwrap_or(ExitCode::Interrupted));
+}
