@@ -279,6 +279,7 @@ fn every_kind_of_file_gives_the_same_shapes() {
     let dataset = h5.new_dataset::<f32>().shape([n, k]).create("single").expect("dataset");
     dataset.write_raw(&single).expect("values");
     put(&h5, "double", [k, n], &lying);
+    drop(dataset);
     h5.close().expect("closed");
     let mut text = format!("%%MatrixMarket matrix array real general\n% a comment\n{n} {k}\n");
     lying.iter().for_each(|v| text += &format!("{v:e}\n"));

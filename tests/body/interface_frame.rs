@@ -244,8 +244,8 @@ fn the_command_makes_a_body_on_an_interface() {
     for words in [
         &["select", "held.flex.h5", "--scene", "scene.toml"][..],
         &["trade", "held.flex.h5", "--scene", "scene.toml"],
-        &["export", "held.flex.h5", "--to", "simscape", "-o", "held.mat"],
-        &["export", "held.flex.h5", "--to", "chrono", "-o", "held.csv"],
+        &["export", "held.flex.h5", "--to", "simscape", "--allow-loss", "-o", "held.mat"],
+        &["export", "held.flex.h5", "--to", "chrono", "--allow-loss", "-o", "held.csv"],
         &[
             "export",
             "held.flex.h5",
