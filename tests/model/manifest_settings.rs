@@ -94,7 +94,13 @@ fn residual_vectors_of_the_manifest_are_those_of_the_command_line_which_replaces
 
     let replaced = run(&stated, "--residual-vectors interfaces");
     assert!(loads(&replaced).iter().all(|name| name.starts_with("left") || name.starts_with("tip")));
-    assert_eq!(loads(&run(&stated, "--residual-vectors=")), Vec::<&str>::new());
+    // Without any the report says what free modes lack at the interfaces.
+    let without = run(&stated, "--residual-vectors=");
+    assert_eq!(loads(&without).len(), 12);
+    assert_eq!(without["model"]["settings"]["residual_vectors"], serde_json::json!([]));
+    for load in without["modes"]["truncation"].as_array().expect("a list") {
+        assert_eq!(load["before"], load["after"], "{load}");
+    }
 }
 
 #[test]
@@ -135,7 +141,7 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
     assert_eq!(names, ["force x at `tip`", "load `stretch`"]);
     let notes: Vec<_> =
         report["diagnostics"].as_array().expect("a list").iter().map(|d| &d["code"]).collect();
-    assert_eq!(notes, ["FB531"]);
+    assert_eq!(notes, ["FB531", "FB526"]);
     let (code, _, err) = flexbody(path, "check b.h5 --against model.toml");
     assert_eq!((code, err.as_str()), (0, ""), "no file has changed");
     let checks = json(path, "check b.h5 --against model.toml --json");

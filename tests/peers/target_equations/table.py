@@ -42,7 +42,7 @@ NOTES = {
     "i": "The moment acts on the axes $e^{\\tilde\\theta}$ at a random q ([6.8](theory.md)).",
     "j": "Refused (FB720).",
     "l": "At q = 0: Exudyn takes the moment of the undeformed centre of mass.",
-    "k": "Without groups 14 to 18 the modes of such a body do not move its centre of mass. `export` asks for `--allow-loss`.",
+    "k": "Without groups 14 to 18 the modes of such a body do not move its centre of mass. `export` refuses it.",
 }
 
 
