@@ -531,6 +531,8 @@ fn a_clamped_public_body_keeps_its_frame() {
         told.body.frames.iter().map(of_frame).fold(0.0, f64::max)
     };
     let given = read(&shared);
+    let notes = audit(&given, 1e-6).notes.join("\n");
+    assert!(notes.contains("the frame stands on 2 nodes that move in no mode, 1 to 21"), "{notes}");
     let source = SourceFile::new("body", &shared, "0".repeat(64));
     let taken = import_body(&given, source, UnitSystem::default(), &ImportFrame::Kept).expect("a body");
     // Surface lines are kept, stresses are told to be lost.

@@ -283,9 +283,9 @@ fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
     };
     let places = match &places_at_rest(frames)[..] {
         [] => String::new(),
-        [one] => format!("; the frame stands on node {one}, which rests in every mode"),
+        [one] => format!("; the frame stands on node {one}, which moves in no mode"),
         [first, .., last] => format!(
-            "; the frame stands on {} nodes that rest in every mode, {first} to {last}",
+            "; the frame stands on {} nodes that move in no mode, {first} to {last}",
             places_at_rest(frames).len()
         ),
     };
@@ -295,22 +295,14 @@ fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
 /// Displacement of a node relative to the largest of the mode up to which the node rests.
 const AT_REST: f64 = 1e-9;
 
-/// Labels of the nodes that neither move nor turn in any mode.
+/// Labels of the nodes that move in no mode; they may turn, as the ends of a body whose frame follows its chord.
 fn places_at_rest(frames: &[ImportedFrame]) -> Vec<&str> {
     let modes = frames.first().map_or(0, |frame| frame.translation.ncols());
-    let size = |a: &Mat<f64>, j: usize| a.col(j).norm_max();
-    let largest: Vec<[f64; 2]> = (0..modes)
-        .map(|j| {
-            let most = |of: &dyn Fn(&ImportedFrame) -> f64| frames.iter().map(of).fold(0.0, f64::max);
-            let turned = |frame: &ImportedFrame| frame.rotation.as_ref().map_or(0.0, |a| size(a, j));
-            [most(&|frame| size(&frame.translation, j)), most(&turned)]
-        })
-        .collect();
+    let size = |frame: &ImportedFrame, j: usize| frame.translation.col(j).norm_max();
+    let largest: Vec<f64> =
+        (0..modes).map(|j| frames.iter().map(|frame| size(frame, j)).fold(0.0, f64::max)).collect();
     let rests = |frame: &&ImportedFrame| {
-        largest.iter().enumerate().all(|(j, [moved, turned])| {
-            size(&frame.translation, j) <= AT_REST * moved
-                && frame.rotation.as_ref().is_none_or(|rotation| size(rotation, j) <= AT_REST * turned)
-        })
+        largest.iter().enumerate().all(|(j, largest)| size(frame, j) <= AT_REST * largest)
     };
     frames.iter().filter(rests).map(|frame| frame.label.as_str()).collect()
 }
