@@ -215,7 +215,7 @@ fn outputs_that_may_not_be_written_are_refused_before_the_work() {
     for (output, code) in [("old.h5", "FB121"), ("/proc/new.h5", "FB1"), ("/dev/stdout", "FB107")] {
         let ended = run(path, &format!("convert model.toml -o {output}"));
         assert!(said(&ended).contains(&format!("error[{code}")), "{output}: {}", said(&ended));
-        assert_eq!(ended.status.code() == Some(4), code == "FB121", "{output}");
+        assert!(code != "FB121" || ended.status.code() == Some(4), "{output}");
     }
     // A stream that is a file without a name.
     let words = "exec \"$0\" convert model.toml -o /dev/stdout > gone; ";

@@ -9,6 +9,10 @@ const BLOCK: usize = 8 << 20;
 /// Bytes that the first block has at the begin: it grows with what there is, for most files are small.
 const FIRST_BLOCK: usize = 1 << 16;
 
+/// Factor by which the first block grows. The allocator keeps the smaller blocks: doubling would leave as much as the
+/// largest once more.
+const GROWTH: usize = 16;
+
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
@@ -42,7 +46,7 @@ impl<'a> Blocks<'a> {
         self.carry.clear();
         while !ends && filled < BLOCK {
             if filled == block.len() {
-                block.resize((2 * filled).min(BLOCK), 0);
+                block.resize((GROWTH * filled).min(BLOCK), 0);
             }
             let count = self.stream.read(&mut block[filled..])?;
             filled += count;
