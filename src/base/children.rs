@@ -6,7 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often [`wait_for_all`] looks.
+/// Interval at which [`wait_for_all`] looks.
 const INTERVAL: Duration = Duration::from_millis(2);
 
 static RUNNING: Mutex<Running> = Mutex::new(Running { processes: Vec::new(), is_closed: false });
@@ -20,7 +20,7 @@ struct Running {
 /// Runs a program to its end, and keeps what it prints.
 ///
 /// # Errors
-/// Where it cannot be started, or this program is about to end.
+/// An error if the program cannot be started, or this program is about to end.
 pub fn output(command: &mut Command) -> std::io::Result<Output> {
     let child = start(command.stdout(Stdio::piped()).stderr(Stdio::piped()))?;
     output_of(child)
@@ -29,7 +29,7 @@ pub fn output(command: &mut Command) -> std::io::Result<Output> {
 /// Starts a program that ends with this one; [`output_of`] waits for it, on the same thread.
 ///
 /// # Errors
-/// Where it cannot be started, or this program is about to end.
+/// An error if the program cannot be started, or this program is about to end.
 pub fn start(command: &mut Command) -> std::io::Result<Child> {
     end_with_this_process(command);
     let mut running = running();
@@ -44,7 +44,7 @@ pub fn start(command: &mut Command) -> std::io::Result<Child> {
 /// Waits for the end of a program that [`start`] has started, and keeps what it prints.
 ///
 /// # Errors
-/// Those of reading what it prints.
+/// Every error of reading the output of the program.
 pub fn output_of(child: Child) -> std::io::Result<Output> {
     let id = child.id();
     let output = child.wait_with_output();

@@ -88,7 +88,7 @@ impl FileIdentity {
 /// which may never end.
 ///
 /// # Errors
-/// Those of opening it, and [`ErrorKind::InvalidInput`] where it is something else.
+/// Every error of opening the file, and [`ErrorKind::InvalidInput`] if it is something else.
 pub fn open_regular(path: &Path) -> std::io::Result<File> {
     let meta = std::fs::metadata(path)?;
     if meta.is_dir() {
@@ -103,7 +103,7 @@ pub fn open_regular(path: &Path) -> std::io::Result<File> {
 /// Reads a regular file of at most `most` bytes as text.
 ///
 /// # Errors
-/// Those of [`open_regular`] and of reading; [`ErrorKind::FileTooLarge`] where it is longer.
+/// Every error of [`open_regular`] and of reading; [`ErrorKind::FileTooLarge`] if the file is longer.
 pub fn read_text(path: &Path, most: u64) -> std::io::Result<String> {
     let mut text = String::new();
     open_regular(path)?.take(most + 1).read_to_string(&mut text)?;

@@ -91,7 +91,7 @@ fn is_ignored(signal: c_int) -> bool {
     action(signal).is_some_and(|action| action.sa_sigaction == libc::SIG_IGN)
 }
 
-/// How a signal is handled.
+/// Handling of a signal.
 fn action(signal: c_int) -> Option<sigaction> {
     // SAFETY: zeros are valid for the structure, which the call fills.
     unsafe {

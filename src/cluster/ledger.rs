@@ -53,7 +53,7 @@ impl Ledger {
     /// Makes sure before the work that the ledger can be written.
     ///
     /// # Errors
-    /// Those of [`OutputSlot::prepare`].
+    /// Every error of [`OutputSlot::prepare`].
     pub fn reserve(&self) -> Result<()> {
         OutputSlot::prepare(&self.path).map(drop)
     }

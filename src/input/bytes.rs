@@ -168,7 +168,7 @@ impl InputFile {
     /// The path of the file with its fingerprint and its state: enough to see later whether it changed.
     ///
     /// # Errors
-    /// As [`Self::sha256`].
+    /// Every error of [`Self::sha256`].
     pub(super) fn seen(&self) -> Result<SeenFile, Diagnostic> {
         Ok(SeenFile { path: self.path.clone(), sha256: self.sha256()?, state: self.state })
     }

@@ -1,4 +1,4 @@
-//! What messages quote of files that other files name: a manifest may name any file of the machine, whose text is not
+//! Quotes in messages of files that other files name: a manifest may name any file of the machine, whose text is not
 //! to reach those who see the messages.
 
 use crate::base::diagnostic::Diagnostic;

@@ -445,7 +445,7 @@ impl<'a> Responses<'a> {
         Some(Added { vectors: found.vectors, kept, dropped })
     }
 
-    /// What the free modes alone lack of each static response.
+    /// Returns the part of each static response that the free modes alone lack.
     fn lacking(&self) -> Vec<Truncation> {
         let error = |j: usize| {
             if self.deforms[j] { (self.energy_beside[j].max(0.0) / self.energy[j]).sqrt() } else { 0.0 }

@@ -11,7 +11,7 @@ use nalgebra::Matrix3;
 use std::borrow::Cow;
 
 impl FlexBody {
-    /// The same body in mean axes: rigid motion is taken out of the modes, which are normalised again (theory 5.2).
+    /// Returns the body in mean axes: rigid motion is taken out of the modes, which are normalised again (theory 5.2).
     /// A body in mean axes is returned as it is.
     ///
     /// # Errors
@@ -28,10 +28,10 @@ impl FlexBody {
         self.changed(&change, ReferenceConditions::MeanAxes).map(Cow::Owned)
     }
 
-    /// The same body in mean axes with its frame at `at`; `Model` keeps origin and axes.
+    /// Returns the body in mean axes with its frame at `at`; `Model` keeps origin and axes.
     ///
     /// # Errors
-    /// Those of [`FlexBody::in_mean_axes`].
+    /// Every error of [`FlexBody::in_mean_axes`].
     pub fn in_mean_axes_at(&self, at: BodyFrame) -> Result<Self> {
         let body = self.in_mean_axes()?.into_owned();
         let invariants = body.invariants();
@@ -49,11 +49,11 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// The same body with its frame on the interface `name`: origin at its reference point, axes of the model, the
+    /// Returns the body with its frame on the interface `name`: origin at its reference point, axes of the model, the
     /// modes those of the body that is held there (constrained modes in the span of the frame and the modes).
     ///
     /// # Errors
-    /// Those of [`FlexBody::carried`] and [`FlexBody::in_mean_axes`].
+    /// Every error of [`FlexBody::carried`] and [`FlexBody::in_mean_axes`].
     pub fn on_interface(&self, name: &str) -> Result<Self> {
         let conditions = ReferenceConditions::Interface(name.to_owned());
         if *self.conditions() == conditions {
@@ -105,7 +105,7 @@ impl FlexBody {
         Ok(())
     }
 
-    /// The same body after a change of its modes.
+    /// Returns the body after a change of its modes.
     fn changed(&self, change: &ModalChange, conditions: ReferenceConditions) -> Result<Self> {
         let mut parts = self.parts().clone();
         let invariants = change.invariants(&parts.invariants);

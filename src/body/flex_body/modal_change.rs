@@ -140,7 +140,7 @@ impl ModalChange {
     /// m_ff becomes the unit matrix and K_ff diagonal.
     ///
     /// # Errors
-    /// Those of [`ModalChange::to_mean_axes`].
+    /// Every error of [`ModalChange::to_mean_axes`].
     pub(crate) fn in_own_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let split = Split::new(invariants, dimension)?;
         let modes = eigenmodes(invariants, &split.deforming)?;

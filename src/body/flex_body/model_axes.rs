@@ -28,7 +28,7 @@ impl FlexBody {
         Ok(body)
     }
 
-    /// The same body in a frame at `origin` with the columns of `axes` as axes, both in the body frame: as
+    /// Returns the body in a frame at `origin` with the columns of `axes` as axes, both in the body frame: as
     /// [`FlexBody::in_model_axes`].
     ///
     /// # Errors

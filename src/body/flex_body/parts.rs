@@ -166,7 +166,7 @@ pub struct Parts {
     pub units: UnitSystem,
     /// Body frame.
     pub frame: Frame,
-    /// What ties the body frame to the deformed body.
+    /// Reference conditions that tie the body frame to the deformed body.
     pub conditions: ReferenceConditions,
     /// Node numbers and positions in the BODY frame.
     pub nodes: Nodes,

@@ -160,7 +160,7 @@ impl ModalCoordinates {
         })
     }
 
-    /// The same body in other modal coordinates.
+    /// Returns the body in other modal coordinates.
     fn changed(self, change: &ModalChange, frames: &[ImportedFrame]) -> Self {
         let positions: Vec<[f64; 3]> = frames.iter().map(|frame| frame.position).collect();
         let turns: Vec<bool> = frames.iter().map(|frame| frame.rotation.is_some()).collect();

@@ -4,7 +4,7 @@ use super::any_body::{ANY_BODY, DIGITS};
 use crate::body::invariants::{Expected, IdentityCheck, Invariants, identities};
 use crate::numerics::linalg::larger;
 
-/// What the digits of FE matrices leave of K_ff beside its diagonal, and more: so near to it, eigenvalues
+/// Limit of K_ff beside its diagonal, above what the digits of FE matrices leave: so near to it, eigenvalues
 /// differ from the diagonal by the square of this.
 const NEARLY_DIAGONAL: f64 = 1e-5;
 

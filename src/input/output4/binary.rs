@@ -32,7 +32,7 @@ impl Binary {
         ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(own)
     }
 
-    /// Where the columns of the matrices stand.
+    /// Place of the columns of the matrices.
     ///
     /// # Errors
     /// FB301, FB303, FB304 for records that are none of a matrix.

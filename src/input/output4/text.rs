@@ -67,7 +67,7 @@ fn format(text: &[u8]) -> Option<Format> {
     ((1..=100).contains(&format.per_line) && (8..=100).contains(&format.width)).then_some(format)
 }
 
-/// Where the columns of the matrices stand, and how their numbers are written.
+/// Place of the columns of the matrices, and notation of their numbers.
 ///
 /// # Errors
 /// FB301, FB303, FB304 for lines that are none of a matrix.

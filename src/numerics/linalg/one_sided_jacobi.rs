@@ -12,7 +12,7 @@ const MAX_SWEEPS: usize = 60;
 ///
 /// Rotations of pairs of columns make these orthogonal (Hestenes 1958). Every singular value of G = B D, D diagonal,
 /// is found to the rounding of the well-conditioned B, however widely the entries of D differ (Demmel, Veselic 1992).
-/// That is what a stiffness in modes of 1 Hz and of 1 MHz needs; a decomposition of G G' loses the small values.
+/// A stiffness in modes of 1 Hz and of 1 MHz needs these digits; a decomposition of G G' loses the small values.
 ///
 /// Returns `None` if a column is zero or an entry is not finite.
 pub fn left_singular_vectors(mut g: Mat<f64>) -> Option<(Vec<f64>, Mat<f64>)> {

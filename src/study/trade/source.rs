@@ -27,7 +27,7 @@ impl Source {
     /// The reference, or a body alone; with the time that it took to make it, where that is known.
     ///
     /// # Errors
-    /// Those of [`FlexBody::require_mean_axes`].
+    /// Every error of [`FlexBody::require_mean_axes`].
     pub fn new(name: impl Into<String>, body: FlexBody, preprocessing: Option<f64>) -> Result<Self> {
         body.require_mean_axes("trade")?;
         let mut parts = body.into_parts();

@@ -133,7 +133,7 @@ pub(crate) const DIALECTS: [Dialect; 5] = [
 ];
 
 /// EMBSlib (Modelica, github.com/vwaurich/EMBS_ModelicaLib), by the source of its reader, `ReadSID_C.h` of 2022-06-30.
-/// It knows the letter D alone in exponents, holds five digits of a whole number and 511 bytes of a line, and takes a
+/// EMBSlib knows the letter D alone in exponents, holds five digits of a whole number and 511 bytes of a line, and takes a
 /// line for the head of an array wherever one of mdCM, J, Ct, Cr, Me, Gr, Ge, Oe, ksigma, Ke, De, frame, refmod
 /// stands in it.
 pub(crate) const EMBS: Dialect = Dialect {
