@@ -261,6 +261,23 @@ fn the_command_makes_a_body_on_an_interface() {
         let (code, _, err) = run(words);
         assert!(code == Some(2) && err.contains("stands on interface `bolt_base`"), "{words:?}: {err}");
     }
+    // Written for another program and read again: kept, in mean axes, and on the node of the other interface.
+    let words = |line: &str| run(&line.split(' ').collect::<Vec<_>>());
+    for line in [
+        "export held.flex.h5 --to sid -o held.SID_FEM",
+        "convert --from sid held.SID_FEM --units mm,t,s -o kept.flex.h5",
+        "check kept.flex.h5",
+        "convert --from sid held.SID_FEM --units mm,t,s --frame com -o again.flex.h5",
+        "check again.flex.h5",
+        "compare again.flex.h5 mean.flex.h5",
+        "convert --from sid held.SID_FEM --units mm,t,s --frame interface=21010 -o wall.flex.h5",
+        "check wall.flex.h5",
+    ] {
+        let (code, out, err) = words(line);
+        assert_eq!(code, Some(0), "{line}: {out}{err}");
+    }
+    let (code, _, err) = words("compare kept.flex.h5 mean.flex.h5");
+    assert!(code == Some(2) && err.contains("other reference conditions"), "{err}");
     let (code, _, err) = convert(&["--frame", "interface=nobody", "-o", "none.flex.h5"]);
     assert!(code == Some(2) && err.contains("bolt_base, bolt_wall"), "{err}");
     let (code, _, err) = convert(&["--frame", "sideways", "-o", "none.flex.h5"]);
