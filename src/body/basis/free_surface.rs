@@ -39,7 +39,7 @@ impl Basis for FreeSurface {
         if self.residual_vectors.is_empty() {
             let Task { model, settings, resume, watch } = *task;
             let mut free = free_surface_resumed(model, settings, resume, watch)?;
-            free.truncation = interface_truncation(model, &free.solution, watch);
+            free.truncation = interface_truncation(model, &free.solution, settings, watch);
             return Ok(free);
         }
         free_modes_with(&self.residual_vectors, "residual vector", task)

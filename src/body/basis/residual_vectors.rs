@@ -14,7 +14,7 @@ use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
 use crate::base::progress::{Event, Watch};
 use crate::base::provenance::SourceFile;
-use crate::model::{Coupling, FeModel, InertialRows, RawShapes};
+use crate::model::{Coupling, FeModel, InertialRows, NodeSet, RawShapes};
 use crate::numerics::eigen::{
     Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Multigrid, Precision, ResponseAccuracy,
     Resume, Wanted, dynamic_responses, modes_of_span, static_responses, static_responses_twice,
@@ -314,10 +314,12 @@ pub(super) fn with_residual_vectors(
 pub(super) fn interface_truncation(
     model: &FeModel,
     free: &EigenSolution,
+    settings: &ModeSettings,
     watch: Watch<'_>,
 ) -> Vec<Truncation> {
     let has_levels = free.plan.is_some_and(|plan| plan.multigrid == Multigrid::Used);
-    if model.interfaces().is_empty() || has_levels || free.vectors.ncols() == 0 {
+    let unknown = has_levels || free.vectors.ncols() == 0 || !responses_fit(model, free, settings);
+    if model.interfaces().is_empty() || unknown {
         return Vec::new();
     }
     watch(Event::Phase("compliance of the interfaces"));
@@ -330,6 +332,17 @@ pub(super) fn interface_truncation(
         Ok(Responses::new(&problem, free, &loads, beside).lacking())
     };
     found().unwrap_or_default()
+}
+
+/// True if the responses to all loads at interfaces fit the memory beside a factor like that of the search.
+fn responses_fit(model: &FeModel, free: &EigenSolution, settings: &ModeSettings) -> bool {
+    /// Blocks of all loads that are held at once: forces, responses, and these times K and M.
+    const BLOCKS: usize = 5;
+    let loads = |set: &NodeSet| if set.coupling() == Coupling::Free { 3 * set.nodes.len() } else { 6 };
+    let columns: usize = model.interfaces().iter().map(loads).sum();
+    let bytes = (BLOCKS * columns * free.vectors.nrows() * size_of::<f64>()) as u64;
+    let factor = free.plan.map_or(0, |plan| plan.bytes);
+    settings.memory.is_none_or(|most| bytes.saturating_add(factor) <= most)
 }
 
 /// What free modes do not have of the responses to loads (N x m).
