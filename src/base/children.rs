@@ -1,5 +1,5 @@
 //! Programs that this one has started and waits for. They end with it: an interruption of this one alone, as by a queue
-//! that ends a job, is passed on to them, and on Linux they are told to end where this one is killed.
+//! that ends a job, is passed on to them, and on Linux they are terminated where this one is killed.
 #![cfg_attr(target_os = "linux", allow(unsafe_code))] // a system call between fork and exec
 
 use std::process::{Child, Command, Output, Stdio};

@@ -395,7 +395,7 @@ impl OutputSlot {
     }
 }
 
-/// Extent of the time in which an output that has its name can be taken back.
+/// Time during which an output that has its name can be taken back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lasting {
     Final,

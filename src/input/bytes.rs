@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::SystemTime;
 
-/// Bytes at the begin of a file that are read when it is opened: formats are told by them.
+/// Bytes at the start of a file that are read when it is opened, from which its format is recognised.
 const HEAD_BYTES: usize = 4096;
 
 /// Bytes that a decoder of a compressed file is given at a time.

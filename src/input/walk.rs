@@ -74,7 +74,7 @@ pub(crate) struct Walk<'a> {
 impl Walk<'_> {
     /// Returns the findings in the order of lines, the first of them where there are many.
     fn told(mut self) -> Vec<Diagnostic> {
-        /// Findings that are told one by one.
+        /// Largest number of findings that are listed.
         const SHOWN: usize = 200;
         self.found.sort_by_key(Diagnostic::line);
         let more = self.found.len().saturating_sub(SHOWN);

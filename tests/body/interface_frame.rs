@@ -3,12 +3,11 @@
 
 use crate::support::elements::{Kind, MassRule, Material};
 use crate::support::general::raw_fixture;
+use crate::support::held::HeldModel;
 use crate::support::mesh::Mesh;
 use crate::support::plane::rectangle;
 use crate::support::program::{fixtures, flexbody};
 use crate::support::random::Random;
-use crate::support::reference::dense;
-use faer::Mat;
 use flexbody::base::diagnostic::Code;
 use flexbody::base::error::Result;
 use flexbody::base::progress::SILENT;
@@ -20,7 +19,6 @@ use flexbody::body::verification::{own_identities, verify};
 use flexbody::formats::flex_body_file;
 use flexbody::model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody::numerics::eigen::{Accuracy, Wanted};
-use nalgebra::{DMatrix, Vector3};
 
 const SOFT: Material = Material { youngs: 1e7, poisson: 0.0, density: 1000.0 };
 const ALL: usize = 54;
@@ -51,38 +49,8 @@ fn checked(raw: RawModel) -> FeModel {
     FeModel::from_raw(raw).expect("a body").model
 }
 
-fn matrix(a: &Mat<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
-}
-
 fn failed(checks: Vec<flexbody::body::invariants::IdentityCheck>) -> Vec<String> {
     checks.into_iter().filter(|check| !check.passed).map(|check| format!("{check:?}")).collect()
-}
-
-/// Eigenvalues of K and M with the mean motion of `nodes` held (dense, all rows displacements).
-fn held_eigenvalues(raw: &RawModel, nodes: &[i64]) -> Vec<f64> {
-    let (k, m) = (matrix(&dense(&raw.stiffness.matrix)), matrix(&dense(&raw.mass.matrix)));
-    let at = |i: usize| Vector3::from(raw.nodes.positions[i]);
-    let rows: Vec<usize> = nodes.iter().map(|id| *id as usize - 1).collect();
-    let centre = rows.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / rows.len() as f64;
-    let mut rigid = DMatrix::zeros(k.nrows(), 6);
-    for &i in &rows {
-        for axis in 0..3 {
-            let turn = Vector3::ith(axis, 1.0).cross(&(at(i) - centre));
-            rigid[(3 * i + axis, axis)] = 1.0;
-            (0..3).for_each(|c| rigid[(3 * i + c, 3 + axis)] = turn[c]);
-        }
-    }
-    let eigen = (&rigid * rigid.transpose()).symmetric_eigen();
-    let free: Vec<usize> = (0..k.nrows()).filter(|&j| eigen.eigenvalues[j].abs() < 1e-9).collect();
-    let motions = DMatrix::from_fn(k.nrows(), free.len(), |i, j| eigen.eigenvectors[(i, free[j])]);
-    let (k, m) = (motions.tr_mul(&k) * &motions, motions.tr_mul(&m) * &motions);
-    let lower = m.cholesky().expect("mass").l();
-    let half = lower.solve_lower_triangular(&k).expect("regular");
-    let small = lower.solve_lower_triangular(&half.transpose()).expect("regular");
-    let mut values: Vec<f64> = small.symmetric_eigenvalues().iter().copied().collect();
-    values.sort_by(f64::total_cmp);
-    values
 }
 
 #[test]
@@ -92,9 +60,8 @@ fn with_all_modes_the_eigenvalues_are_those_of_the_held_model() {
     let conversion = on_interface(&model, "root", BasisChoice::default(), ALL).expect("a body");
     let body = conversion.body;
     assert_eq!(*body.conditions(), ReferenceConditions::Interface("root".to_owned()));
-    for (own, expected) in
-        body.modes().eigenvalue.iter().zip(held_eigenvalues(&raw, &raw.interfaces[0].nodes))
-    {
+    let held = HeldModel::new(&raw, &raw.interfaces[0].nodes);
+    for (own, expected) in body.modes().eigenvalue.iter().zip(held.eigenvalues()) {
         assert!((own / expected - 1.0).abs() < 1e-8, "{own:e}, {expected:e}");
     }
     assert_eq!(failed(own_identities(&body)), Vec::<String>::new());

@@ -535,7 +535,7 @@ fn a_clamped_public_body_keeps_its_frame() {
     assert!(notes.contains("the frame stands on 2 nodes that move in no mode, 1 to 21"), "{notes}");
     let source = SourceFile::new("body", &shared, "0".repeat(64));
     let taken = import_body(&given, source, UnitSystem::default(), &ImportFrame::Kept).expect("a body");
-    // Surface lines are kept, stresses are told to be lost.
+    // Surface lines are kept, stresses are reported as lost.
     assert!(taken.body.mesh().is_some_and(|mesh| mesh.edges().len() == 20));
     assert!(taken.diagnostics.iter().any(|d| d.message().contains("nodal stress matrix")));
     let folder = tempfile::tempdir().expect("a folder");

@@ -47,7 +47,7 @@ fn unpacked_rod() -> TempDir {
     folder
 }
 
-/// An FE program starts again while its matrices are read: their files are cut off, and written anew.
+/// An FE program starts again while its matrices are read: their files are cut off, and written again.
 #[cfg(unix)]
 #[test]
 #[ignore = "slow"]
@@ -254,7 +254,7 @@ fn a_deck_includes_no_more_than_a_thousand_files() {
     assert!(run.status.code() == Some(2) && said.contains("FB110") && said.contains("1000 times"), "{said}");
 }
 
-/// Mistakes that a manifest has many times are told a few times, and no more interfaces are read than a body can have.
+/// Mistakes that a manifest has many times are listed a few times, and no more interfaces are read than a body can have.
 #[test]
 fn a_manifest_with_very_many_interfaces_is_refused_in_short() {
     let folder = tet4();

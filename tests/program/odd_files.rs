@@ -146,7 +146,7 @@ fn pipes_and_devices_that_files_name_are_no_inputs() {
     assert!(!members(path).iter().any(|name| name.starts_with("new") || name.starts_with(".flexbody")));
 }
 
-/// What a batch and a prepared folder keep for themselves may be something else, too.
+/// The files that a batch and a prepared folder keep for themselves may be something else, too.
 #[test]
 fn pipes_in_the_places_of_files_that_the_program_keeps_are_refused() {
     let folder = folder();
@@ -270,7 +270,7 @@ fn an_output_keeps_the_owner_of_the_file_that_it_replaces() {
     assert_eq!((after.uid(), after.gid(), after.mode()), (before.uid(), before.gid(), before.mode()));
 }
 
-/// As many threads as are asked for would leave no memory to go on with.
+/// A run is asked for so many threads that these would leave no memory to go on with.
 #[test]
 fn so_many_threads_that_no_machine_has_them_are_no_fault() {
     let folder = folder();

@@ -13,6 +13,7 @@ pub mod file_bodies;
 pub mod files;
 pub mod flexible;
 pub mod general;
+pub mod held;
 pub mod integrate;
 pub mod jointed;
 pub mod mesh;

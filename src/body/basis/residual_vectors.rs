@@ -460,28 +460,30 @@ impl<'a> Responses<'a> {
 
     /// Returns the part of each static response that the free modes alone lack.
     fn lacking(&self) -> Vec<Truncation> {
-        let error = |j: usize| {
-            if self.deforms[j] { (self.energy_beside[j].max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
+        let lacking = |(j, load): (usize, &String)| {
+            let error = self.error(self.energy_beside[j], j);
+            Truncation { load: load.clone(), before: error, after: error }
         };
-        let names = self.loads.names.iter().enumerate();
-        names.map(|(j, load)| Truncation { load: load.clone(), before: error(j), after: error(j) }).collect()
+        self.loads.names.iter().enumerate().map(lacking).collect()
+    }
+
+    /// Norm in K of a part of the response `j`, given by its square, relative to that of the whole response.
+    fn error(&self, part: f64, j: usize) -> f64 {
+        if self.deforms[j] { (part.max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
     }
 
     /// What the free modes lack of each static response, and what the modes of the whole span do.
-    fn truncation(self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
+    fn truncation(mut self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
         let modal = gram(ritz.vectors.as_ref(), self.loads.forces.as_ref());
         let amplitudes =
             Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| -modal[(p, j)] / ritz.eigenvalues[p]);
-        let mut rest = self.whole;
+        let mut rest = std::mem::replace(&mut self.whole, Mat::new());
         add_combination(rest.as_mut(), ritz.vectors.as_ref(), amplitudes.as_ref());
         let rest = column_products(rest.as_ref(), problem.pencil.apply_stiffness(rest.as_ref()).as_ref());
-        let error = |part: f64, j: usize| {
-            if self.deforms[j] { (part.max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
-        };
         let truncation = |(j, name): (usize, &String)| Truncation {
             load: name.clone(),
-            before: error(self.energy_beside[j], j),
-            after: error(rest[j], j),
+            before: self.error(self.energy_beside[j], j),
+            after: self.error(rest[j], j),
         };
         let is_static = |(j, _): &(usize, &String)| self.loads.frequencies[*j].1 == 0.0;
         self.loads.names.iter().enumerate().filter(is_static).map(truncation).collect()

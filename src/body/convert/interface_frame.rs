@@ -126,17 +126,14 @@ fn motion_of_interface(
         let rotations = modes.rotations.as_ref().map(Mat::as_ref);
         interface.rows(&nodes, modes.of_nodes(), rotations, model.dimension())
     };
-    let determined = own.and_then(rows).and_then(|rows| Some((rows.translation, rows.rotation?)));
-    let Some((translation, rotation)) = determined else {
+    let Some(motion) = own.and_then(rows).and_then(|rows| rows.rigid_motion()) else {
         return Err(impossible(format!(
             "the nodes of interface `{name}` lie on one line: its orientation is not known, no frame can stand on it"
         )));
     };
-    let all = |i: usize, j: usize| if i < 3 { translation[(i, j)] } else { rotation[(i - 3, j)] };
-    let nf = translation.ncols();
     Ok(match model.dimension() {
-        2 => Mat::from_fn(3, nf, |i, j| all([0, 1, 5][i], j)),
-        _ => Mat::from_fn(6, nf, all),
+        2 => Mat::from_fn(3, motion.ncols(), |i, j| motion[([0, 1, 5][i], j)]),
+        _ => motion,
     })
 }
 

@@ -11,6 +11,7 @@
 //! interface: no constraint is left to solve. The body that hangs from the interface has the eigenpairs of
 //! (K_ff, m_ff), with m_ff of the new modes.
 
+use super::rigid_motion::{rotations_without, shapes_without, stacked};
 use super::{FlexBody, Groups, LoadKind, ReferenceConditions};
 use crate::base::diagnostic::{Code, Diagnostic};
 use crate::base::error::{Error, Result};
@@ -70,9 +71,9 @@ impl FlexBody {
     /// model, and the modes are those of the head of this module. A body that is carried already is returned
     /// as it is.
     ///
-    /// Geometric stiffness is left out, whatever frame the body has: what stresses the carried body are the loads together with the
-    /// reaction at the interface. The stiffness of inertia follows from the moments of the nodes and their
-    /// rotations relative to the carrier.
+    /// Geometric stiffness is left out, whatever frame the body has: the loads together with the reaction at the
+    /// interface stress the carried body. The stiffness of inertia follows from the moments of the nodes and
+    /// their rotations relative to the carrier.
     ///
     /// # Errors
     /// FB212 for names that the body has not; FB214 where `carrier` has no reference point or no orientation,
@@ -99,22 +100,8 @@ impl FlexBody {
             Carrier::Interface(name) => ReferenceConditions::Interface(name.clone()),
             Carrier::Node(_) => ReferenceConditions::Unstated,
         };
-        let taken = |node: usize, k: usize, j: usize| {
-            let x = parts.nodes.positions[node];
-            let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-            motion[(k, j)] + motion[(3 + l, j)] * x[m] - motion[(3 + m, j)] * x[l]
-        };
-        let (rows, nf) = (parts.modes.shape.nrows(), motion.ncols());
-        parts.modes.shape =
-            Mat::from_fn(rows, nf, |row, j| parts.modes.shape[(row, j)] - taken(row / 3, row % 3, j));
-        parts.modes.rotation = parts.modes.rotation.map(|rotation| {
-            // Nodes without rotations have zeros in their place.
-            let turns = |node: usize| (0..nf).any(|j| (0..3).any(|k| rotation[(3 * node + k, j)] != 0.0));
-            let turns: Vec<bool> = (0..rows / 3).map(turns).collect();
-            Mat::from_fn(rows, nf, |row, j| {
-                if turns[row / 3] { rotation[(row, j)] - motion[(3 + row % 3, j)] } else { 0.0 }
-            })
-        });
+        parts.modes.shape = shapes_without(&motion, &parts.modes.shape, &parts.nodes.positions);
+        parts.modes.rotation = parts.modes.rotation.map(|rotation| rotations_without(&motion, &rotation));
         parts.invariants = parts.invariants.without_rigid_motion(motion.as_ref());
         for lumped in &mut parts.lumped {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
@@ -290,12 +277,11 @@ impl FlexBody {
                     let why = if interface.coupling == Some(Coupling::Free) { " (it is free)" } else { "" };
                     return Err(refused(format!("interface `{name}` has no reference point{why}")));
                 };
-                let Some(rotation) = rows.rotation else {
+                let Some(motion) = rows.rigid_motion() else {
                     return Err(refused(format!(
                         "the nodes of interface `{name}` lie on one line: its orientation is not known"
                     )));
                 };
-                let motion = stacked(&rows.translation, &rotation);
                 Ok(CarriedPoint { reference: Vector3::from(reference), motion })
             }
         }
@@ -304,10 +290,6 @@ impl FlexBody {
 
 fn refused(message: String) -> Error {
     Diagnostic::new(Code::CarrierImpossible, message).into()
-}
-
-fn stacked(upper: &Mat<f64>, lower: &Mat<f64>) -> Mat<f64> {
-    Mat::from_fn(6, upper.ncols(), |i, j| if i < 3 { upper[(i, j)] } else { lower[(i - 3, j)] })
 }
 
 /// Energy, relative to that of the direction with most, below which there is nothing in a direction.

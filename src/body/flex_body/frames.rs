@@ -128,12 +128,6 @@ impl FlexBody {
     fn changed_modes(&self, change: &ModalChange, invariants: &Invariants) -> Modes {
         let (old, positions) = (self.modes(), &self.nodes().positions);
         let eigenvalue = diagonal_eigenvalues(invariants);
-        let rotation = old.rotation.as_ref().map(|rotation| {
-            let turns = |node: usize| {
-                (0..rotation.ncols()).any(|j| (0..3).any(|k| rotation[(3 * node + k, j)] != 0.0))
-            };
-            change.rotations(rotation, &(0..positions.len()).map(turns).collect::<Vec<_>>())
-        });
         let damping = self.damping();
         let modal_damping = (damping.norm_max() > 0.0).then(|| change.congruent(&damping));
         let ratio = |j: usize, lambda: f64| {
@@ -146,7 +140,7 @@ impl FlexBody {
             damping_ratio: eigenvalue.iter().enumerate().map(|(j, &lambda)| ratio(j, lambda)).collect(),
             modal_damping,
             shape: change.shapes(&old.shape, positions),
-            rotation,
+            rotation: old.rotation.as_ref().map(|rotation| change.rotations(rotation)),
             internal: None,
             eigenvalue,
         }

@@ -1,5 +1,6 @@
 //! Interfaces of a body: what a joint needs of them.
 
+use super::rigid_motion::{has_rotations, stacked};
 use crate::model::{Coupling, InterfaceMotion, Nodes};
 use crate::numerics::linalg::combine;
 use faer::{Mat, MatRef};
@@ -37,6 +38,11 @@ pub struct InterfaceRows {
 }
 
 impl InterfaceRows {
+    /// Translation and rotation of the reference point in every mode (6 x nf); `None` where no rotation is determined.
+    pub fn rigid_motion(&self) -> Option<Mat<f64>> {
+        self.rotation.as_ref().map(|rotation| stacked(&self.translation, rotation))
+    }
+
     /// The mode in which the interface deforms most, and how much, relative to its largest motion in any
     /// mode.
     pub fn deformation(&self) -> (usize, f64) {
@@ -58,11 +64,8 @@ impl Interface {
     ) -> Option<InterfaceRows> {
         let (d, k, nf) = (dimension, self.nodes.len(), shape.ncols());
         let positions: Vec<[f64; 3]> = self.nodes.iter().map(|&i| nodes.positions[i]).collect();
-        // Nodes without rotations have zeros in their place.
-        let turns = |rotation: MatRef<'_, f64>, node: usize| {
-            (0..nf).any(|j| (0..3).any(|axis| rotation[(3 * node + axis, j)] != 0.0))
-        };
-        let rotation = rotation.filter(|rotation| self.nodes.iter().all(|&node| turns(*rotation, node)));
+        let rotation =
+            rotation.filter(|rotation| self.nodes.iter().all(|&node| has_rotations(*rotation, node)));
         let motion = InterfaceMotion::new(&positions, rotation.is_some(), d, Some(self.reference?));
         let all =
             Mat::from_fn(motion.rigid().nrows(), nf, |row, j| match (row.checked_sub(d * k), rotation) {

@@ -14,6 +14,7 @@ mod model_rows;
 mod parts;
 mod reduced;
 mod reference_conditions;
+mod rigid_motion;
 mod rounded;
 mod softening;
 mod storage;

@@ -1,6 +1,7 @@
 //! Changes of the modal coordinates of a body: to mean axes, or to normalised modes in the frame that it has
 //! (theory 5.2).
 
+use super::rigid_motion::{rotations_without, shapes_without};
 use crate::body::invariants::{GeneralTerms, Invariants, symmetric_part};
 use crate::numerics::linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 use faer::Mat;
@@ -8,14 +9,15 @@ use faer::Mat;
 /// Part of the squared M-norm that rigid motion leaves of a motion of the modes, below which the motion is rigid.
 const RIGID: f64 = 1e-10;
 
-/// Modes psi' = Psi X - R(x) T with the rigid motions R about the origin of the frame. Nodal motions that the
+/// Modes psi' = (Psi - R(x) A) X with the rigid motions R about the origin of the frame. Nodal motions that the
 /// frame and the modes span together stay the same.
 #[derive(Debug, Clone)]
 pub(crate) struct ModalChange {
     /// X (nf x nf').
     modes: Mat<f64>,
-    /// T (6 x nf'): translation and rotation that is taken from each new mode.
-    taken: Mat<f64>,
+    /// A (6 x nf): translation and rotation that is taken from each old mode; `None` if the frame stays tied to the
+    /// body as it is.
+    taken: Option<Mat<f64>>,
     /// Rigid motions among the modes, which are left out.
     left_out: RigidMotions,
 }
@@ -133,7 +135,7 @@ impl ModalChange {
             split.deforming[(i, j)] / split.left[j].sqrt()
         });
         let modes = eigenmodes(invariants, &scaled)?;
-        Ok(Self { taken: &split.rigid * &modes, modes, left_out: split.rigid_motions })
+        Ok(Self { modes, taken: Some(split.rigid), left_out: split.rigid_motions })
     }
 
     /// The change to normalised modes in the frame that the body has: rigid motions among the modes are left out,
@@ -144,8 +146,7 @@ impl ModalChange {
     pub(crate) fn in_own_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let split = Split::new(invariants, dimension)?;
         let modes = eigenmodes(invariants, &split.deforming)?;
-        let taken = Mat::zeros(6, modes.ncols());
-        Ok(Self { modes, taken, left_out: split.rigid_motions })
+        Ok(Self { modes, taken: None, left_out: split.rigid_motions })
     }
 
     /// Rigid motions among the modes, which are left out.
@@ -158,65 +159,35 @@ impl ModalChange {
         symmetric_part(&(self.modes.transpose() * a * &self.modes))
     }
 
-    /// True if no rigid motion is taken from the modes: the frame is tied to the body as before.
-    pub(crate) fn keeps_the_frame(&self) -> bool {
-        self.taken.norm_max() == 0.0
-    }
-
     /// Displacements of nodes (3n x nf) at `positions` in the new modes.
     pub(crate) fn shapes(&self, shape: &Mat<f64>, positions: &[[f64; 3]]) -> Mat<f64> {
-        let (new, taken) = (shape * &self.modes, &self.taken);
-        Mat::from_fn(new.nrows(), new.ncols(), |row, j| {
-            let (x, k) = (positions[row / 3], row % 3);
-            let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-            new[(row, j)] - taken[(k, j)] - (taken[(3 + l, j)] * x[m] - taken[(3 + m, j)] * x[l])
-        })
+        match &self.taken {
+            Some(taken) => shapes_without(taken, shape, positions) * &self.modes,
+            None => shape * &self.modes,
+        }
     }
 
-    /// Rotations of nodes (3n x nf) in the new modes; nodes without rotations (`turns`) keep zeros.
-    pub(crate) fn rotations(&self, rotation: &Mat<f64>, turns: &[bool]) -> Mat<f64> {
-        let new = rotation * &self.modes;
-        Mat::from_fn(new.nrows(), new.ncols(), |row, j| {
-            if turns[row / 3] { new[(row, j)] - self.taken[(3 + row % 3, j)] } else { 0.0 }
-        })
+    /// Rotations of nodes (3n x nf) in the new modes; nodes without rotations, whose rows are zeros, keep them.
+    pub(crate) fn rotations(&self, rotation: &Mat<f64>) -> Mat<f64> {
+        match &self.taken {
+            Some(taken) => rotations_without(taken, rotation) * &self.modes,
+            None => rotation * &self.modes,
+        }
     }
 
-    /// The invariants in the new modes. For a mass that does not commute with rotations, the part of W3 that S does
-    /// not determine is taken as that of the modes, none of it as that of the rigid motion in them.
+    /// The invariants in the new modes (see [`Invariants::without_rigid_motion`] for masses that do not commute with
+    /// rotations).
     pub(crate) fn invariants(&self, old: &Invariants) -> Invariants {
-        if self.keeps_the_frame() {
-            return self.normalised(old.with_basis(self.modes.as_ref()));
-        }
-        let nf = old.n_modes();
-        let t = Mat::from_fn(6 + nf, self.modes.ncols(), |i, j| match i.checked_sub(6) {
-            None => -self.taken[(i, j)],
-            Some(mode) => self.modes[(mode, j)],
-        });
-        let mut new = old.with_rigid_modes().with_basis(t.as_ref());
-        if let Some(general) = old.general() {
-            let (own, mut w3) = (old.w3_of_s(), new.w3_of_s());
-            let count = new.n_modes();
-            for a in 0..3 {
-                let beside = Mat::from_fn(nf, nf, |i, j| general.w3[(a * nf + i, j)] - own[(a * nf + i, j)]);
-                let change = self.modes.transpose() * beside * &self.modes;
-                (0..count).for_each(|i| (0..count).for_each(|j| w3[(a * count + i, j)] += change[(i, j)]));
-            }
-            let (w0, modal_mass) = (new.w0(), Mat::identity(count, count));
-            new = new.with_general(GeneralTerms { w0, w3, modal_mass, plane: general.plane });
-            if general.plane {
-                new = new.about_z();
-            }
-        }
-        new.with_groups(old.groups())
+        let tied = self.taken.as_ref().map(|taken| old.without_rigid_motion(taken.as_ref()));
+        normalised(tied.as_ref().unwrap_or(old).with_basis(self.modes.as_ref()))
     }
+}
 
-    /// Invariants whose stored modal mass, if they have one of their own, is the unit matrix.
-    fn normalised(&self, new: Invariants) -> Invariants {
-        let Some(general) = new.general().cloned() else { return new };
-        let (groups, count) = (new.groups(), new.n_modes());
-        new.with_general(GeneralTerms { modal_mass: Mat::identity(count, count), ..general })
-            .with_groups(groups)
-    }
+/// Invariants whose stored modal mass, if they have one of their own, is the unit matrix.
+fn normalised(new: Invariants) -> Invariants {
+    let Some(general) = new.general().cloned() else { return new };
+    let (groups, count) = (new.groups(), new.n_modes());
+    new.with_general(GeneralTerms { modal_mass: Mat::identity(count, count), ..general }).with_groups(groups)
 }
 
 /// The diagonal of K_ff, ascending: rounding may have exchanged entries that repeat.

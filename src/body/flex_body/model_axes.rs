@@ -20,7 +20,7 @@ impl FlexBody {
     /// acceleration, a = a' - alpha x d - omega x (omega x d).
     ///
     /// # Errors
-    /// Those of [`FlexBody::new`], when numbers overflow.
+    /// Every error of [`FlexBody::new`], when numbers overflow.
     pub fn in_model_axes(&self, origin: Vector3<f64>) -> Result<Self> {
         let mut body = self.in_frame(origin, self.frame().axes.transpose())?;
         // Without the rounding of a product of axes with their transpose.
@@ -32,7 +32,7 @@ impl FlexBody {
     /// [`FlexBody::in_model_axes`].
     ///
     /// # Errors
-    /// Those of [`FlexBody::new`], when numbers overflow.
+    /// Every error of [`FlexBody::new`], when numbers overflow.
     pub fn in_frame(&self, origin: Vector3<f64>, axes: Matrix3<f64>) -> Result<Self> {
         let (to_new, to_body) = (axes.transpose(), axes);
         let mut parts = self.parts().clone();

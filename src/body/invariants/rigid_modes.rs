@@ -22,7 +22,7 @@ impl Invariants {
 
     /// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes
     /// before the others.
-    pub(crate) fn with_rigid_modes(&self) -> Self {
+    fn with_rigid_modes(&self) -> Self {
         let old = self;
         let nf = old.n_modes();
         let (m, c, j) = (old.0.mass, &old.0.first_moment, &old.0.second_moment);
@@ -75,7 +75,7 @@ impl Invariants {
     }
 
     /// W3 by its formula from S.
-    pub(crate) fn w3_of_s(&self) -> Mat<f64> {
+    fn w3_of_s(&self) -> Mat<f64> {
         let solid = Self(PrimaryData { general: None, groups: Groups::ALL, ..self.0.clone() });
         solid.w3().expect("held")
     }

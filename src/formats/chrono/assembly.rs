@@ -52,17 +52,17 @@ impl Assembly {
         if n_modes == 0 { 3 } else { n_modes }
     }
 
-    /// Changes the coordinates of `told`.
+    /// Changes the coordinates of `given`.
     ///
     /// # Errors
     /// [`ExportLoses`](Code::ExportLoses) if the mass matrix is none of a body, or numbers leave double precision.
-    pub(super) fn of(told: &InterfaceMatrices<'_>) -> Result<Self> {
+    pub(super) fn of(given: &InterfaceMatrices<'_>) -> Result<Self> {
         let refuse = |what: &str| {
             let message = format!("chrono needs the centre of mass of the body: {what}");
             let help = "convert the model again: flexbody convert --basis craig-bampton";
             Diagnostic::new(Code::ExportLoses, message).with_help(help)
         };
-        let extended = Extended::of(told);
+        let extended = Extended::of(given);
         let change = extended.change().ok_or_else(|| {
             refuse("its coordinates have no mass, or its fixed-interface modes have more than all of it")
         })?;
@@ -72,7 +72,7 @@ impl Assembly {
             Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]))
         };
         let (mass, stiffness) = (in_nodes(&extended.mass), in_nodes(&extended.stiffness));
-        let damping = told.damping.as_ref().map(|damping| in_nodes(&extended.padded(damping)));
+        let damping = given.damping.as_ref().map(|damping| in_nodes(&extended.padded(damping)));
         let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
         if ![Some(&mass), Some(&stiffness), damping.as_ref()].into_iter().flatten().all(finite) {
             return Err(refuse("its matrices leave the range of double precision").into());
@@ -101,9 +101,9 @@ struct Extended {
 }
 
 impl Extended {
-    fn of(told: &InterfaceMatrices<'_>) -> Self {
-        let n_boundary = 6 * told.frames.len();
-        let m = told.mass;
+    fn of(given: &InterfaceMatrices<'_>) -> Self {
+        let n_boundary = 6 * given.frames.len();
+        let m = given.mass;
         let n_modes = m.nrows() - n_boundary;
         let momentum = Mat::from_fn(3, m.nrows(), |a, j| (a..n_boundary).step_by(6).map(|i| m[(i, j)]).sum());
         let total = Matrix3::from_fn(|a, b| (b..n_boundary).step_by(6).map(|j| momentum[(a, j)]).sum());
@@ -121,23 +121,23 @@ impl Extended {
             total,
             rest,
         };
-        (extended.mass, extended.stiffness) = extended.matrices(told);
+        (extended.mass, extended.stiffness) = extended.matrices(given);
         extended
     }
 
     /// Returns M and K of all coordinates.
-    fn matrices(&self, told: &InterfaceMatrices<'_>) -> (Mat<f64>, Mat<f64>) {
+    fn matrices(&self, given: &InterfaceMatrices<'_>) -> (Mat<f64>, Mat<f64>) {
         let (nb, nf) = (self.n_boundary, self.n_modes);
-        let (mut mass, mut stiffness) = (self.padded(told.mass), self.padded(told.stiffness));
+        let (mut mass, mut stiffness) = (self.padded(given.mass), self.padded(given.stiffness));
         let (filled, first) = (nb + nf, self.size() - 3);
-        let square = self.rest_frequency_squared(told);
+        let square = self.rest_frequency_squared(given);
         // Modes that fill the last node move alone.
         for i in filled..first {
             (mass[(i, i)], stiffness[(i, i)]) = (1.0, FILL_FREQUENCY.powi(2) * square);
         }
         // The rest mass moves with the interfaces, R'(M_BB - M_Bf M_fB), and in no mode.
         let modal = self.momentum.as_ref().subcols(nb, nf);
-        let of_modes = combine(modal, told.mass.as_ref().submatrix(nb, 0, nf, nb));
+        let of_modes = combine(modal, given.mass.as_ref().submatrix(nb, 0, nf, nb));
         for a in 0..3 {
             for j in 0..nb {
                 let coupling = (1.0 + REST_SHARE) * self.momentum[(a, j)] - of_modes[(a, j)];
@@ -166,9 +166,9 @@ impl Extended {
 
     /// Eigenvalue of the rest mass: above those of all fixed-interface modes; without any, above what the interfaces
     /// vibrate with when all others are held.
-    fn rest_frequency_squared(&self, told: &InterfaceMatrices<'_>) -> f64 {
-        let all = if self.n_modes == 0 { 0..self.n_boundary } else { self.n_boundary..told.mass.nrows() };
-        let highest = all.map(|i| told.stiffness[(i, i)] / told.mass[(i, i)]);
+    fn rest_frequency_squared(&self, given: &InterfaceMatrices<'_>) -> f64 {
+        let all = if self.n_modes == 0 { 0..self.n_boundary } else { self.n_boundary..given.mass.nrows() };
+        let highest = all.map(|i| given.stiffness[(i, i)] / given.mass[(i, i)]);
         REST_FREQUENCY.powi(2) * highest.filter(|v| v.is_finite()).fold(0.0, f64::max)
     }
 

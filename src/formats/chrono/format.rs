@@ -31,8 +31,8 @@ impl ExportFormat for Chrono {
     }
 
     fn needs(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        let Ok(told) = InterfaceMatrices::of(body, "chrono") else { return Vec::new() };
-        let modes = Assembly::modes_to_request(told.mass.nrows() - 6 * told.frames.len());
+        let Ok(given) = InterfaceMatrices::of(body, "chrono") else { return Vec::new() };
+        let modes = Assembly::modes_to_request(given.mass.nrows() - 6 * given.frames.len());
         vec![
             format!(
                 "DoModalReduction must request {modes} modes with SetReductionType(CRAIG_BAMPTON) and \
@@ -45,14 +45,14 @@ impl ExportFormat for Chrono {
     }
 
     fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {
-        let told = InterfaceMatrices::of(body, "chrono")?;
-        let assembly = Assembly::of(&told)?;
+        let given = InterfaceMatrices::of(body, "chrono")?;
+        let assembly = Assembly::of(&given)?;
         let mut beside = vec![
             ("M.mtx".into(), matrix_market(&assembly.mass)),
             ("K.mtx".into(), matrix_market(&assembly.stiffness)),
         ];
         beside.extend(assembly.damping.as_ref().map(|damping| ("R.mtx".into(), matrix_market(damping))));
-        Ok(Exported { file: table(&told, &assembly, centre_of_mass(body)), beside })
+        Ok(Exported { file: table(&given, &assembly, centre_of_mass(body)), beside })
     }
 }
 
@@ -62,14 +62,14 @@ fn centre_of_mass(body: &FlexBody) -> [f64; 3] {
 }
 
 /// Returns the table of the boundary nodes, with a remark about the internal ones.
-fn table(told: &InterfaceMatrices<'_>, assembly: &Assembly, [x, y, z]: [f64; 3]) -> Vec<u8> {
-    let internal = assembly.mass.nrows() / 6 - told.frames.len();
+fn table(given: &InterfaceMatrices<'_>, assembly: &Assembly, [x, y, z]: [f64; 3]) -> Vec<u8> {
+    let internal = assembly.mass.nrows() / 6 - given.frames.len();
     let mut table = format!(
         "# boundary nodes in the order of the matrices, then {internal} internal nodes, all at the centre of mass \
          {x:e} {y:e} {z:e}; modes to request: {}\nname,x,y,z\n",
         Assembly::modes_to_request(assembly.n_modes)
     );
-    for (name, [x, y, z]) in &told.frames {
+    for (name, [x, y, z]) in &given.frames {
         let name = name.replace('"', "\"\"");
         writeln!(table, "\"{name}\",{x:e},{y:e},{z:e}").expect("writing to a String cannot fail");
     }

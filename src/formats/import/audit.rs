@@ -281,13 +281,13 @@ fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
     let Some(by) = beside_free_surface(invariants) else {
         return "modes are mass-normalised free-surface modes".to_owned();
     };
-    let places = match &places_at_rest(frames)[..] {
+    let at_rest = places_at_rest(frames);
+    let places = match &at_rest[..] {
         [] => String::new(),
         [one] => format!("; the frame stands on node {one}, which moves in no mode"),
-        [first, .., last] => format!(
-            "; the frame stands on {} nodes that move in no mode, {first} to {last}",
-            places_at_rest(frames).len()
-        ),
+        [first, .., last] => {
+            format!("; the frame stands on {} nodes that move in no mode, {first} to {last}", at_rest.len())
+        }
     };
     format!("modes are no mass-normalised free-surface modes (by {by:.1e}){places}")
 }

@@ -9,9 +9,9 @@ use crate::base::provenance::SourceFile;
 use crate::base::units::UnitSystem;
 use crate::body::flex_body::{
     Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, ModalChange, Modes,
-    Parts, ReferenceConditions, Source, Storage, TermDecision,
+    Parts, ReferenceConditions, Source, Storage, TermDecision, diagonal_eigenvalues, reduced_residuals,
+    rigid_motions,
 };
-use crate::body::flex_body::{diagonal_eigenvalues, reduced_residuals, rigid_motions};
 use crate::body::invariants::{BodyFrame, Invariants, identities, symmetric_part};
 use crate::model::Nodes;
 use crate::numerics::linalg::larger;
@@ -163,11 +163,10 @@ impl ModalCoordinates {
     /// Returns the body in other modal coordinates.
     fn changed(self, change: &ModalChange, frames: &[ImportedFrame]) -> Self {
         let positions: Vec<[f64; 3]> = frames.iter().map(|frame| frame.position).collect();
-        let turns: Vec<bool> = frames.iter().map(|frame| frame.rotation.is_some()).collect();
         Self {
             invariants: change.invariants(&self.invariants),
             shape: change.shapes(&self.shape, &positions),
-            rotation: self.rotation.map(|rotation| change.rotations(&rotation, &turns)),
+            rotation: self.rotation.map(|rotation| change.rotations(&rotation)),
             damping: self.damping.map(|damping| change.congruent(&damping)),
             geometric_stiffness: self
                 .geometric_stiffness

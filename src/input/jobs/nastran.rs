@@ -25,7 +25,7 @@ use std::collections::HashMap;
 use std::path::Path;
 use systems::Systems;
 
-/// Bytes by which a deck is told: comments may stand above its first card.
+/// Bytes in which a deck is recognised: comments may stand above its first card.
 const DECK_HEAD: usize = 1 << 20;
 
 /// The reader of Nastran jobs.

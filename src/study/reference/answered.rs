@@ -33,9 +33,9 @@ pub(super) struct Lacking {
 
 /// Damping of the equations of all nodes.
 pub(super) enum LackingDamping {
-    /// That of the modes of the body, D_ff (nf x nf): D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M.
+    /// Damping of the modes of the body, D_ff (nf x nf): D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M.
     OfModes(Mat<f64>),
-    /// That of the model: [Psi, E]'D [Psi, E] (nf + k square).
+    /// Damping of the model: [Psi, E]'D [Psi, E] (nf + k square).
     OfModel(Mat<f64>),
 }
 
