@@ -1,12 +1,8 @@
 //! CPU time of the condensation at 300k degrees of freedom and 20 modes: `cargo bench --bench condense`.
 
-#[path = "../tests/support/cuboid.rs"]
-#[allow(dead_code)] // shared with tests
-mod cuboid;
-
-use cuboid::Cuboid;
 use faer::Mat;
-use flexbody::body::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped};
+use flexbody_body::invariants::{BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped};
+use oracle::cuboid::Cuboid;
 use std::time::Instant;
 
 /// CPU seconds of this process, or `None` where the system does not tell.

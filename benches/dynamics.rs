@@ -5,23 +5,20 @@
 //! matrices of nalgebra as they are printed (theory section 6). Processor time on Linux, best of several:
 //! other programs only ever slow a run down.
 
-#[path = "../tests/support/mod.rs"]
-mod support;
-
-use flexbody::body::flex_body::Frame;
-use flexbody::body::invariants::BodyFrame;
-use flexbody::model::FeModel;
-use flexbody::motion::dynamics::{
+use flexbody_body::flex_body::Frame;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_model::FeModel;
+use flexbody_motion::dynamics::{
     EquationsOfMotion, EulerParameters, Evaluation, NodalConfiguration, NodalEquations, NodalMotion,
     ReferenceConditions, Terms,
 };
-use flexbody::numerics::integration::System;
+use flexbody_motion::integration::System;
 use nalgebra::{DVector, Vector3};
+use oracle::equations::State;
+use oracle::flexible::{fixture, lively_state, oracle};
+use oracle::general::{quasi_velocities, raw_fixture};
+use oracle::random::Random;
 use std::time::Instant;
-use support::equations::State;
-use support::flexible::{fixture, lively_state, oracle};
-use support::general::{quasi_velocities, raw_fixture};
-use support::random::Random;
 
 const REPEATS: usize = 5;
 

@@ -6,7 +6,7 @@
 //! "omega": [3], "q": [nf], "qd": [nf]}, vectors of the frame along its axes, which are those of the world at
 //! the start.
 
-use flexbody::motion::dynamics::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms};
+use flexbody_motion::dynamics::{EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::path::PathBuf;
@@ -52,7 +52,7 @@ fn main() {
     };
     let text = std::fs::read_to_string(path).expect("readable");
     let start: Start = serde_json::from_str(&text).expect("a start");
-    let body = flexbody::formats::flex_body_file::read(&start.body).expect("a body");
+    let body = flexbody_file::read(&start.body).expect("a body");
     let equations = EquationsOfMotion::new(&body, Terms::ALL);
     let (nf, n) = (equations.n_modes(), 7 + equations.n_modes() + equations.n_velocities());
     let mut motion =

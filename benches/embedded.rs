@@ -4,19 +4,15 @@
 //! Accelerations of a free body from its state, each state another. Library and C programs take turns;
 //! seconds are of the processor, the ratio of every turn is formed by itself, and medians are told.
 
-#[path = "../tests/support/mod.rs"]
-mod support;
-
-use flexbody::body::flex_body::FlexBody;
-use flexbody::body::invariants::BodyFrame;
-use flexbody::formats::export::{ExportOptions, Points};
-use flexbody::formats::find_format;
-use flexbody::motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
-use std::path::Path;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_formats::export::{ExportOptions, Points};
+use flexbody_formats::find_format;
+use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
+use oracle::flexible::{fixture, lively_state};
+use oracle::general::quasi_velocities;
+use oracle::random::Random;
 use std::process::Command;
-use support::flexible::{fixture, lively_state};
-use support::general::quasi_velocities;
-use support::random::Random;
 
 const BODY: &str = "bracket_hex20";
 
@@ -90,7 +86,7 @@ impl Program {
         };
         let numbers: Vec<u8> = states.iter().flatten().flat_map(number).collect();
         std::fs::write(path("states"), numbers).expect("writable");
-        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let root = oracle::root();
         let name = format!("flexbody_{BODY}_");
         let compiled = Command::new("cc")
             .args(flags)
@@ -192,7 +188,7 @@ fn main() {
     );
     println!("{text}");
     if std::env::args().any(|argument| argument == "--write") {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/formats/embedded.md");
+        let path = oracle::root().join("docs/formats/embedded.md");
         let page = std::fs::read_to_string(&path).expect("the page");
         let (before, rest) = page.split_once("<!-- times -->\n").expect("a place for the table");
         let (_, after) = rest.split_once("<!-- end of times -->").expect("an end of the table");

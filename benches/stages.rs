@@ -2,9 +2,9 @@
 //! (`benches/make_block.py` makes models).
 
 use faer::Mat;
-use flexbody::input::{read_manifest, read_model};
-use flexbody::model::FeModel;
-use flexbody::numerics::linalg::{Analysis, Cholesky, CscMatrix, Inertia, Pencil, Real, Solve};
+use flexbody_input::{read_manifest, read_model};
+use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Inertia, Pencil, Real, Solve};
+use flexbody_model::FeModel;
 use std::time::Instant;
 
 #[global_allocator]

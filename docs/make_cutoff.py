@@ -33,7 +33,7 @@ freedom, modes from {first:.0f} Hz. It spins about the axes of the model: x alon
 mostly bending, which the first modes have, and to about a tenth stretching of the plate in itself, which none of the first fifty modes has.
 
 Errors (8.13) of the static response to the centrifugal loads in the norm of K, of [theory](theory.md#8-modes) section 8. `flexbody` {version}
-computes the modes; the exact response is a dense solve by scipy. Written by `python3 docs/make_cutoff.py`; `tests/body/residual_vectors.rs` holds the figures.
+computes the modes; the exact response is a dense solve by scipy. Written by `python3 docs/make_cutoff.py`; `crates/body/tests/body/residual_vectors.rs` holds the figures.
 
 """
 TAIL = """

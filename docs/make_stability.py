@@ -52,7 +52,7 @@ after the body tumbled free for {turns} periods of its first mode at a twentieth
 Every file was checked against its model (`flexbody check --against`): all passed. No case has an error above 10^-6 in frequencies, I0 or W1, or from its files in W2 and W3,
 without a warning that says so. Where rounding keeps the K-residuals above what `standard` promises, modes are projected in twice the precision ([theory](theory.md#8-modes), after (8.4)): most frequencies then keep
 all digits of the files, and W2 and W3 what the distance of the modes leaves. Tumbling has no digits where the mass matrix of a bent needle is singular to double precision. Written by
-`python3 docs/make_stability.py`, which fails if this is not so; `tests/numerics/extremes.rs` holds what is said here.
+`python3 docs/make_stability.py`, which fails if this is not so; `crates/body/tests/body/extremes.rs` holds what is said here.
 
 ![digits kept against digits that the files hold](images/stability.svg)
 """

@@ -97,7 +97,7 @@ def case(label, make, modes=8, **settings):
 
 FAMILIES = [
     ("Units", "A bar of two bricks in other units; silicon of 100 x 10 x 2 micrometres and a kilometre of steel in metres. Powers of two change no digit at all "
-     "(`tests/numerics/extremes.rs`). Numbers whose products leave the range of double precision are refused before any work.",
+     "(`crates/body/tests/body/extremes.rs`). Numbers whose products leave the range of double precision are refused before any work.",
      [case("m, kg, s", lambda: bricks((2, 1, 1), BAR)),
       case("um, kg, s", lambda: scaled(bricks((2, 1, 1), BAR), "1", "1", "1e6")),
       case("MEMS, in m", lambda: bricks((2, 1, 1), ("1e-4", "1e-5", "2e-6"), material=lambda c: {"young": mpfr("169e9"), "poisson": mpfr("0.22"), "density": mpfr(2330)})),

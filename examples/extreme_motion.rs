@@ -3,12 +3,11 @@
 //!
 //!     cargo run --release --example extreme_motion -- body.flex.h5
 
-use flexbody::body::flex_body::FlexBody;
-use flexbody::formats::flex_body_file;
-use flexbody::motion::dynamics::{
+use flexbody_body::flex_body::FlexBody;
+use flexbody_motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Motion, Orientation, Terms,
 };
-use flexbody::numerics::integration::{Explicit, Failure, Gauss, Method, System, integrate};
+use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, System, integrate};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -40,7 +39,7 @@ struct Run {
 
 fn main() {
     let path = std::env::args().nth(1).expect("usage: extreme_motion BODY.flex.h5");
-    let body = flex_body_file::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
+    let body = flexbody_file::read(&path).unwrap_or_else(|error| panic!("{path}: {error}"));
     let fastest = body.modes().eigenvalue[body.n_modes() - 1].sqrt();
     let gauss = |order: usize, part: f64| {
         move |n: usize| Method::Gauss { method: Gauss::new(n, order), step: part / fastest }

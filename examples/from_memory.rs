@@ -3,6 +3,8 @@
 //!
 //!     cargo run --release --example from_memory -- truss.flex.h5
 
+#![allow(unreachable_pub)] // modules that several examples share
+
 mod truss;
 
 use flexbody::{ConvertOptions, FlexBody, Model, Result, SparseMatrix};

@@ -7,6 +7,8 @@
 //! those of the rigid body in closed form, how the energy drifted, and what the impulses of joint and weight
 //! lack of the change of momentum. With four times the stiffness the period is off by a quarter.
 
+#![allow(unreachable_pub)] // modules that several examples share
+
 #[allow(dead_code)] // The other example uses all of it.
 mod joints;
 #[allow(dead_code)] // The tower is the example `from_memory`.

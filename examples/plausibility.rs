@@ -5,9 +5,9 @@
 //!
 //! With folders of models as arguments it prints their rows only.
 
-use flexbody::base::diagnostic::Code;
-use flexbody::input::{ModelFiles, read_manifest, read_model};
-use flexbody::model::{FeModel, Plausibility, RawModel};
+use flexbody_base::diagnostic::Code;
+use flexbody_input::{ModelFiles, read_manifest, read_model};
+use flexbody_model::{FeModel, Plausibility, RawModel};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 

@@ -8,6 +8,8 @@
 //! change of momentum, and how the energy drifted. With four times the stiffness a quarter of the difference
 //! of the places is left, and half of that of the velocities, which is a vibration.
 
+#![allow(unreachable_pub)] // modules that several examples share
+
 #[allow(dead_code)] // The other example uses all of it.
 mod joints;
 #[allow(dead_code)] // The tower is the example `from_memory`.

@@ -11,9 +11,9 @@ fi
 # shellcheck source=scripts/cmake.sh
 source scripts/cmake.sh
 
-cargo build --release --locked
+cargo build --release --locked --package flexbody
 mkdir -p target/quickstart
-cargo run --release --locked --quiet -- convert fixtures/models/connecting_rod/model.toml \
+cargo run --release --locked --quiet --package flexbody -- convert fixtures/models/connecting_rod/model.toml \
     -o target/quickstart/connecting_rod.flex.h5 --report target/quickstart/connecting_rod.html
 
 echo

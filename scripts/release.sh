@@ -51,7 +51,7 @@ if [ ! -d "$(rustc --print sysroot)/lib/rustlib/$target" ]; then
 fi
 
 step "build"
-[ -n "${FLEXBODY:-}" ] || cargo build --release --locked
+[ -n "${FLEXBODY:-}" ] || cargo build --release --locked --package flexbody
 # The two usual compilers are found without being told.
 [ -z "${MUSL_CC:-}" ] || export CC_x86_64_unknown_linux_musl="$MUSL_CC"
 # Size: nothing unwinds, and there are no tables for it; only small functions are inlined (conversions and simulations take 4 % longer, and the program
@@ -61,7 +61,7 @@ linkers="$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/^host: //p
 flags="-C force-unwind-tables=no -C llvm-args=-inline-threshold=$INLINED -C relocation-model=static"
 flags="$flags -C link-arg=-fuse-ld=lld -C link-arg=-B$linkers -C link-arg=-Wl,--icf=all -C link-arg=-Wl,-T,$PWD/scripts/static.ld"
 CFLAGS_x86_64_unknown_linux_musl="-fno-asynchronous-unwind-tables -fno-unwind-tables" CARGO_TARGET_X86_64_UNKNOWN_LINUX_MUSL_RUSTFLAGS="$flags" \
-    cargo build --profile dist --locked --target "$target"
+    cargo build --profile dist --locked --package flexbody --target "$target"
 ordinary="$(realpath "${FLEXBODY:-$built/release/flexbody}")"
 static="$(realpath "$built/$target/dist/flexbody")"
 
@@ -79,7 +79,7 @@ echo "   $size bytes"
 env -i "$static" doctor | sed 's/^/   /'
 
 step "it ends as it should: signals, a panic, results that cannot be printed"
-FLEXBODY="$static" cargo test --locked --test program -- --include-ignored ends::
+FLEXBODY="$static" cargo test --locked --package flexbody --test program -- --include-ignored ends::
 
 step "its results are those of the ordinary build"
 for model in connecting_rod bracket_hex20 frame_beams; do

@@ -93,71 +93,20 @@
 //! # }
 //! ```
 //!
-//! Rooms of the sources and the arrows between them: `ARCHITECTURE.md`; `tests/program/architecture.rs` holds
-//! them.
+//! The crates that stand behind this front door, and which of them uses which: `ARCHITECTURE.md`.
 
-// What only tests look into is unused without them.
-#![cfg_attr(not(feature = "internals"), allow(dead_code, unused_imports))]
+#![deny(
+    clippy::exit,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used
+)]
 
 mod api;
-
-// The rooms behind the front door. They are no part of the interface: tests and benches of this package see
-// them by the feature `internals`, which promises nothing.
-#[cfg(not(feature = "internals"))]
-mod base;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod base;
-#[cfg(not(feature = "internals"))]
-mod body;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod body;
-#[cfg(all(feature = "cli", not(feature = "internals")))]
+#[cfg(feature = "cli")]
+#[allow(clippy::exit, clippy::print_stderr, clippy::print_stdout)] // the program
 mod cli;
-#[cfg(all(feature = "cli", feature = "internals"))]
-#[doc(hidden)]
-pub mod cli;
-#[cfg(not(feature = "internals"))]
-mod cluster;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod cluster;
-#[cfg(not(feature = "internals"))]
-mod formats;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod formats;
-#[cfg(not(feature = "internals"))]
-mod input;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod input;
-#[cfg(not(feature = "internals"))]
-mod model;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod model;
-#[cfg(not(feature = "internals"))]
-mod motion;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod motion;
-#[cfg(not(feature = "internals"))]
-mod numerics;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod numerics;
-#[cfg(not(feature = "internals"))]
-mod report;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod report;
-#[cfg(not(feature = "internals"))]
-mod study;
-#[cfg(feature = "internals")]
-#[doc(hidden)]
-pub mod study;
 
 pub use api::{
     Accuracy, Basis, Conversion, ConvertOptions, Coupling, FlexBody, Frame, GeometricStiffness, Identity,
@@ -171,20 +120,20 @@ pub use api::{Trade, TradeOptions};
 /// makes them, [`FlexBody::node_point`] and [`FlexBody::interface_point`] the points where joints hold a
 /// body; `examples/pendulum.rs` joins one to the ground.
 pub mod dynamics {
-    pub use crate::motion::dynamics::{
+    pub use flexbody_motion::dynamics::{
         AngularVelocity, BodyPoint, EquationsOfMotion, EulerParameters, Evaluation, LoadAxes, LoadJacobian,
         NotPositiveDefinite, Orientation, PlaneAngle, Prescribed, RotationVector, Terms,
     };
 }
 
-pub use base::diagnostic::{Code, Diagnostic, Severity};
-pub use base::error::{Error, ExitCode, Result};
+pub use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+pub use flexbody_base::error::{Error, ExitCode, Result};
 
 /// What `src/main.rs` and the command of the Python package run. No part of the interface.
 #[cfg(feature = "cli")]
 #[doc(hidden)]
 pub mod program {
-    pub use crate::base::memory::goes_without;
-    pub use crate::base::output::abandon_unfinished_soon;
     pub use crate::cli::{Arguments, end, end_without_unfinished_files, parse, run, use_threads};
+    pub use flexbody_base::memory::goes_without;
+    pub use flexbody_base::output::abandon_unfinished_soon;
 }

@@ -17,7 +17,7 @@ use std::time::Duration;
 /// Large blocks come and go on all threads: the system allocator gives them back each time, and the page
 /// faults and interrupts of that cost more than the work (measured: half of the factorisation time on two
 /// threads).
-pub struct Allocator;
+pub(crate) struct Allocator;
 
 // SAFETY: every call is passed on unchanged; a failure that is not expected does not return.
 unsafe impl GlobalAlloc for Allocator {
@@ -108,7 +108,7 @@ fn tell(text: &[u8]) {
 /// Before anything else: a file that becomes too large is an error of the write, not a signal; as many files
 /// may be open as the system allows, since every output holds one; the C library keeps one pool of memory for
 /// all threads, not 64 MiB of address space for each.
-pub fn prepare() {
+pub(crate) fn prepare() {
     #[cfg(unix)]
     // SAFETY: sets limits of this process, before any thread is started; what fails leaves things as they
     // are.

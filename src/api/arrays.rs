@@ -2,7 +2,7 @@
 
 use super::matrix::shown;
 use super::{FlexBody, Matrix};
-use crate::body::flex_body::MassStructure;
+use flexbody_body::flex_body::MassStructure;
 use nalgebra::Matrix3;
 
 /// A file that a body was made of.

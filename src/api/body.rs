@@ -3,19 +3,19 @@
 use super::matrix::shown;
 use super::progress::{Listener, NOBODY, heard};
 use super::{Matrix, Motion, Scene, Selection};
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::progress::Event;
-use crate::body::convert::interface_compliance;
-use crate::body::flex_body;
-use crate::body::verification::own_identities;
-use crate::formats::export::ExportOptions;
-use crate::formats::flex_body_file::RecordedMotion;
-use crate::formats::{FORMATS, export, find_format};
-use crate::motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
-use crate::motion::scene::{Point, body_point, simulate, unsettled_rate};
-use crate::study::selection::select_for_cases;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::convert::interface_compliance;
+use flexbody_body::flex_body;
+use flexbody_body::verification::own_identities;
+use flexbody_file::RecordedMotion;
+use flexbody_formats::export::ExportOptions;
+use flexbody_formats::{FORMATS, export, find_format};
+use flexbody_linalg::progress::Event;
+use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
+use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
+use flexbody_study::selection::select_for_cases;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
@@ -47,7 +47,7 @@ impl FlexBody {
     /// breaks its schema; FB712 when it was changed since it was written.
     #[cfg(feature = "hdf5")]
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        crate::formats::flex_body_file::read(path).map(Self)
+        flexbody_file::read(path).map(Self)
     }
 
     /// Writes a flex-body file: it appears whole or not at all.
@@ -56,7 +56,7 @@ impl FlexBody {
     /// FB104 and FB602 when it cannot be written.
     #[cfg(feature = "hdf5")]
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
-        crate::formats::flex_body_file::write(&self.0, path)
+        flexbody_file::write(&self.0, path)
     }
 
     /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the

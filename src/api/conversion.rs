@@ -2,15 +2,15 @@
 
 use super::progress::{Listener, NOBODY, heard};
 use super::{FlexBody, Model, Scene, Selection};
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
-use crate::body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert};
-use crate::body::invariants::BodyFrame;
-use crate::body::verification::accept;
-use crate::motion::scene;
-use crate::numerics::eigen::{self, Resume, Wanted};
-use crate::study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
+use flexbody_body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert};
+use flexbody_body::invariants::BodyFrame;
+use flexbody_body::verification::accept;
+use flexbody_eigen::{Resume, Wanted};
+use flexbody_motion::scene;
+use flexbody_study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
 
 /// Which shapes the body has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -150,9 +150,9 @@ impl ConvertOptions {
             ..ConvertSettings::default()
         };
         settings.modes.accuracy = match self.accuracy {
-            Accuracy::Fast => eigen::Accuracy::Fast,
-            Accuracy::Standard => eigen::Accuracy::Standard,
-            Accuracy::Certified => eigen::Accuracy::Certified,
+            Accuracy::Fast => flexbody_eigen::Accuracy::Fast,
+            Accuracy::Standard => flexbody_eigen::Accuracy::Standard,
+            Accuracy::Certified => flexbody_eigen::Accuracy::Certified,
         };
         if let Some(count) = self.modes {
             settings.modes.wanted = Wanted::Lowest(count);

@@ -2,7 +2,6 @@
 
 use super::matrix::shown;
 use super::{FlexBody, Matrix};
-use crate::model;
 
 /// How the nodes of an interface and its reference point follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,19 +16,19 @@ pub enum Coupling {
 }
 
 impl Coupling {
-    pub(super) fn inner(self) -> model::Coupling {
+    pub(super) fn inner(self) -> flexbody_model::Coupling {
         match self {
-            Self::Rigid => model::Coupling::Rigid,
-            Self::Averaging => model::Coupling::Averaging,
-            Self::Free => model::Coupling::Free,
+            Self::Rigid => flexbody_model::Coupling::Rigid,
+            Self::Averaging => flexbody_model::Coupling::Averaging,
+            Self::Free => flexbody_model::Coupling::Free,
         }
     }
 
-    fn outer(inner: model::Coupling) -> Self {
+    fn outer(inner: flexbody_model::Coupling) -> Self {
         match inner {
-            model::Coupling::Rigid => Self::Rigid,
-            model::Coupling::Averaging => Self::Averaging,
-            model::Coupling::Free => Self::Free,
+            flexbody_model::Coupling::Rigid => Self::Rigid,
+            flexbody_model::Coupling::Averaging => Self::Averaging,
+            flexbody_model::Coupling::Free => Self::Free,
         }
     }
 
@@ -78,7 +77,7 @@ impl FlexBody {
     pub fn interfaces(&self) -> Vec<Interface> {
         let (nodes, modes) = (self.0.nodes(), self.0.modes());
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
-        let show = |interface: &crate::body::flex_body::Interface| {
+        let show = |interface: &flexbody_body::flex_body::Interface| {
             let rows = interface.rows(nodes, modes.shape.as_ref(), rotation, self.0.dimension());
             Interface {
                 name: interface.name.clone(),

@@ -1,17 +1,17 @@
 //! A finite element model, read from files or made of matrices in memory.
 
 use super::Coupling;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
-use crate::base::units::UnitSystem;
-use crate::input::{
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::units::UnitSystem;
+use flexbody_input::{
     InterfaceNodes, InterfaceSource, LoadSource, ModelFiles, check_size, read_manifest, read_model,
 };
-use crate::model::{
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{
     CheckedModel, Damping, DampingBand, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel, Reference,
     SurfaceMesh,
 };
-use crate::numerics::linalg::CscMatrix;
 use std::path::{Path, PathBuf};
 
 /// A sparse matrix with both triangles of a symmetric one.

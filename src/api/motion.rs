@@ -1,8 +1,8 @@
 //! The motion of a body.
 
-use crate::base::diagnostic::Diagnostic;
-use crate::base::units::UnitSystem;
-use crate::motion::scene::Recording;
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::units::UnitSystem;
+use flexbody_motion::scene::Recording;
 use nalgebra::Vector3;
 
 /// The motion of a body in a scene. Units are those of the model.
@@ -149,8 +149,8 @@ impl Motion {
     /// # Errors
     /// FB104, FB105, FB107 and FB602 when it cannot be written.
     #[cfg(feature = "hdf5")]
-    pub fn write(&self, path: impl AsRef<std::path::Path>) -> crate::base::error::Result<()> {
-        use crate::formats::flex_body_file::{fill_simulation, prepare_output};
+    pub fn write(&self, path: impl AsRef<std::path::Path>) -> flexbody_base::error::Result<()> {
+        use flexbody_file::{fill_simulation, prepare_output};
         let slot = prepare_output(path)?;
         fill_simulation(&self.recording, &self.units, &slot)?;
         slot.commit()

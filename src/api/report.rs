@@ -1,7 +1,7 @@
 //! Reports, as the commands write them.
 
 use super::{FlexBody, Motion, Selection};
-use crate::report::{self, Facts, RunData, SelectionFacts, SimulationFacts, simulation_csv};
+use flexbody_report::{Facts, RunData, SelectionFacts, SimulationFacts, simulation_csv};
 
 /// Formats of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,24 +16,24 @@ pub enum ReportFormat {
 }
 
 impl ReportFormat {
-    pub(super) fn inner(self) -> report::Format {
+    pub(super) fn inner(self) -> flexbody_report::Format {
         match self {
-            Self::Json => report::Format::Json,
-            Self::Text => report::Format::Text,
-            Self::Html => report::Format::Html,
+            Self::Json => flexbody_report::Format::Json,
+            Self::Text => flexbody_report::Format::Text,
+            Self::Html => flexbody_report::Format::Html,
         }
     }
 }
 
 /// What a report says of the run: the `diagnostics`, and nothing about times and memory.
-pub(super) fn run(diagnostics: &[crate::base::diagnostic::Diagnostic]) -> RunData {
+pub(super) fn run(diagnostics: &[flexbody_base::diagnostic::Diagnostic]) -> RunData {
     RunData { diagnostics: diagnostics.to_vec(), ..RunData::default() }
 }
 
 impl FlexBody {
     /// The report of `flexbody inspect`.
     pub fn report(&self, format: ReportFormat) -> String {
-        report::render(&Facts::new(&self.0, &RunData::default()), format.inner())
+        flexbody_report::render(&Facts::new(&self.0, &RunData::default()), format.inner())
     }
 }
 

@@ -1,9 +1,9 @@
 //! What a body is to do, and what it needs for that.
 
-use crate::base::diagnostic::Diagnostic;
-use crate::base::error::Result;
-use crate::motion::scene::{self, read_case, read_cases};
-use crate::study::selection;
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::Result;
+use flexbody_motion::scene::{self, read_case, read_cases};
+use flexbody_study::selection;
 use std::path::Path;
 
 /// What a body is to do: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).

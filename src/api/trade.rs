@@ -2,13 +2,13 @@
 
 use super::progress::{Listener, heard};
 use super::{FlexBody, Model, ReportFormat, Scene, report};
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::progress::Watch;
-use crate::body::basis::ModeSettings;
-use crate::report::{TradeFacts, trade_csv};
-use crate::study::reference::ReferenceError;
-use crate::study::trade::{
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::ModeSettings;
+use flexbody_linalg::progress::Watch;
+use flexbody_report::{TradeFacts, trade_csv};
+use flexbody_study::reference::ReferenceError;
+use flexbody_study::trade::{
     self, Allowed, ReferenceKind, Settings, Source, WantedBodies, conversions_for_cases,
 };
 

@@ -4,17 +4,17 @@ mod cluster;
 mod guidance;
 mod response;
 
-use crate::body::invariants::BodyFrame;
-use crate::formats::FORMATS;
-use crate::formats::IMPORT_FORMATS;
-use crate::formats::export::ExportFormat;
 use clap::builder::PossibleValue;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-pub use cluster::{
+pub(super) use cluster::{
     AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments, SolverName,
 };
-pub use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
-pub use response::ResponseArguments;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_formats::FORMATS;
+use flexbody_formats::IMPORT_FORMATS;
+use flexbody_formats::export::ExportFormat;
+pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
+pub(super) use response::ResponseArguments;
 use std::path::PathBuf;
 
 /// Exact flexible bodies for multibody simulation from finite element mass and stiffness matrices.
@@ -208,7 +208,7 @@ fn foreign_formats() -> clap::builder::PossibleValuesParser {
 
 /// Names of the FE programs whose jobs are read.
 fn job_programs() -> clap::builder::PossibleValuesParser {
-    crate::input::job_programs().map(PossibleValue::new).collect::<Vec<_>>().into()
+    flexbody_input::job_programs().map(PossibleValue::new).collect::<Vec<_>>().into()
 }
 
 /// What a manifest would say of the job of an FE program, for every command that takes a model.

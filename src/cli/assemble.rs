@@ -5,10 +5,10 @@ use super::arguments::{AssembleArguments, EngineArguments};
 use super::convert::run_with;
 use super::elsewhere::Elsewhere;
 use super::outcome::Outcome;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::cluster::{Prepared, read_prepared};
-use crate::numerics::eigen::Accuracy;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_cluster::{Prepared, read_prepared};
+use flexbody_eigen::Accuracy;
 
 pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;

@@ -2,11 +2,11 @@
 
 use super::arguments::AuditArguments;
 use super::outcome::Outcome;
-use crate::base::error::Result;
-use crate::formats::import::audit;
-use crate::formats::{find_import_format, recognise};
-use crate::input::InputFile;
-use crate::report::{audit_json, audit_text};
+use flexbody_base::error::Result;
+use flexbody_base::text::InputFile;
+use flexbody_formats::import::audit;
+use flexbody_formats::{find_import_format, recognise};
+use flexbody_report::{audit_json, audit_text};
 
 pub(super) fn run(arguments: &AuditArguments) -> Result<Outcome> {
     let asked = arguments.from.as_deref().map(find_import_format).transpose()?;

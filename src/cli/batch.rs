@@ -7,19 +7,19 @@ use super::outcome::Outcome;
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{for_threads, memory_left};
 use super::watcher::Watcher;
-use crate::base::children;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, ExitCode, Result};
-use crate::base::output::OutputSlot;
-use crate::base::progress::Event;
-use crate::body::basis::ModeSettings;
-use crate::cluster::{
+use clap::Parser;
+use flexbody_base::children;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, ExitCode, Result};
+use flexbody_base::output::OutputSlot;
+use flexbody_body::basis::ModeSettings;
+use flexbody_cluster::{
     BatchBody, BatchList, Budget, Ledger, conversion_bytes, inputs_fingerprint, read_batch_list,
 };
-use crate::input::read_model;
-use crate::model::FeModel;
-use crate::report::{BatchFacts, BatchRow, Format};
-use clap::Parser;
+use flexbody_input::read_model;
+use flexbody_linalg::progress::Event;
+use flexbody_model::FeModel;
+use flexbody_report::{BatchFacts, BatchRow, Format};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::{Command as Process, Stdio};

@@ -3,22 +3,21 @@
 use super::arguments::CheckArguments;
 use super::models::of_manifest_or_job;
 use super::outcome::Outcome;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::body::convert::poor_fits;
-use crate::body::flex_body::FlexBody;
-use crate::body::verification::{changed_sources, own_identities, verify};
-use crate::formats::flex_body_file;
-use crate::input::read_model;
-use crate::model::{FeModel, RawModel};
-use crate::report::{dropped_text, identities_json, identities_text};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::convert::poor_fits;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::verification::{changed_sources, own_identities, verify};
+use flexbody_input::read_model;
+use flexbody_model::{FeModel, RawModel};
+use flexbody_report::{dropped_text, identities_json, identities_text};
 
 pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     if let (None, Some(option)) = (&arguments.against, arguments.job.first()) {
         let message = format!("{option} says something of the job of --against, which is missing");
         return Err(Diagnostic::new(Code::Usage, message).into());
     }
-    let (body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
+    let (body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     diagnostics.extend(poor_fits(&body));
     let mut checks = own_identities(&body);
     if let Some(path) = &arguments.against {

@@ -3,19 +3,18 @@
 use super::arguments::CompareArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::formats::flex_body_file;
-use crate::report::{ComparisonFormat, ComparisonReport, Tolerances, compare, compare_common};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_report::{ComparisonFormat, ComparisonReport, Tolerances, compare, compare_common};
 use std::path::Path;
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     refuse_replacing([&arguments.a, &arguments.b].into_iter(), arguments.report.iter())?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let (a, mut diagnostics) = flex_body_file::read_with_notes(&arguments.a)?;
-    let (b, of_b) = flex_body_file::read_with_notes(&arguments.b)?;
+    let (a, mut diagnostics) = flexbody_file::read_with_notes(&arguments.a)?;
+    let (b, of_b) = flexbody_file::read_with_notes(&arguments.b)?;
     diagnostics.extend(of_b);
     let compare = if arguments.common { compare_common } else { compare };
     let comparison = compare(&a, &b, &tolerances(arguments))?;

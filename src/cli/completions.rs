@@ -3,9 +3,9 @@
 
 use super::arguments::{Arguments, CompletionsArguments, ManArguments};
 use super::outcome::Outcome;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
 use clap::CommandFactory;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
 
 const PROGRAM: &str = "flexbody";
 

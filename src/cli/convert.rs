@@ -12,24 +12,25 @@ use super::select::asked_cases;
 use super::terminal::body_text;
 use super::unjudged::refuse_unjudged;
 use super::watcher::Watcher;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::progress::Event;
-use crate::base::units::UnitSystem;
-use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, ModeSettings};
-use crate::body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert_resuming};
-use crate::body::verification::accept;
-use crate::formats::flex_body_file;
-use crate::input::{
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::basis::{
+    BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, ModeSettings,
+};
+use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert_resuming};
+use flexbody_body::verification::accept;
+use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
+use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
-use crate::model::{CheckedModel, FeModel, RawModel};
-use crate::motion::scene::Scene;
-use crate::numerics::eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
-use crate::report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
-use crate::study::checkpoint::resume;
-use crate::study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
+use flexbody_linalg::progress::Event;
+use flexbody_model::{CheckedModel, FeModel, RawModel};
+use flexbody_motion::scene::Scene;
+use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
+use flexbody_study::checkpoint::resume;
+use flexbody_study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -194,7 +195,7 @@ impl Job<'_> {
         }
         accept(&conversion.body)?;
         watcher.hear(Event::Phase("writing"));
-        flex_body_file::fill_slot(&conversion.body, &reserved.body)?;
+        flexbody_file::fill_slot(&conversion.body, &reserved.body)?;
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
         let output = (places.body.display().to_string(), size);
         let phases = watcher.finish();

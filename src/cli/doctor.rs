@@ -2,10 +2,10 @@
 
 use super::outcome::Outcome;
 use super::resources::{address_space_limit, memory_left, use_threads};
-use crate::base::error::Result;
-use crate::base::hdf5_file::library_version;
-use crate::base::provenance::generator;
-use crate::numerics::linalg::instruction_set;
+use flexbody_base::error::Result;
+use flexbody_base::hdf5_file::library_version;
+use flexbody_base::provenance::generator;
+use flexbody_linalg::instruction_set;
 use serde::Serialize;
 
 /// What the program finds.

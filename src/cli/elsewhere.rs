@@ -2,13 +2,13 @@
 
 use super::arguments::ConvertArguments;
 use super::arguments::{EngineName, SolverName};
-use crate::base::diagnostic::Diagnostic;
-use crate::base::error::{Error, Result};
-use crate::base::output::code_of;
-use crate::base::progress::{Event, Watch};
-use crate::body::basis::{BasisChoice, ModeSettings};
-use crate::cluster::{Engine, ModelReference, PrepareSettings, Prepared, Solver, prepare, read_found};
-use crate::model::FeModel;
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::{Error, Result};
+use flexbody_base::output::code_of;
+use flexbody_body::basis::{BasisChoice, ModeSettings};
+use flexbody_cluster::{Engine, ModelReference, PrepareSettings, Prepared, Solver, prepare, read_found};
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::FeModel;
 use std::path::{Path, PathBuf};
 
 /// Who finds the modes of a conversion.

@@ -5,8 +5,8 @@ use super::exit::end;
 use super::output::tell_bug;
 #[cfg(unix)]
 use super::signals;
-use crate::base::error::ExitCode;
-use crate::base::output::abandon_unfinished_soon;
+use flexbody_base::error::ExitCode;
+use flexbody_base::output::abandon_unfinished_soon;
 use std::panic::PanicHookInfo;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -39,7 +39,7 @@ fn panicked(panic: &PanicHookInfo<'_>, print: &dyn Fn(&PanicHookInfo<'_>), argum
 #[cfg(not(unix))]
 fn interrupted() {
     use std::io::Write;
-    let ended = crate::base::output::abandon_unfinished();
+    let ended = flexbody_base::output::abandon_unfinished();
     let _ = writeln!(std::io::stderr(), "interrupted: no unfinished file is left");
     end(ended.unwrap_or(ExitCode::Interrupted));
 }

@@ -1,7 +1,7 @@
 //! The end of the process, whatever its threads are doing.
 #![allow(unsafe_code)] // a call of the C library that ends the process
 
-use crate::base::error::ExitCode;
+use flexbody_base::error::ExitCode;
 
 /// Ends the process at once: other threads may be inside HDF5, whose own end waits for them or crashes.
 pub fn end(code: ExitCode) -> ! {

@@ -4,16 +4,16 @@ use super::arguments::ExportArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
 use super::resources::memory_left;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::body::convert::interface_compliance;
-use crate::body::flex_body::FlexBody;
-use crate::formats::export::{ExportOptions, Exported, InertiaInScene, Points};
-use crate::formats::flex_body_file::{self, read_simulation};
-use crate::formats::{export, find_format};
-use crate::input::parse_units;
-use crate::motion::scene::{inertia_share, read_cases};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::convert::interface_compliance;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_file::read_simulation;
+use flexbody_formats::export::{ExportOptions, Exported, InertiaInScene, Points};
+use flexbody_formats::{export, find_format};
+use flexbody_input::parse_units;
+use flexbody_motion::scene::{inertia_share, read_cases};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     refuse_replacing(inputs(), std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
 
-    let (mut body, mut diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
+    let (mut body, mut diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     if let Some(scene) = &arguments.scene {
         options.in_scene = inertia_in_scene(&body, scene)?;
     }

@@ -4,15 +4,15 @@ use super::arguments::{ConvertArguments, FrameName, StorageName};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::terminal::body_text;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::provenance::SourceFile;
-use crate::formats::find_import_format;
-use crate::formats::flex_body_file;
-use crate::formats::import::{ImportFrame, accept_imported, import_body};
-use crate::input::{InputFile, parse_units};
-use crate::report::{Facts, Format, RunData, render};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_base::provenance::SourceFile;
+use flexbody_base::text::InputFile;
+use flexbody_formats::find_import_format;
+use flexbody_formats::import::{ImportFrame, accept_imported, import_body};
+use flexbody_input::parse_units;
+use flexbody_report::{Facts, Format, RunData, render};
 
 pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let format = find_import_format(from)?;
@@ -24,7 +24,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let outputs = std::iter::once(&arguments.output).chain(&arguments.report);
     refuse_replacing(std::iter::once(path), outputs)?;
-    let slot = flex_body_file::prepare_output(&arguments.output)?;
+    let slot = flexbody_file::prepare_output(&arguments.output)?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
 
     let file = InputFile::open(path)?;
@@ -42,7 +42,7 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     }
     accept_imported(&imported).map_err(|error| error.in_file(path))?;
     refuse_warnings(arguments.printing, &imported.diagnostics)?;
-    flex_body_file::fill_slot(&imported.body, &slot)?;
+    flexbody_file::fill_slot(&imported.body, &slot)?;
     let run = RunData { diagnostics: imported.diagnostics, ..RunData::default() };
     let facts = Facts::new(&imported.body, &run);
     for (slot, format) in reports.iter().zip(formats) {

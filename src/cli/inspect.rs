@@ -4,14 +4,13 @@ use super::arguments::InspectArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::terminal::body_text;
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::formats::flex_body_file;
-use crate::report::{Facts, Format, RunData, render};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_report::{Facts, Format, RunData, render};
 
 pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
     if arguments.structure {
-        let structure = format!("{:#}", flex_body_file::structure(&arguments.body)?);
+        let structure = format!("{:#}", flexbody_file::structure(&arguments.body)?);
         return Ok(Outcome {
             text: structure.clone(),
             json: structure,
@@ -22,7 +21,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     refuse_replacing(std::iter::once(&arguments.body), arguments.report.iter())?;
     let reports = arguments.report.iter().map(OutputSlot::prepare).collect::<Result<Vec<_>>>()?;
-    let (body, diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
+    let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let facts = Facts::new(&body, &RunData::default());
     if !reports.is_empty() {
         refuse_warnings(arguments.printing, &diagnostics)?;

@@ -2,12 +2,12 @@
 
 use super::arguments::JobArguments;
 use super::places::{refuse_replacing, refuse_replacing_read};
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
-use crate::input::{
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_input::{
     InterfaceNodes, InterfaceSource, ModelFiles, ModelSource, is_job, read_manifest, read_model,
 };
-use crate::model::{CheckedModel, Coupling, FeModel, Reference};
+use flexbody_model::{CheckedModel, Coupling, FeModel, Reference};
 use std::path::{Path, PathBuf};
 
 /// Whether `path`, of a model or of a flex-body file, is that of a model.

@@ -1,8 +1,8 @@
 //! What a command comes back with.
 
 use super::arguments::Printing;
-use crate::base::diagnostic::{Code, Diagnostic, Severity};
-use crate::base::error::{Error, Result};
+use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+use flexbody_base::error::{Error, Result};
 
 /// What a command found: text for stdout, the same as JSON, warnings and notes, and whether its checks
 /// passed.

@@ -8,13 +8,13 @@ use super::{
     assemble, audit, batch, check, compare, completions, convert, doctor, export, inspect, prepare, recipe,
     response, select, simulate, trade, view,
 };
-use crate::base::diagnostic::{Code, Diagnostic, Severity};
-use crate::base::error::{ExitCode, Result};
-use crate::base::memory::tell_left;
-use crate::base::output::{begin_run, end_run, stand_by};
-use crate::base::read_files;
-use crate::report::output_json;
 use clap::{CommandFactory, Parser};
+use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+use flexbody_base::error::{ExitCode, Result};
+use flexbody_base::memory::tell_left;
+use flexbody_base::output::{begin_run, end_run, stand_by};
+use flexbody_base::read_files;
+use flexbody_report::output_json;
 use std::ffi::OsString;
 use std::io::Write;
 

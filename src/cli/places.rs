@@ -1,13 +1,12 @@
 //! Where outputs go: each is reserved before the work, and appears after it.
 
 use super::arguments::ConvertArguments;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::read_files::{FileIdentity, refuse_read, replaces};
-use crate::formats::flex_body_file;
-use crate::report::Format;
-use crate::study::checkpoint::CheckpointFile;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_base::read_files::{FileIdentity, refuse_read, replaces};
+use flexbody_report::Format;
+use flexbody_study::checkpoint::CheckpointFile;
 use std::path::{Path, PathBuf};
 
 /// Output files of one body.
@@ -42,7 +41,7 @@ impl Places {
 
     pub(super) fn reserve(&self) -> Result<Reserved> {
         Ok(Reserved {
-            body: flex_body_file::prepare_output(&self.body)?,
+            body: flexbody_file::prepare_output(&self.body)?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
             checkpoint: self.checkpoint.as_deref().map(CheckpointFile::open).transpose()?,
         })

@@ -5,13 +5,13 @@ use super::arguments::PrepareArguments;
 use super::elsewhere::{folder_around, in_made_folder};
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::body::basis::ModeSettings;
-use crate::cluster::{ModelReference, PrepareSettings, Prepared, prepare};
-use crate::input::read_model;
-use crate::model::{CheckedModel, FeModel};
-use crate::numerics::eigen::{Accuracy, Wanted};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::ModeSettings;
+use flexbody_cluster::{ModelReference, PrepareSettings, Prepared, prepare};
+use flexbody_eigen::{Accuracy, Wanted};
+use flexbody_input::read_model;
+use flexbody_model::{CheckedModel, FeModel};
 
 pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     let accuracy = match arguments.accuracy {
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     Ok(Outcome { text, json: json.to_string(), diagnostics, passed: true })
 }
 
-fn usage(message: &str) -> crate::base::error::Error {
+fn usage(message: &str) -> flexbody_base::error::Error {
     Diagnostic::new(Code::Usage, message).into()
 }
 

@@ -2,9 +2,9 @@
 
 use super::arguments::RecipeArguments;
 use super::outcome::Outcome;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::input::RECIPES;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_input::RECIPES;
 
 pub(super) fn run(arguments: &RecipeArguments) -> Result<Outcome> {
     let recipe = RECIPES.iter().find(|recipe| recipe.program == arguments.program);

@@ -7,21 +7,20 @@ use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::progress::{Event, Watch};
-use crate::body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ModeSettings};
-use crate::body::convert::{ConvertSettings, convert};
-use crate::body::flex_body::FlexBody;
-use crate::formats::flex_body_file;
-use crate::input::LoadSource;
-use crate::model::FeModel;
-use crate::motion::scene::{Point, Scene, read_case};
-use crate::numerics::eigen::Wanted;
-use crate::report::{Format, ResponseFacts, RunData, response_csv};
-use crate::study::response::{Band, Place, Settings, respond};
-use crate::study::tailoring::read_loads;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ModeSettings};
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_eigen::Wanted;
+use flexbody_input::LoadSource;
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::FeModel;
+use flexbody_motion::scene::{Point, Scene, read_case};
+use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
+use flexbody_study::response::{Band, Place, Settings, respond};
+use flexbody_study::tailoring::read_loads;
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
@@ -44,7 +43,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
         let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
         (Some(model), body, diagnostics)
     } else {
-        let (body, notes) = flex_body_file::read_with_notes(&arguments.model)?;
+        let (body, notes) = flexbody_file::read_with_notes(&arguments.model)?;
         (None, body, notes)
     };
     let settings = settings(arguments, scene.as_ref(), &body)?;
@@ -107,7 +106,7 @@ fn model_and_body(
     let (files, checked) = read_checked(&arguments.model, &arguments.job, outputs(arguments))?;
     let (model, mut diagnostics) = (checked.model, checked.diagnostics);
     if let Some(path) = &arguments.body {
-        let (body, notes) = flex_body_file::read_with_notes(path)?;
+        let (body, notes) = flexbody_file::read_with_notes(path)?;
         diagnostics.extend(notes);
         return Ok((model, body, diagnostics));
     }

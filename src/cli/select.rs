@@ -6,21 +6,20 @@ use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
 use super::watcher::Watcher;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::progress::{Event, Watch};
-use crate::body::basis::{BasisChoice, FreeSurface, ModeSettings};
-use crate::body::convert::ConvertSettings;
-use crate::body::flex_body::FlexBody;
-use crate::formats::flex_body_file;
-use crate::model::CheckedModel;
-use crate::motion::scene::{Scene, read_case, read_cases};
-use crate::numerics::eigen::{Resume, Wanted};
-use crate::report::{Format, RunData, SelectionFacts};
-use crate::study::reference::{EnrichedForCases, ReferenceError};
-use crate::study::selection::select_for_cases;
-use crate::study::tailoring::{Tailoring, loads_for, read_loads};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::basis::{BasisChoice, FreeSurface, ModeSettings};
+use flexbody_body::convert::ConvertSettings;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_eigen::{Resume, Wanted};
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::CheckedModel;
+use flexbody_motion::scene::{Scene, read_case, read_cases};
+use flexbody_report::{Format, RunData, SelectionFacts};
+use flexbody_study::reference::{EnrichedForCases, ReferenceError};
+use flexbody_study::selection::select_for_cases;
+use flexbody_study::tailoring::{Tailoring, loads_for, read_loads};
 use std::path::Path;
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
@@ -40,7 +39,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
         converted(arguments, &scenes, &watch)?
     } else {
         refuse_modes(arguments)?;
-        let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
+        let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         (body, Vec::new(), notes)
     };
     let selection = select_for_cases(&body, &lacks, &scenes, memory_left(None), &watch)

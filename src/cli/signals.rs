@@ -6,9 +6,9 @@
 #![allow(unsafe_code)] // calls of the C library that ask for, set and raise signals
 
 use super::exit::end;
-use crate::base::children;
-use crate::base::error::ExitCode;
-use crate::base::output::{abandon_unfinished, abandon_unfinished_soon};
+use flexbody_base::children;
+use flexbody_base::error::ExitCode;
+use flexbody_base::output::{abandon_unfinished, abandon_unfinished_soon};
 use libc::{c_int, sigaction, siginfo_t};
 use signal_hook::iterator::Signals;
 use std::io::{IsTerminal, Write};

@@ -6,14 +6,13 @@ use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
 use super::resources::{memory_left, use_threads};
 use super::select::asked_cases;
 use super::watcher::Watcher;
-use crate::base::diagnostic::Diagnostic;
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::progress::Event;
-use crate::body::flex_body::FlexBody;
-use crate::formats::flex_body_file;
-use crate::motion::scene::{Scene, simulate, unsettled_rate};
-use crate::report::{Format, RunData, SimulationFacts, simulation_csv};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::progress::Event;
+use flexbody_motion::scene::{Scene, simulate, unsettled_rate};
+use flexbody_report::{Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
@@ -37,7 +36,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
         [_] => vec![reserved],
         all => all.iter().map(Places::reserve).collect::<Result<Vec<_>>>()?,
     };
-    let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
+    let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
     let job =
         Job { path: &arguments.scene, printing: arguments.printing, body: &body, formats: &formats, threads };
     let several = scenes.len() > 1;
@@ -109,7 +108,7 @@ impl Job<'_> {
         refuse_warnings(self.printing, &run.diagnostics)?;
         let facts = SimulationFacts::new(&recording, self.body.units(), &run);
         if let Some(slot) = &slots.motion {
-            flex_body_file::fill_simulation(&recording, self.body.units(), slot)?;
+            flexbody_file::fill_simulation(&recording, self.body.units(), slot)?;
         }
         if let Some(slot) = &slots.table {
             slot.fill(simulation_csv(&recording).as_bytes())?;
@@ -153,7 +152,7 @@ impl Places {
 
     fn reserve(&self) -> Result<Slots> {
         Ok(Slots {
-            motion: self.motion.as_ref().map(flex_body_file::prepare_output).transpose()?,
+            motion: self.motion.as_ref().map(flexbody_file::prepare_output).transpose()?,
             table: self.table.as_ref().map(OutputSlot::prepare).transpose()?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
         })

@@ -1,8 +1,8 @@
 //! What the terminal shows of a body, in how many columns, and whether in colours.
 
 use super::arguments::Printing;
-use crate::base::diagnostic::printable;
-use crate::report::{Facts, Format, Screen, render, summary};
+use flexbody_base::diagnostic::printable;
+use flexbody_report::{Facts, Format, Screen, render, summary};
 use std::borrow::Cow;
 use std::io::IsTerminal;
 

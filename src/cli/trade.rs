@@ -7,15 +7,14 @@ use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
 use super::select::asked_cases;
 use super::watcher::Watcher;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::base::progress::Event;
-use crate::body::basis::ModeSettings;
-use crate::formats::flex_body_file;
-use crate::report::{Format, RunData, TradeFacts, trade_csv};
-use crate::study::reference::ReferenceError;
-use crate::study::trade::{
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_body::basis::ModeSettings;
+use flexbody_linalg::progress::Event;
+use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
+use flexbody_study::reference::ReferenceError;
+use flexbody_study::trade::{
     Allowed, Row, Settings, Source, Trade, WantedBodies, conversions_for_cases, reserved, trade_for_cases,
 };
 use std::path::{Path, PathBuf};
@@ -49,7 +48,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         diagnostics.extend(made.diagnostics);
         (Some(checked.model), made.sources, made.lacks)
     } else {
-        let (body, notes) = flex_body_file::read_with_notes(&arguments.body)?;
+        let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         diagnostics.extend(notes);
         (None, vec![Source::new("file", body, None)?], Vec::new())
     };
@@ -104,8 +103,8 @@ fn candidate_bodies(
     let named: Vec<(PathBuf, &Row)> = named.collect();
     refuse_replacing(taken.iter().copied(), named.iter().map(|(path, _)| path))?;
     let written = named.into_iter().map(|(path, row)| {
-        let slot = flex_body_file::prepare_output(path)?;
-        flex_body_file::fill_slot(&row.candidate.body(&sources[row.candidate.source])?, &slot)?;
+        let slot = flexbody_file::prepare_output(path)?;
+        flexbody_file::fill_slot(&row.candidate.body(&sources[row.candidate.source])?, &slot)?;
         Ok(slot)
     });
     written.collect()

@@ -1,10 +1,10 @@
 //! Conversions for a scene whose selection does not hold: nothing is written unless the user allows it.
 
 use super::arguments::ConvertArguments;
-use crate::base::diagnostic::{Code, Diagnostic};
-use crate::base::error::{Error, Result};
-use crate::study::reference::ReferenceError;
-use crate::study::selection::Selection;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_study::reference::ReferenceError;
+use flexbody_study::selection::Selection;
 
 /// Ends a conversion whose `selection` does not hold, without `--allow-unjudged`; `found` are the diagnostics of the
 /// conversion, which say why.

@@ -3,16 +3,16 @@
 use super::arguments::ViewArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::refuse_replacing;
-use crate::base::error::Result;
-use crate::base::output::OutputSlot;
-use crate::formats::flex_body_file::{self, read_simulation};
-use crate::report::{Format, View};
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_file::read_simulation;
+use flexbody_report::{Format, View};
 
 pub(super) fn run(arguments: &ViewArguments) -> Result<Outcome> {
     let inputs = std::iter::once(&arguments.body).chain(&arguments.simulation);
     refuse_replacing(inputs, std::iter::once(&arguments.output))?;
     let slot = OutputSlot::prepare(&arguments.output)?;
-    let (body, diagnostics) = flex_body_file::read_with_notes(&arguments.body)?;
+    let (body, diagnostics) = flexbody_file::read_with_notes(&arguments.body)?;
     let motion = arguments.simulation.as_ref().map(read_simulation).transpose()?;
     let triangles = arguments.triangles.map(|most| most as usize);
     let view = View::new(&body, triangles, motion.as_ref()).map_err(|error| match &arguments.simulation {

@@ -1,8 +1,8 @@
 //! Progress on a terminal with the time that is left of each phase, and the time that each phase took.
 
 use super::resources::{cpu_seconds, has_thread};
-use crate::base::progress::Event;
-use crate::report::Phase;
+use flexbody_linalg::progress::Event;
+use flexbody_report::Phase;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;
 use std::sync::Mutex;

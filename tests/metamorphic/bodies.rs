@@ -2,15 +2,15 @@
 
 use crate::draws::{between, one_in, pick};
 use crate::stress::of_spin;
-use crate::support::beams::{BeamMass, elbow, star};
-use crate::support::elements::{Kind as Element, MassRule, Material};
-use crate::support::general::raw_fixture;
-use crate::support::mesh::{Mesh, grid};
-use crate::support::plane::rectangle;
-use crate::support::random::Random;
-use crate::support::turning::block;
-use flexbody::model::{Coupling, Damping, NodeSet, RawModel, Reference};
+use flexbody_model::{Coupling, Damping, NodeSet, RawModel, Reference};
 use nalgebra::Vector3;
+use oracle::beams::{BeamMass, elbow, star};
+use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::general::raw_fixture;
+use oracle::mesh::{Mesh, grid};
+use oracle::plane::rectangle;
+use oracle::random::Random;
+use oracle::turning::block;
 
 /// Kinds of bodies.
 pub const KINDS: [&str; 8] = [
@@ -41,7 +41,7 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
 }
 
 /// Damping of the model in a third of the cases.
-fn damping(random: &mut Random) -> Option<Damping<flexbody::model::RawMatrix>> {
+fn damping(random: &mut Random) -> Option<Damping<flexbody_model::RawMatrix>> {
     match pick(random, 6) {
         0 => Some(Damping::Ratio(0.02)),
         // Named by ratios of the lowest frequencies, which all bodies but the plane frame have near one.

@@ -1,7 +1,7 @@
 //! Random choices.
 
-use crate::support::random::Random;
 use nalgebra::Vector3;
+use oracle::random::Random;
 
 /// A stream of random numbers for a seed and a purpose: purposes do not share numbers.
 pub fn stream(seed: u64, purpose: u64) -> Random {

@@ -1,7 +1,7 @@
 //! Features of a scene, each of which can be told and taken away.
 
 use crate::subject::Subject;
-use flexbody::motion::scene::{Attachment, Drive, History, Load, Point, VectorHistory};
+use flexbody_motion::scene::{Attachment, Drive, History, Load, Point, VectorHistory};
 use nalgebra::Vector3;
 
 /// Names of the features of a subject, ascending.
@@ -12,7 +12,7 @@ pub fn features(subject: &Subject) -> Vec<&'static str> {
     let spin_start = scene.spin.as_ref().and_then(|spin| spin.start);
     let carried_start = carried_spin.and_then(|spin| spin.start);
     let drive = scene.carried.as_ref().and_then(|carried| carried.translation.as_ref());
-    let world = |axes| axes == flexbody::motion::scene::Axes::World;
+    let world = |axes| axes == flexbody_motion::scene::Axes::World;
     let all = || scene.acting().chain(scene.driving()).filter(|history| !history.is_nothing());
     let has = |test: &dyn Fn(&VectorHistory) -> bool| all().any(test);
     let loads = |test: &dyn Fn(&Load) -> bool| scene.loads.iter().any(test);

@@ -1,8 +1,7 @@
 //! The metamorphic matrix: scene features crossed with transformations that must not change the physics, crossed with
 //! the commands that judge a motion.
 
-#[path = "../support/mod.rs"]
-mod support;
+#![allow(unreachable_pub)] // nothing outside reads a test
 
 mod bodies;
 mod commands;
@@ -10,7 +9,7 @@ mod correspondence;
 mod draws;
 mod features;
 mod matrix;
-mod oracle;
+mod nodes_in_world;
 mod outputs;
 mod scenes;
 mod shrink;

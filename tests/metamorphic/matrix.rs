@@ -9,7 +9,7 @@ use crate::shrink::smallest;
 use crate::subject::Subject;
 use crate::text::Text;
 use crate::transformations::{self, Pair, Transformation};
-use flexbody::base::error::{Error, Result};
+use flexbody_base::error::{Error, Result};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::sync::Mutex;

@@ -3,18 +3,18 @@
 use crate::bodies::{self, KINDS, turns};
 use crate::draws::{axis, between, direction, one_in, pick, stream};
 use crate::subject::{Basis, Subject};
-use crate::support::random::Random;
-use crate::support::scenes::nothing_happens;
-use flexbody::base::error::Result;
-use flexbody::body::flex_body::FlexBody;
-use flexbody::body::invariants::BodyFrame;
-use flexbody::model::RawModel;
-use flexbody::motion::dynamics::RotationVector;
-use flexbody::motion::scene::{
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_model::RawModel;
+use flexbody_motion::dynamics::RotationVector;
+use flexbody_motion::scene::{
     AttachmentKind, Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, Point, Range,
     Samples, Scene, Scheme, Spin, Tolerance, VectorHistory, trace,
 };
 use nalgebra::{Matrix3, Vector3};
+use oracle::random::Random;
+use oracle::scenes::nothing_happens;
 use std::f64::consts::TAU;
 
 /// Largest deflection by the loads, relative to the extent of the body.

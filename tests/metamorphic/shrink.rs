@@ -1,7 +1,7 @@
 //! The smallest scene that still shows a violation.
 
 use crate::subject::{Basis, Subject};
-use flexbody::motion::scene::{Attachment, Axes, History, MotionRange, Scene, VectorHistory};
+use flexbody_motion::scene::{Attachment, Axes, History, MotionRange, Scene, VectorHistory};
 use nalgebra::Vector3;
 
 /// Drops features as long as `fails` holds; gives the last subject for which it does.

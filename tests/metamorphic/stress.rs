@@ -1,11 +1,11 @@
 //! Geometric stiffness of solids under the centrifugal forces of a spin.
 
-use crate::support::elements::Material;
-use crate::support::mesh::{Mesh, entries};
-use crate::support::reference::dense;
-use flexbody::model::{GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
-use flexbody::numerics::linalg::CscMatrix;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
 use nalgebra::{DMatrix, DVector, Vector3};
+use oracle::elements::Material;
+use oracle::mesh::{Mesh, entries};
+use oracle::reference::dense;
 
 /// Eigenvalues of K below this part of the largest are those of rigid motion.
 const RIGID: f64 = 1e-10;

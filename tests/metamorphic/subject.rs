@@ -1,16 +1,15 @@
 //! A model with the scene that it is put into.
 
 use crate::text;
-use flexbody::base::error::Result;
-use flexbody::base::progress::SILENT;
-use flexbody::body::basis::{BasisChoice, CraigBampton, ModeSettings};
-use flexbody::body::convert::{ConvertSettings, convert};
-use flexbody::body::flex_body::FlexBody;
-use flexbody::body::invariants::BodyFrame;
-use flexbody::formats::flex_body_file;
-use flexbody::model::{FeModel, RawModel};
-use flexbody::motion::scene::{Scene, read_cases};
-use flexbody::numerics::eigen::Wanted;
+use flexbody_base::error::Result;
+use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_eigen::Wanted;
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{FeModel, RawModel};
+use flexbody_motion::scene::{Scene, read_cases};
 
 /// Modes of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -85,8 +84,8 @@ impl Subject {
         }
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("body.flex.h5");
-        flex_body_file::write(&body, &path)?;
-        flex_body_file::read(&path)
+        flexbody_file::write(&body, &path)?;
+        flexbody_file::read(&path)
     }
 
     /// The load cases.

@@ -1,6 +1,6 @@
 //! A scene as the files that a user would write.
 
-use flexbody::motion::scene::{
+use flexbody_motion::scene::{
     Attachment, Axes, Drive, History, Load, Point, Range, Samples, Scene, Scheme, VectorHistory,
 };
 use nalgebra::Vector3;

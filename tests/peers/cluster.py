@@ -44,7 +44,7 @@ def forget(folder):
 
 def version():
     """Name and version of SLEPc; `Absent` where it is not here."""
-    probe = subprocess.run([PYTHON, str(ROOT / "src/cluster/driver.py"), "--probe"], capture_output=True, text=True)
+    probe = subprocess.run([PYTHON, str(ROOT / "crates/cluster/src/driver.py"), "--probe"], capture_output=True, text=True)
     if probe.returncode or not shutil.which(MPIEXEC.split()[0]):
         raise Absent("petsc4py, slepc4py and MPI (apt-get install python3-petsc4py-real python3-slepc4py-real)")
     told = json.loads(probe.stdout)

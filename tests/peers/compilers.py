@@ -2,7 +2,7 @@
 """The header of `embedded` in compilers: C99, C++ and, for a Cortex-M4F, the size of the code and of its stack.
 
 `rows` and `arm` are called by suite.py. `cc` and `c++` on the PATH; the ARM compiler (Debian: `apt-get install gcc-arm-none-eabi libnewlib-arm-none-eabi`)
-by ARM_GCC or on the PATH. That the code computes the right numbers is the matter of tests/formats/export_embedded.rs, in C and in C++.
+by ARM_GCC or on the PATH. That the code computes the right numbers is the matter of crates/formats/tests/formats/export_embedded.rs, in C and in C++.
 """
 
 import re

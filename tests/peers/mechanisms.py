@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Motion of two flexible bodies in Exudyn: a double pendulum and a slider-crank; writes tests/motion/motion/physics/mechanisms.json.
+"""Motion of two flexible bodies in Exudyn: a double pendulum and a slider-crank; writes tests/program/motion/mechanisms.json.
 
 Optional, some minutes: needs Python with exudyn, h5py, numpy and scipy; not part of `cargo test`, which reads the result.
 
@@ -199,7 +199,7 @@ def main():
                 "joints": [{"ends": [say(a), say(b)], "axes": [bool(v) for v in axes]} for a, b, axes in m["joints"]],
                 "shown": [say(end) for end in m["shown"]], "gravity": list(m["gravity"]),
                 "duration": m["duration"], "error": error, "places": places.tolist()}
-    (ROOT / "tests/motion/motion/physics/mechanisms.json").write_text(json.dumps(result, indent=1) + "\n")
+    (ROOT / "tests/program/motion/mechanisms.json").write_text(json.dumps(result, indent=1) + "\n")
 
 
 if __name__ == "__main__":

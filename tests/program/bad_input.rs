@@ -31,9 +31,10 @@
 //! and so is a file that is that of the base. `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes
 //! the reports; read the difference.
 
-use crate::support::cases::{Case, contents};
-use crate::support::program::{fixtures, flexbody, members};
-use flexbody::base::diagnostic::Code;
+use crate::program::flexbody;
+use flexbody_base::diagnostic::Code;
+use oracle::cases::{Case, contents};
+use oracle::{fixtures, members};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -177,7 +178,7 @@ fn every_code_about_inputs_and_models_has_a_case() {
     let known: BTreeSet<&str> = Code::ALL.iter().map(|code| code.id()).collect();
     let unknown: Vec<&String> = codes.iter().filter(|id| !known.contains(id.as_str())).collect();
     assert!(unknown.is_empty(), "no codes: {unknown:?}");
-    // These need another state of the program; outputs are in tests/formats/store_output.rs and
+    // These need another state of the program; outputs are in crates/file/tests/file/store_output.rs and
     // tests/program/command_line.rs, files that change while they are read in tests/program/hostile_files.rs.
     let elsewhere = ["FB104", "FB105", "FB107", "FB121", "FB132"];
     let missing: Vec<&str> = known

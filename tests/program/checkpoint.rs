@@ -1,18 +1,18 @@
 //! A search for modes that goes on from a checkpoint gives what a fresh one gives, with less work; a file
 //! that is no checkpoint of the model is refused.
 
-use flexbody::base::progress::SILENT;
-use flexbody::body::basis::{ModalBasis, ModeSettings, free_surface, free_surface_resumed};
-use flexbody::input::{read_manifest, read_model};
-use flexbody::model::FeModel;
-use flexbody::numerics::eigen::{Accuracy, Method, Proof, Resume, Snapshot, Wanted};
-use flexbody::numerics::linalg::gram;
+use flexbody_body::basis::{ModalBasis, ModeSettings, free_surface, free_surface_resumed};
+use flexbody_eigen::{Accuracy, Method, Proof, Resume, Snapshot, Wanted};
+use flexbody_input::{read_manifest, read_model};
+use flexbody_linalg::gram;
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::FeModel;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Mutex;
 
 fn manifest(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name).join("model.toml")
+    oracle::root().join("fixtures/models").join(name).join("model.toml")
 }
 
 fn model(name: &str) -> FeModel {

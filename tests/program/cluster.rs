@@ -2,16 +2,17 @@
 //! results are written here as the driver writes them, from modes of the built-in solver; `tests/peers` runs
 //! the driver itself.
 
-use crate::support::program::{fixtures, flexbody, members};
+use crate::program::flexbody;
 use faer::Mat;
-use flexbody::base::progress::SILENT;
-use flexbody::base::provenance::sha256_hex;
-use flexbody::body::basis::{ModeSettings, free_surface, rigid_modes};
-use flexbody::cluster::Budget;
-use flexbody::input::{read_manifest, read_model};
-use flexbody::model::FeModel;
-use flexbody::numerics::eigen::Wanted;
+use flexbody_base::provenance::sha256_hex;
+use flexbody_body::basis::{ModeSettings, free_surface, rigid_modes};
+use flexbody_cluster::Budget;
+use flexbody_eigen::Wanted;
+use flexbody_input::{read_manifest, read_model};
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::FeModel;
 use nalgebra::Vector3;
+use oracle::{fixtures, members};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};

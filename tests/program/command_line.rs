@@ -5,10 +5,10 @@
 #[path = "../../examples/from_memory.rs"]
 mod from_memory;
 
-use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::files::{DofOrder, Numbering, Triangle, reordered, write_model};
-use crate::support::mesh::{Assembly, Mesh};
-use crate::support::program::members;
+use oracle::elements::{Kind, MassRule, Material};
+use oracle::files::{DofOrder, Numbering, Triangle, reordered, write_model};
+use oracle::members;
+use oracle::mesh::{Assembly, Mesh};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -55,7 +55,7 @@ fn done(folder: &Path, line: &str) -> Run {
 }
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name)
+    oracle::root().join("fixtures/models").join(name)
 }
 
 fn block() -> Assembly {
@@ -462,7 +462,7 @@ fn inspect_tells_what_the_file_holds() {
 #[test]
 fn the_summary_says_what_is_approximate() {
     let folder = tempfile::tempdir().unwrap();
-    let model = crate::support::program::fixtures().join("models/plane_frame/model.toml");
+    let model = oracle::fixtures().join("models/plane_frame/model.toml");
     let line = format!("convert {} -o b.h5 --modes 4 --storage f32", model.display());
     let text = done(folder.path(), &line).out;
     for part in ["PLANE model", "a part of the mass along the axes of the", "rounded to 32-bit floats"] {
@@ -473,7 +473,7 @@ fn the_summary_says_what_is_approximate() {
 #[test]
 fn exports_tell_what_they_lose_in_a_scene() {
     let folder = tempfile::tempdir().unwrap();
-    let model = crate::support::program::fixtures().join("models/mpc_block/model.toml");
+    let model = oracle::fixtures().join("models/mpc_block/model.toml");
     done(folder.path(), &format!("convert {} -o b.h5 --modes 4", model.display()));
     let lost = |scene: &str| {
         let line = format!("export b.h5 --to exudyn -o b.hdf5 --allow-loss {scene}");
@@ -504,8 +504,7 @@ fn nodal_masses_of_the_user_are_compared_like_any_other_scheme() {
     let folder = model();
     // Row sums as a user would write them, in another order of the nodes.
     let mut sums = vec![0.0; block().nodes.len()];
-    crate::support::mesh::entries(&block().scalar_mass)
-        .for_each(|(row, _, value)| sums[row as usize] += value);
+    oracle::mesh::entries(&block().scalar_mass).for_each(|(row, _, value)| sums[row as usize] += value);
     let mut rows: Vec<_> = sums.iter().enumerate().map(|(i, m)| format!("{},{m:e}\n", i + 1)).collect();
     rows.reverse();
     fs::write(folder.path().join("masses.csv"), "node,mass\n".to_owned() + &rows.concat()).unwrap();

@@ -2,15 +2,14 @@
 //! `FLEXBODY_BLESS=1 cargo test --test program docs_generated` writes them. Written ones lead to files and
 //! codes that exist.
 
-use flexbody::base::diagnostic;
-use flexbody::base::diagnostic::{Code, Severity};
-use flexbody::formats::flex_body_file;
-use flexbody::input::RECIPES;
-use std::path::{Path, PathBuf};
+use flexbody_base::diagnostic;
+use flexbody_base::diagnostic::{Code, Severity};
+use flexbody_input::RECIPES;
+use std::path::PathBuf;
 
 #[track_caller]
 fn assert_generated(path: &str, generated: &str) {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    let file = oracle::root().join(path);
     if std::env::var_os("FLEXBODY_BLESS").is_some_and(|v| v == "1") {
         std::fs::write(&file, generated).unwrap();
     }
@@ -23,12 +22,12 @@ fn assert_generated(path: &str, generated: &str) {
 
 #[test]
 fn format_description() {
-    assert_generated("docs/format.md", &flex_body_file::format_markdown());
+    assert_generated("docs/format.md", &flexbody_file::format_markdown());
 }
 
 #[test]
 fn format_schema() {
-    assert_generated("schemas/flexbody-file.schema.json", &flex_body_file::format_schema());
+    assert_generated("schemas/flexbody-file.schema.json", &flexbody_file::format_schema());
 }
 
 #[test]
@@ -39,7 +38,7 @@ fn diagnostic_codes() {
 /// What `flexbody recipe` prints stands in the page on FE programs, each piece in a block of its own.
 #[test]
 fn recipes_are_those_of_the_page() {
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/fe_programs.md");
+    let page = oracle::root().join("docs/fe_programs.md");
     let page = std::fs::read_to_string(page).expect("the page");
     for recipe in RECIPES {
         for step in recipe.steps {
@@ -51,7 +50,7 @@ fn recipes_are_those_of_the_page() {
 
 /// README, ARCHITECTURE, CHANGELOG and all of `docs/`, `fixtures/` and `benches/` with their text.
 fn documents() -> Vec<(PathBuf, String)> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = oracle::root();
     let mut found = Vec::new();
     for folder in ["", "docs", "docs/formats", "fixtures", "fixtures/codes", "benches/peers"] {
         for entry in std::fs::read_dir(root.join(folder)).unwrap() {
@@ -99,7 +98,7 @@ fn codes_are_unique_and_their_exit_codes_fit_their_severity() {
     ids.dedup();
     assert_eq!(ids.len(), Code::ALL.len());
     for code in Code::ALL {
-        let fails = code.exit_code() != flexbody::base::error::ExitCode::Done;
+        let fails = code.exit_code() != flexbody_base::error::ExitCode::Done;
         assert_eq!(fails, code.severity() == Severity::Error, "{}", code.id());
     }
 }

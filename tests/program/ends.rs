@@ -3,11 +3,11 @@
 //! `FLEXBODY` names another program that these tests run: scripts/release.sh holds the one that is handed out to them.
 #![cfg(unix)]
 
-use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::files::{Triangle, write_model};
-use crate::support::mesh::Mesh;
-use crate::support::program::{fixtures, members};
-use flexbody::base::error::ExitCode;
+use flexbody_base::error::ExitCode;
+use oracle::elements::{Kind, MassRule, Material};
+use oracle::files::{Triangle, write_model};
+use oracle::mesh::Mesh;
+use oracle::{fixtures, members};
 use std::io::{Read, Write};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use tempfile::TempDir;
 fn program(folder: &Path) -> Command {
     let mut command = Command::new("sh");
     command.args(["-c", "ulimit -c 0; exec \"$@\"", "sh"]).current_dir(folder);
-    command.arg(crate::support::program::program());
+    command.arg(crate::program::program());
     command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     command
 }

@@ -1,10 +1,10 @@
 //! The library as a program that uses it sees it: listeners, interfaces, reports, motions, trade studies, jobs.
 
-use crate::support::program::fixtures;
 use flexbody::{
     Basis, Code, ConvertOptions, Coupling, ExitCode, FlexBody, Model, Progress, ReportFormat, Scene,
     SparseMatrix, TradeOptions,
 };
+use oracle::fixtures;
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};

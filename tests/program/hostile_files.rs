@@ -1,6 +1,7 @@
 //! Files that do harm: they change while they are read, load code, send commands to the terminal, lead elsewhere.
 
-use crate::support::program::{fixtures, flexbody, members};
+use crate::program::flexbody;
+use oracle::{fixtures, members};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

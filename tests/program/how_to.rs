@@ -28,7 +28,7 @@ fn run(commands: &str, folder: &Path) -> String {
 }
 
 fn check(name: &str) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = oracle::root();
     let page = std::fs::read_to_string(root.join("docs/how_to").join(name)).expect("a page");
     let folder = tempfile::tempdir().expect("a folder");
     std::os::unix::fs::symlink(root.join("fixtures"), folder.path().join("fixtures")).expect("a link");

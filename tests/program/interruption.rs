@@ -1,11 +1,11 @@
 //! An interrupted program ends at once, says so, and leaves nothing but what was there before.
 #![cfg(unix)]
 
-use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::files::{Triangle, write_model};
-use crate::support::mesh::Mesh;
-use crate::support::program::members;
-use flexbody::base::error::ExitCode;
+use flexbody_base::error::ExitCode;
+use oracle::elements::{Kind, MassRule, Material};
+use oracle::files::{Triangle, write_model};
+use oracle::members;
+use oracle::mesh::Mesh;
 use std::io::Read;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
@@ -159,7 +159,7 @@ fn programs_that_it_waits_for_end_with_it() {
 /// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of
 /// these names.
 fn small_convert(out: &Path) -> Command {
-    let model = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models/cube_hex8/model.toml");
+    let model = oracle::root().join("fixtures/models/cube_hex8/model.toml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
     command.arg("convert").arg(model).args(["--output", "new.flex.h5", "--report", "new.json"]);
     command.current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());
@@ -190,7 +190,7 @@ fn whenever_it_is_killed_outputs_are_whole_and_the_next_run_leaves_nothing_else(
             let _ = Command::new("kill").arg(format!("-{signal}")).arg(child.id().to_string()).output();
             let status = child.wait().expect("a child");
             if !is_old(&body) {
-                flexbody::formats::flex_body_file::read(&body).expect("a whole body");
+                flexbody_file::read(&body).expect("a whole body");
             }
             if !is_old(&report) {
                 let text = std::fs::read_to_string(&report).expect("text");

@@ -1,12 +1,12 @@
 //! With `--json` every command prints one object, as `schemas/output.schema.json` says, whatever became of
 //! the run; warnings end a run where they are denied.
 
-use crate::support::elements::{Kind, MassRule, Material};
-use crate::support::files::{Triangle, write_model};
-use crate::support::mesh::Mesh;
-use crate::support::program::flexbody;
-use flexbody::cli::Arguments;
+use crate::program::flexbody;
+use flexbody::program::Arguments;
 use jsonschema::{Retrieve, Uri};
+use oracle::elements::{Kind, MassRule, Material};
+use oracle::files::{Triangle, write_model};
+use oracle::mesh::Mesh;
 use serde_json::Value;
 use std::error::Error;
 use std::fs;
@@ -24,7 +24,7 @@ struct Folder;
 impl Retrieve for Folder {
     fn retrieve(&self, uri: &Uri<String>) -> Result<Value, Box<dyn Error + Send + Sync>> {
         let name = uri.path().as_str().rsplit('/').next().unwrap_or_default();
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas").join(name);
+        let path = oracle::root().join("schemas").join(name);
         Ok(serde_json::from_str(&fs::read_to_string(path)?)?)
     }
 }

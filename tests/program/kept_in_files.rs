@@ -1,12 +1,13 @@
 //! Matrices that are kept in files instead of in memory: the same as others, and the same files for a cluster.
 
-use crate::support::program::{fixtures, flexbody, members};
-use flexbody::base::progress::SILENT;
-use flexbody::body::convert::{ConvertSettings, convert};
-use flexbody::input::{read_manifest, read_model};
-use flexbody::model::{FeModel, RawModel};
-use flexbody::numerics::linalg::CscMatrix;
+use crate::program::flexbody;
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_input::{read_manifest, read_model};
+use flexbody_linalg::CscMatrix;
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{FeModel, RawModel};
 use hdf5_metno as hdf5;
+use oracle::{fixtures, members};
 use std::fs;
 use std::path::Path;
 

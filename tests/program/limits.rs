@@ -2,13 +2,13 @@
 //! message, and leaves nothing behind. Never a signal, never a panic.
 #![cfg(target_os = "linux")]
 
-use crate::support::program::members;
-use flexbody::base::error::ExitCode;
+use flexbody_base::error::ExitCode;
+use oracle::members;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn fixture(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/models").join(name).join("model.toml")
+    oracle::root().join("fixtures/models").join(name).join("model.toml")
 }
 
 /// Runs the program in `folder` under `limit`, which the shell sets.

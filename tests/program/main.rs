@@ -1,28 +1,30 @@
 //! The program as people and scripts meet it: command line, messages, reports, limits; documents and the
 //! structure of the sources.
 
-#[path = "../support/mod.rs"]
-mod support;
+#![allow(unreachable_pub)] // nothing outside reads a test
 
-mod architecture;
 mod bad_input;
+mod bodies;
 mod checkpoint;
 mod cluster;
 mod command_line;
-mod comparison_coverage;
 mod docs_generated;
 mod ends;
+mod formats;
 mod front_door;
 mod hostile_files;
-#[cfg(unix)]
 mod how_to;
 mod interruption;
+mod jointed;
 mod json_output;
 mod kept_in_files;
 mod licences;
 mod limits;
+mod models;
+mod motion;
 mod odd_files;
+mod program;
 mod replaced_inputs;
-mod report;
-mod report_comparison;
+mod structure;
+mod study;
 mod view;

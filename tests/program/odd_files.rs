@@ -2,7 +2,8 @@
 //! program says so before the work, waits for nothing, and keeps what a file had.
 #![cfg(unix)]
 
-use crate::support::program::{fixtures, members, program};
+use crate::program::program;
+use oracle::{fixtures, members};
 use std::fs::{self, Permissions};
 use std::os::unix::fs::{MetadataExt, PermissionsExt};
 use std::path::Path;

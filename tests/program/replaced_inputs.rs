@@ -1,7 +1,8 @@
 //! No output replaces a file that a command reads, also one that no argument names: what a deck includes or assigns, a
 //! history of a scene, a file under the name of a link.
 
-use crate::support::program::{fixtures, flexbody, members};
+use crate::program::flexbody;
+use oracle::{fixtures, members};
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;

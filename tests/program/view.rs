@@ -1,10 +1,11 @@
 //! The page of `flexbody view`: what it holds, and that a browser draws it.
 
-use crate::support::file_bodies::{Random, parts};
-use crate::support::program::{fixtures, flexbody};
-use flexbody::body::flex_body::{FlexBody, SurfaceMesh};
-use flexbody::formats::flex_body_file::{self, read_simulation};
-use flexbody::report::{Facts, Format, RunData, View, render};
+use crate::program::flexbody;
+use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
+use flexbody_file::{self, read_simulation};
+use flexbody_report::{Facts, Format, RunData, View, render};
+use oracle::file_bodies::{Random, parts};
+use oracle::fixtures;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -98,8 +99,8 @@ fn simulations_are_played_by_their_body() {
     let page = fs::read_to_string(folder.path().join("spin.html")).expect("a page");
     assert_eq!(element(&page, "data-times").len(), (4 * 21usize).div_ceil(3) * 4);
     // Colours go up to the largest deflection, which may lie between the instants.
-    let body = flex_body_file::read(folder.path().join("body.flex.h5")).expect("a body");
-    let motion = flex_body_file::read_simulation(folder.path().join("spin.h5")).expect("a motion");
+    let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
+    let motion = flexbody_file::read_simulation(folder.path().join("spin.h5")).expect("a motion");
     let shape = &body.modes().shape;
     let deflection = |q: &[f64], node: usize| {
         let along = |k: usize| q.iter().enumerate().map(|(j, q)| q * shape[(3 * node + k, j)]).sum::<f64>();

@@ -1,9 +1,9 @@
 //! Arguments of the commands that guide: `doctor`, `completions`, `man`, `recipe`.
 
 use super::Printing;
-use crate::input::RECIPES;
 use clap::Args;
 use clap::builder::PossibleValue;
+use flexbody_input::RECIPES;
 
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]

@@ -1,8 +1,8 @@
 //! What can be said on the command line about transfer functions.
 
 use super::{BasisName, JobArguments, Printing, positive};
-use crate::study::response::{Band, Settings as ResponseSettings};
 use clap::Args;
+use flexbody_study::response::{Band, Settings as ResponseSettings};
 use std::path::PathBuf;
 
 /// Arguments of `response`.

@@ -7,9 +7,9 @@ mod verdicts;
 use crate::outputs::{Output, Outputs, Values};
 use crate::subject::Subject;
 use crate::transformations::Reach;
-use flexbody::base::diagnostic::Diagnostic;
-use flexbody::base::error::Result;
-use flexbody::motion::scene::{Scene, Scheme};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::Result;
+use flexbody_motion::scene::{Scene, Scheme};
 use std::collections::BTreeSet;
 
 /// A command with its name.

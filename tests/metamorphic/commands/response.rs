@@ -3,10 +3,10 @@
 use super::{error, findings};
 use crate::outputs::{Output, Outputs, Values};
 use crate::subject::Subject;
-use flexbody::base::error::Result;
-use flexbody::base::progress::SILENT;
-use flexbody::motion::scene::Point;
-use flexbody::study::response::{Band, Complex, Function, Place, Settings, respond};
+use flexbody_base::error::Result;
+use flexbody_linalg::progress::SILENT;
+use flexbody_motion::scene::Point;
+use flexbody_study::response::{Band, Complex, Function, Place, Settings, respond};
 
 /// Damping ratio of a body that has none: responses at resonances are finite.
 const RATIO: f64 = 0.02;

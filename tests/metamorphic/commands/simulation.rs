@@ -3,10 +3,10 @@
 use super::{LOOKED_AT, STEP_ENDS, findings, number};
 use crate::outputs::{Along, Output, Outputs, Values};
 use crate::subject::Subject;
-use flexbody::base::error::Result;
-use flexbody::body::flex_body::FlexBody;
-use flexbody::motion::dynamics::Orientation;
-use flexbody::motion::scene::{Recording, simulate};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_motion::dynamics::Orientation;
+use flexbody_motion::scene::{Recording, simulate};
 use nalgebra::{Matrix3, Vector3};
 
 const LENGTH: [i32; 3] = [1, 0, 0];

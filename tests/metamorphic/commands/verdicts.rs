@@ -3,13 +3,13 @@
 use super::{ENRICHED, cases, error, facts, findings};
 use crate::outputs::{Output, Outputs};
 use crate::subject::{Basis, Subject};
-use flexbody::base::error::Result;
-use flexbody::base::progress::SILENT;
-use flexbody::numerics::eigen::Resume;
-use flexbody::study::reference::ReferenceError;
-use flexbody::study::selection::{Selection, select_for_cases};
-use flexbody::study::tailoring::{Tailoring, convert_for_cases};
-use flexbody::study::trade::{Kind, Row, Settings, Source, trade_for_cases};
+use flexbody_base::error::Result;
+use flexbody_eigen::Resume;
+use flexbody_linalg::progress::SILENT;
+use flexbody_study::reference::ReferenceError;
+use flexbody_study::selection::{Selection, select_for_cases};
+use flexbody_study::tailoring::{Tailoring, convert_for_cases};
+use flexbody_study::trade::{Kind, Row, Settings, Source, trade_for_cases};
 
 /// Errors over their tolerances are compared up to this one.
 const BEYOND: f64 = 2.0;

@@ -4,9 +4,9 @@ use super::Pair;
 use crate::correspondence::Correspondence;
 use crate::features::has_singular_mass;
 use crate::subject::{Basis, Subject};
-use crate::support::random::Random;
-use flexbody::base::error::Result;
-use flexbody::body::invariants::BodyFrame;
+use flexbody_base::error::Result;
+use flexbody_body::invariants::BodyFrame;
+use oracle::random::Random;
 
 /// Converts with another frame.
 pub fn frame(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {

@@ -1,6 +1,6 @@
 //! Histories with other times and values.
 
-use flexbody::motion::scene::{Drive, History, Interpolation, Samples, Scene, VectorHistory};
+use flexbody_motion::scene::{Drive, History, Interpolation, Samples, Scene, VectorHistory};
 use std::f64::consts::TAU;
 
 /// A change of the time t to `factor` (t + `delay`).

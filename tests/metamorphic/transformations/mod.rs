@@ -12,8 +12,8 @@ pub use histories::{Driven, for_driving};
 
 use crate::correspondence::Correspondence;
 use crate::subject::Subject;
-use crate::support::random::Random;
-use flexbody::base::error::Result;
+use flexbody_base::error::Result;
+use oracle::random::Random;
 
 /// Two subjects whose outputs must correspond.
 #[derive(Debug, Clone)]

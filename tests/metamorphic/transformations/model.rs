@@ -6,13 +6,13 @@ use super::world::{extent, turning};
 use crate::correspondence::Correspondence;
 use crate::draws::direction;
 use crate::subject::Subject;
-use crate::support::mesh::entries;
-use crate::support::random::Random;
-use flexbody::base::error::Result;
-use flexbody::model::{Damping, DofLabel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
-use flexbody::motion::scene::Point;
-use flexbody::numerics::linalg::CscMatrix;
+use flexbody_base::error::Result;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{Damping, DofLabel, GeometricStiffness, LoadKind, RawMatrix, RawModel, UnitLoad};
+use flexbody_motion::scene::Point;
 use nalgebra::{Matrix3, Vector3};
+use oracle::mesh::entries;
+use oracle::random::Random;
 use std::collections::{BTreeMap, HashMap};
 
 /// Turns the model about its origin.

@@ -3,9 +3,9 @@
 use super::model::{conjugated, geometric};
 use super::scene::start_axes;
 use crate::subject::Subject;
-use flexbody::model::{Damping, RawMatrix, RawModel, Reference};
-use flexbody::motion::dynamics::{Orientation, RotationVector};
-use flexbody::motion::scene::{Axes, Drive, Scene, VectorHistory};
+use flexbody_model::{Damping, RawMatrix, RawModel, Reference};
+use flexbody_motion::dynamics::{Orientation, RotationVector};
+use flexbody_motion::scene::{Axes, Drive, Scene, VectorHistory};
 use nalgebra::{Matrix3, Vector3};
 
 /// A turn or mirror image of the world, and one of the model with a shift.

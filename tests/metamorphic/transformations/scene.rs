@@ -6,13 +6,13 @@ use crate::correspondence::Correspondence;
 use crate::draws::{between, pick};
 use crate::scenes::scaled;
 use crate::subject::Subject;
-use crate::support::random::Random;
-use flexbody::base::error::Result;
-use flexbody::motion::dynamics::{Orientation, RotationVector};
-use flexbody::motion::scene::{
+use flexbody_base::error::Result;
+use flexbody_motion::dynamics::{Orientation, RotationVector};
+use flexbody_motion::scene::{
     Axes, Drive, History, Initial, ModeStart, Point, Scene, Stage, VectorHistory, simulate,
 };
 use nalgebra::{Matrix3, Vector3};
+use oracle::random::Random;
 
 /// States every vector along other axes.
 pub fn axes(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {

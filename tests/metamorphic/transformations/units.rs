@@ -6,13 +6,13 @@ use super::model::rows;
 use crate::correspondence::Correspondence;
 use crate::draws::pick;
 use crate::subject::Subject;
-use crate::support::mesh::entries;
-use crate::support::random::Random;
-use flexbody::base::error::Result;
-use flexbody::base::units::UnitSystem;
-use flexbody::model::{Damping, LoadKind, RawMatrix, RawModel, Reference};
-use flexbody::motion::scene::{Range, Scene, Scheme};
-use flexbody::numerics::linalg::CscMatrix;
+use flexbody_base::error::Result;
+use flexbody_base::units::UnitSystem;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{Damping, LoadKind, RawMatrix, RawModel, Reference};
+use flexbody_motion::scene::{Range, Scene, Scheme};
+use oracle::mesh::entries;
+use oracle::random::Random;
 
 /// Numbers of a length, a mass and a time over those in the old units.
 #[derive(Debug, Clone, Copy)]

@@ -5,11 +5,11 @@ use super::moved::Motion;
 use crate::correspondence::Correspondence;
 use crate::draws::{axis, between, direction};
 use crate::subject::Subject;
-use crate::support::random::Random;
-use flexbody::base::error::Result;
-use flexbody::motion::dynamics::{Orientation, RotationVector};
-use flexbody::motion::scene::{Drive, History, VectorHistory};
+use flexbody_base::error::Result;
+use flexbody_motion::dynamics::{Orientation, RotationVector};
+use flexbody_motion::scene::{Drive, History, VectorHistory};
 use nalgebra::{Matrix3, Vector3};
+use oracle::random::Random;
 
 /// A random turn, of a plane model in its plane.
 pub fn turning(subject: &Subject, random: &mut Random) -> Matrix3<f64> {

@@ -1,0 +1,464 @@
+//! The one table of diagnostics: every message the tool can give has a code, a severity, an exit code, a
+//! title and a default help here. `docs/codes.md` is generated from it; `fixtures/codes/` triggers each.
+
+use crate::exit_code::ExitCode;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// How much a diagnostic weighs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// A fact the user should know.
+    Note,
+    /// The result stands, but something is unusual.
+    Warning,
+    /// The operation cannot be done, or its result cannot be trusted.
+    Error,
+}
+
+impl Severity {
+    /// `note`, `warning`, `error`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Severity::Note => "note",
+            Severity::Warning => "warning",
+            Severity::Error => "error",
+        }
+    }
+}
+
+macro_rules! codes {
+    ($($variant:ident = $id:literal, $severity:ident, $exit:ident, $title:literal, $help:literal;)*) => {
+        /// A diagnostic's identity. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model,
+        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files and checkpoints, FB8xx usage.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        pub enum Code {
+            $(#[doc = $title] $variant,)*
+        }
+
+        impl Code {
+            /// Every code, in the order of the table.
+            pub const ALL: &'static [Code] = &[$(Code::$variant,)*];
+
+            /// The printed identity, `FB` and three digits.
+            pub fn id(self) -> &'static str {
+                match self { $(Code::$variant => $id,)* }
+            }
+
+            /// Severity of every diagnostic with this code.
+            pub fn severity(self) -> Severity {
+                match self { $(Code::$variant => Severity::$severity,)* }
+            }
+
+            /// Exit code of a process that ends because of it ([`ExitCode::Done`] for warnings and notes).
+            pub fn exit_code(self) -> ExitCode {
+                match self { $(Code::$variant => ExitCode::$exit,)* }
+            }
+
+            /// What is wrong, in general.
+            pub fn title(self) -> &'static str {
+                match self { $(Code::$variant => $title,)* }
+            }
+
+            /// What to do about it, in general; a diagnostic may say something more precise.
+            pub fn help(self) -> &'static str {
+                match self { $(Code::$variant => $help,)* }
+            }
+        }
+    };
+}
+
+codes! {
+    // FB1xx: files
+    FileUnreadable = "FB101", Error, BadInput, "file cannot be read", "check the path and its permissions";
+    FileFormatUnknown = "FB102", Error, BadInput, "file format not recognised", "give Matrix Market (.mtx, .mtx.gz, .mtx.zst), HDF5 (.h5, .hdf5), SciPy (.npz), MATLAB (.mat), PETSc or Nastran (.op4, .pch) matrices";
+    FileCompressionBroken = "FB103", Error, BadInput, "compressed file is damaged or cut off", "transfer or write the file again";
+    OutputUnwritable = "FB104", Error, Resources, "output cannot be written", "check the folder, its permissions and the free space";
+    OutputFolderMissing = "FB105", Error, BadInput, "folder of the output file does not exist", "make the folder first";
+    FileEmpty = "FB106", Error, BadInput, "file is empty", "write the file again";
+    OutputNotFile = "FB107", Error, BadInput, "output path does not name a file", "name a file that may be made or replaced";
+    JobUnknown = "FB108", Error, BadInput, "not the job of an FE program that is read", "give a manifest, or name the program with --format";
+    JobIncomplete = "FB109", Error, BadInput, "file of an FE job is missing", "write all of them in one run and keep them beside the deck";
+    DeckSyntax = "FB110", Error, BadInput, "input deck cannot be read", "correct the line";
+    DeckUnsupported = "FB111", Error, BadInput, "input deck says what is not read", "write the model without it, or give matrices and tables by a manifest";
+    DeckRows = "FB112", Error, BadInput, "rows of the matrices are not those of the input deck", "write deck and matrices in one run";
+    DeckRenumbered = "FB113", Note, Done, "nodes of instances are numbered anew", "nothing to do; interfaces go by node sets";
+    JobStep = "FB114", Note, Done, "one of several steps with matrices is taken", "nothing to do if it is the right one; else remove the others";
+    NodeFileSyntax = "FB115", Error, BadInput, "file of nodes cannot be read", "write it again, or give a table with the columns node, x, y, z";
+    DeckSupports = "FB116", Note, Done, "input deck supports the body", "matrices that are written before the supports are applied (KGG, MGG) are free; for others take the supports out";
+    RowsEmpty = "FB117", Note, Done, "rows without stiffness and mass are left out", "nothing to do for rotations of solids and nodes of no element";
+    DeckLumps = "FB118", Warning, Done, "input deck does not ask for consistent masses", "write PARAM,COUPMASS,1 into the bulk data and run the deck again";
+    JobCondensed = "FB119", Warning, Done, "matrices are condensed to the boundary of a superelement", "give K and M of all nodes (of Nastran KGG and MGG) where it matters how the inertia changes with the deformation";
+    DeckReference = "FB120", Note, Done, "reference node of a distributing coupling lies at the mean of its nodes", "nothing to do; an averaging interface of the nodes has their rotation as well";
+    OutputForbidden = "FB121", Error, Resources, "output may not be written there", "choose another folder, or change the permissions of the folder or the file";
+    MeshPartial = "FB124", Note, Done, "surface to draw the body by is not whole", "nothing to do for the results; connectors and springs are not drawn";
+    MeshForeign = "FB125", Error, BadInput, "mesh is not that of the nodes", "give the mesh that the matrices were computed on, in the same units, or leave `mesh` out";
+    ModesDiffer = "FB127", Warning, Done, "modes of the file are not those of K and M", "give modes of the same mesh, material and mass matrix, of the body without supports";
+    ModeFileSyntax = "FB128", Error, BadInput, "file of modes cannot be read", "write it again as docs/fe_programs.md says, or give the shapes as an array";
+    ModesCompleted = "FB129", Note, Done, "rows that the file of modes lacks follow from the others by K and M", "nothing to do: the modes that the file states fulfil the equations of motion there too";
+    DeckConstrained = "FB131", Note, Done, "rows that follow others by constraints of the deck are eliminated", "nothing to do: matrices before the constraints (KGG, MGG) are those of parts that are not joined";
+    InputChanged = "FB132", Error, BadInput, "file changed while it was read", "run again when the program that writes the file has ended";
+    // FB2xx: tables and manifest
+    ManifestSyntax = "FB201", Error, BadInput, "manifest is not valid TOML or has unknown, missing or mistyped keys", "see docs/input.md for the keys";
+    ManifestUnit = "FB202", Error, BadInput, "unknown unit", "length: m mm cm um km in ft; mass: kg g t tonne lb slug slinch; time: s ms us; or a positive number (factor to SI)";
+    TableHeader = "FB203", Error, BadInput, "table header is not the expected one", "nodes: `node,x,y,z`; dofs: `node,dir` or `row,node,dir`";
+    TableRow = "FB204", Error, BadInput, "table row cannot be read", "give one row per line with the columns of the header";
+    NodeDuplicate = "FB205", Error, BadInput, "node number given twice", "give every node once";
+    CoordinateNotFinite = "FB206", Error, BadInput, "node coordinate is not a finite number", "correct the coordinate";
+    DofDirection = "FB207", Error, BadInput, "direction is not 1 to 6", "1, 2, 3 are displacements along x, y, z; 4, 5, 6 rotations";
+    DofRowOrder = "FB208", Error, BadInput, "row numbers of dofs.csv are not 0, 1, 2, ... each once", "number the rows from 0 or leave the column out";
+    InterfaceNode = "FB209", Error, BadInput, "interface names a node that the model does not have", "correct the node list of the interface";
+    InterfaceAcross = "FB210", Error, BadInput, "interface has nodes of several bodies", "give each body an interface of its own";
+    SceneSyntax = "FB211", Error, BadInput, "scene is not valid TOML or has unknown, missing or mistyped keys", "see docs/simulate.md for the keys";
+    SceneBody = "FB212", Error, BadInput, "scene does not fit the body", "flexbody inspect shows the modes and interfaces of the body";
+    SceneContradicts = "FB213", Error, BadInput, "scene contradicts itself", "leave one of the two out";
+    CarrierImpossible = "FB214", Error, BadInput, "body cannot be carried there", "carry an interface with a reference point whose nodes do not lie on one line, or a node with rotations, of a body with all terms";
+    SeriesColumn = "FB215", Error, BadInput, "column of a history is not in its file", "name a column of the file, or give its number, from 1";
+    SeriesRow = "FB216", Error, BadInput, "file of a history cannot be read as columns over time", "write one row per instant, with ascending times and decimal points";
+    SeriesRange = "FB217", Error, BadInput, "file of a history does not cover the run", "shorten the run, or say with `outside` = \"hold\" that the first and the last value hold outside of the file";
+    PlaceUnknown = "FB218", Error, BadInput, "body does not have the place or the direction", "flexbody inspect shows the interfaces; nodes go by their numbers";
+    SceneCase = "FB219", Error, BadInput, "load case is not in the scene, or none is named where one is needed", "name a case of the scene with --case NAME";
+    NodeSetUnknown = "FB220", Error, BadInput, "node set or region has no nodes of the model", "name a node set of the deck, or correct the region";
+    SceneDamping = "FB225", Error, BadInput, "scene and body both state a damping", "leave [damping] out of the scene (--damping out of the command), or write `replace = true` in it: the damping of the body then does not count";
+    // FB3xx: matrices
+    MatrixSyntax = "FB301", Error, BadInput, "matrix file cannot be parsed", "write the matrix as Matrix Market coordinate real, symmetric or general";
+    MatrixKind = "FB302", Error, BadInput, "kind of matrix not supported", "write a real (or integer) sparse matrix";
+    MatrixIndex = "FB303", Error, BadInput, "matrix index out of range", "Matrix Market counts from 1, HDF5 indices from 0";
+    MatrixCount = "FB304", Error, BadInput, "number of entries differs from the header", "the file may be cut off: write it again";
+    MatrixNotSquare = "FB305", Error, BadInput, "matrix is not square", "give the whole symmetric matrix";
+    MatrixNotFinite = "FB306", Error, BadInput, "matrix has NaN or infinite values", "find the element that made them in the FE program";
+    MatrixAsymmetric = "FB307", Error, BadInput, "matrix is not symmetric", "only symmetric K and M describe a conservative body; gyroscopic, follower and friction terms do not belong here";
+    MatrixSizesDiffer = "FB308", Error, BadInput, "stiffness and mass matrix differ in size", "write both from the same analysis";
+    MatrixTriangles = "FB309", Error, BadInput, "entries on both sides of the diagonal of a matrix declared symmetric", "write one triangle, or declare the matrix general";
+    Hdf5Layout = "FB310", Error, BadInput, "no such matrix in the file or group", "store data, indices, indptr and shape (CSC, CSR) or data, row, col and shape (COO); name the group as FILE.h5:/group";
+    MatrixDigits = "FB311", Warning, Done, "matrix values carry few digits", "write 15 to 17 significant digits: thin bodies lose them all";
+    MatrixEmpty = "FB312", Error, BadInput, "matrix has no nonzero entries", "write the matrix again";
+    MatrixTooLarge = "FB313", Error, BadInput, "matrix is larger than 4294967295 rows", "split the model";
+    ShapesSize = "FB320", Error, BadInput, "array of shapes or loads does not fit the matrices", "one row (or one column) for every matrix row, in the order of the matrices";
+    ShapesZero = "FB321", Error, BadInput, "shape or load is zero everywhere", "remove the column";
+    // FB4xx: model
+    NodesMissing = "FB401", Error, BadInput, "degrees of freedom belong to nodes without coordinates", "add the nodes to the node table";
+    DofCount = "FB402", Error, BadInput, "number of degrees of freedom differs from the matrix size", "one row of dofs.csv per matrix row; without dofs.csv three per node";
+    DofDuplicate = "FB403", Error, BadInput, "the same direction of the same node is given twice", "every (node, direction) pair labels one matrix row";
+    DofIncomplete = "FB404", Error, BadInput, "nodes lack displacement directions, so that the body cannot move rigidly", "export the matrices without supports, symmetry planes or eliminated constraints";
+    NodesUnused = "FB406", Note, Done, "nodes without any degree of freedom are left out", "nothing to do if they are reference or deleted nodes";
+    MassNotPositive = "FB407", Error, Untrustworthy, "mass is not positive", "check densities and the matrix that was given as mass";
+    MassDirectional = "FB408", Error, BadInput, "mass is not that of a rigid body: it differs between the directions", "supports or constraints were eliminated from the mass matrix: export it free";
+    MassBlockStructure = "FB409", Note, Done, "part of the mass matrix does not turn with the nodes", "nothing to do for slender beams and thin shells, whose error falls with the square of the element size to that of the rotary inertia of their sections; of a condensed model (superelement) keep more nodes";
+    RigidMotionStrained = "FB410", Error, BadInput, "rigid motion strains the body: K R is not zero", "the body is constrained or grounded, rotations are labelled as displacements, or coordinates are in other units or another order than the matrix";
+    PencilSingular = "FB411", Error, BadInput, "rows that neither K nor M holds: the eigenproblem is singular", "remove these degrees of freedom from the matrices, or hold them";
+    MassDiagonal = "FB412", Warning, Done, "mass matrix is diagonal: it was lumped before it came here", "ask the FE program for the consistent mass; `exact` below means exact for this lumped matrix only";
+    InertiaImplausible = "FB413", Warning, Done, "mass and size are those of no matter in the units of the model", "check the units of the manifest, or state them with --units";
+    BodiesSeveral = "FB414", Error, Untrustworthy, "matrices hold several bodies", "convert each by itself with --split, or connect them";
+    DiagonalNegative = "FB415", Error, Untrustworthy, "matrix has negative diagonal entries: it cannot be positive semidefinite", "check the element that made them";
+    BodyDegenerate = "FB416", Error, BadInput, "nodes lie on one point or one line: the body has no rotational inertia about it", "beams need nodal rotations; check the coordinates";
+    ModelTooSmall = "FB418", Error, BadInput, "model has no flexible degree of freedom", "a body needs more degrees of freedom than rigid motions: six in space, three in the plane";
+    DirectionOutOfPlane = "FB419", Error, BadInput, "plane model leaves its plane", "a plane model has z = 0 and directions 1 and 2; for others set `dimension = 3`";
+    DampingRigid = "FB420", Warning, Done, "damping matrix resists rigid motion", "damping to ground, or proportional to mass, acts on the motion of the whole body: model it in the multibody system";
+    BodiesCoupled = "FB421", Error, BadInput, "damping or geometric stiffness couples bodies that K and M leave separate", "leave the entries between bodies out";
+    RowsUnheld = "FB422", Error, BadInput, "stiffness leaves rows without coordinates free", "add the nodes to the node table, or remove these degrees of freedom";
+    RowsWithoutPlace = "FB423", Note, Done, "rows without coordinates: internal degrees of freedom", "nothing to do for bubbles and massless connections; add the nodes to the node table if they are nodes";
+    MagnitudeExtreme = "FB424", Error, BadInput, "numbers too large or too small to be multiplied in double precision", "write the model in units in which its numbers are closer to one";
+    NodesRounded = "FB425", Warning, Done, "node positions do not fit the stiffness to all digits", "write coordinates with 17 digits, and the body near the origin: far from it coordinates are rounded to their own size";
+    RotationsFollow = "FB427", Note, Done, "rotations without stiffness and mass follow the nodes around them", "nothing to do for shells without drilling stiffness: no frequency and no displacement depends on these rotations";
+    InterfaceCoupling = "FB430", Error, BadInput, "interface cannot be coupled to its reference point", "give it three nodes that do not lie on one line (two in the plane), or another coupling";
+    InterfaceShared = "FB431", Error, BadInput, "interfaces share nodes", "leave shared nodes to one of the interfaces";
+    InterfaceFit = "FB432", Warning, Done, "interface that was declared rigid deforms in the modes", "take --basis craig-bampton, or declare it averaging";
+    MassOrder = "FB433", Error, BadInput, "mass matrix couples nodes that the stiffness matrix does not: its rows stand in another order, or it is another mesh's", "write K and M from the same analysis in the same order; --allow-implausible (or allow_implausible in [model]) if the model is meant so";
+    MassPairs = "FB434", Warning, Done, "mass matrix couples nodes that the stiffness matrix does not", "nothing to do if the model is meant so; else write K and M in the same order";
+    MassesExchanged = "FB435", Warning, Done, "masses of nodes seem to be exchanged", "write K and M in the same order of nodes";
+    SpeedImplausible = "FB436", Warning, Done, "speed of sound of no known matter: stiffness, mass and lengths do not fit the units of the model", "check that density, Young's modulus and coordinates are all in the units of the manifest, or state these with --units";
+    DensityImplausible = "FB437", Error, BadInput, "density or speed of sound of no known matter: the numbers do not fit the units of the model", "check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant";
+    MatricesExchanged = "FB438", Error, BadInput, "stiffness and mass matrix are exchanged", "give the other file as stiffness, this one as mass";
+    InterfaceFar = "FB439", Warning, Done, "reference point of an interface is far from its nodes", "reference points are in model axes and in the unit of length of the nodes";
+    GeometricStiffnessMotion = "FB440", Error, BadInput, "geometric stiffness is not that of a stress: it breaks a relation with rigid motion", "give the stress stiffness alone: the difference of the stiffness matrices with and without prestress holds the stiffness of the initial displacements as well";
+    GeometricStiffnessLoad = "FB441", Error, BadInput, "geometric stiffness is not that of the load that it is given for", "check load, axis, sign and units, and divide the matrix by the size of the load (of spin about the centre of mass or the origin of the model: by the square of the rate in radians per unit of time)";
+    GeometricStiffnessRough = "FB442", Warning, Done, "geometric stiffness fulfils its relations with rigid motion roughly", "nothing to do where elements of reduced integration explain it; else check that the matrix holds the stress stiffness alone";
+    InterfaceCentre = "FB450", Warning, Done, "reference point of an interface is not the mean of its nodes", "nothing to do if the joint belongs there; else state the point: --interface NAME=SET,COUPLING,X/Y/Z, or `reference` in [[interface]]";
+    // FB5xx: numerics
+    NotConverged = "FB501", Error, Untrustworthy, "eigen-solver did not converge", "ask for fewer modes or a lower accuracy; look for extreme stiffness contrasts";
+    Mechanism = "FB502", Error, Untrustworthy, "more zero-energy modes than rigid motions: a mechanism or loosely connected bodies", "connect the parts or remove the free degree of freedom";
+    MassIndefinite = "FB503", Error, Untrustworthy, "mass matrix is indefinite", "negative lumped masses or wrong signs: export the consistent mass";
+    StiffnessIndefinite = "FB504", Error, Untrustworthy, "stiffness matrix is indefinite", "check for negative springs, prestress beyond buckling, wrong signs";
+    FactorizationFailed = "FB505", Error, Untrustworthy, "factorisation failed or is inaccurate", "the model may be scaled pathologically; check units and stiffness contrasts";
+    CompletenessFailed = "FB506", Error, Untrustworthy, "completeness proof failed: the inertia count differs from the modes found", "report the model to us";
+    CompletenessUnproved = "FB507", Warning, Done, "completeness of the modes is not proved", "use --accuracy standard";
+    RepeatedSplit = "FB508", Warning, Done, "the last mode belongs to a repeated eigenvalue whose other modes are left out", "ask for as many modes as the note says to keep the body's symmetry";
+    ModesClamped = "FB509", Note, Done, "fewer modes exist than were asked for", "nothing to do";
+    NoiseFloor = "FB510", Warning, Done, "digits of the input limit the accuracy of the lowest modes", "write the matrices with 17 significant digits";
+    MassMatrixSingular = "FB511", Note, Done, "mass matrix is singular: fewer finite modes than degrees of freedom", "nothing to do: common for reduced integration";
+    NoModes = "FB512", Error, BadInput, "no flexible mode in the range asked for", "raise --max-frequency";
+    FactorPrecision = "FB513", Note, Done, "precision of the factor", "nothing to do: --factor f64 or f32 decides otherwise";
+    DampingIndefinite = "FB514", Error, Untrustworthy, "damping of the modes is not positive semidefinite or not finite", "damping must not feed energy: check the signs and the units of the damping";
+    ModesOverdamped = "FB515", Warning, Done, "modes are damped beyond the critical damping", "nothing to do if it is meant so; else check the units: a ratio of 2 % is 0.02, alpha is in 1/time, beta in time, D in mass/time";
+    ShapesNone = "FB520", Error, BadInput, "no shape deforms the body", "give shapes that are not rigid motions";
+    ShapesDependent = "FB521", Warning, Done, "shapes are left out because they add nothing", "nothing to do if you know of it";
+    ShapesRigid = "FB522", Note, Done, "rigid-body motions are taken out of the shapes: the body frame carries them out", "nothing to do: no motion is lost";
+    ShapesSpan = "FB523", Warning, Done, "modes of a subspace that are no eigenvectors", "nothing to do for static shapes; else compute the modes more accurately, or with all their digits";
+    LoadsCovered = "FB524", Note, Done, "static responses that add nothing to the basis are left out", "nothing to do: the other modes have them";
+    FreeFrequencies = "FB525", Note, Done, "frequencies of a Craig-Bampton body beside those of the free body", "take more fixed-interface modes (--modes, --max-frequency) where higher frequencies count";
+    InterfaceCompliance = "FB526", Note, Done, "modes lack a part of the static compliance at the interfaces", "convert with --basis craig-bampton or --residual-vectors interfaces, which have all of it";
+    GeometricStiffnessNone = "FB530", Warning, Done, "centrifugal loads without geometric stiffness: the body softens where a real one stiffens", "give [[geometric_stiffness]] for spin, or keep to rates far below the one that is named";
+    GeometricStiffnessPartial = "FB531", Note, Done, "geometric stiffness is given for some directions of a load only", "nothing to do if the load does not act along the others";
+    SimulationStopped = "FB540", Error, Untrustworthy, "simulation cannot go on", "look at spin, loads and dropped terms: the motion leaves the range of the model";
+    LinearRangeLeft = "FB541", Warning, Done, "deflections beyond the range of linear elasticity", "trust the result as a trend only; a body of several flexible parts carries larger deflections";
+    SpinSoftens = "FB542", Warning, Done, "spin at which a body without geometric stiffness is too soft", "convert the model with [[geometric_stiffness]] for spin";
+    PhaseDrifts = "FB543", Warning, Done, "errors that grow with time although amplitudes are bounded", "check a run as long as the longest that the model is for: phases run apart with angular velocity times duration";
+    ResonanceDropped = "FB544", Warning, Done, "a dropped mode near the frequency of a load", "keep the mode, or lengthen the run until the resonance would show";
+    LoadIdle = "FB545", Warning, Done, "a load that does nothing", "to see gravity and inertia bend a body that is held, let an interface carry it: [carried] in docs/simulate.md";
+    CarrierUnresolved = "FB546", Warning, Done, "modes that resolve the carried interface badly", "convert with --basis craig-bampton, or with --residual-vectors interfaces, and the interface in the manifest";
+    CarriedGeometricStiffness = "FB547", Warning, Done, "geometric stiffness that does not act while the body is carried", "it was given for the free body: trust spins that are slow beside the first frequency only";
+    ReferenceLacks = "FB548", Warning, Done, "the body that errors are measured against lacks a part of the model that counts", "convert more modes, or residual vectors for the loads; a shorter or slower scene shows where it comes from";
+    LumpedWithoutBody = "FB549", Note, Done, "a lumped mass that gives no body to compare with", "nothing to do: a program that lumps the mass in this way has no body either";
+    RunTooLong = "FB550", Error, BadInput, "run takes more steps than it may", "simulate a shorter `duration`, leave out modes beyond what the loads reach, or allow more with `most_steps` in [run]";
+    StepPassesOver = "FB551", Error, BadInput, "steps are longer than the oscillations of a load", "give a shorter `step`, or none";
+    MotionWithoutBasis = "FB552", Note, Done, "a motion that no few shapes make", "nothing to do: the modes are those without --basis scene";
+    RateUnsettled = "FB554", Warning, Done, "a rate that still changes with the steps of the integration", "give a smaller `tolerance` (a shorter `step`) in [run], and take the rate for settled when it no longer changes";
+    SelectionUnjudged = "FB557", Error, CheckFailed, "a body for a scene that it does not hold, or where nothing can be said of it", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body all the same";
+    CouplingEffect = "FB558", Note, Done, "rigid interfaces that the body and the model it is compared with have in common", "nothing to do where a stiff part is mounted at the interface; else state coupling = \"averaging\", which lets it deform";
+    // FB6xx: resources
+    MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
+    DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
+    CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
+    WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
+    Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
+    Forked = "FB606", Error, Resources, "process has none of the threads that it computes with", "start processes by `spawn` or `forkserver`, or fork before the first work";
+    // FB7xx: flex-body files and checkpoints
+    BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
+    BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
+    BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
+    BodyIdentity = "FB704", Error, CheckFailed, "identity violated", "convert the model again; if it stays, report the file to us";
+    BodiesDiffer = "FB705", Error, CheckFailed, "flexible bodies differ", "see the table of quantities and tolerances";
+    BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
+    BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
+    CheckpointUnreadable = "FB708", Error, BadInput, "not a checkpoint, or a damaged one", "remove the file or name another one: the run then starts anew";
+    CheckpointVersion = "FB709", Error, BadInput, "checkpoint of another format version", "read it with the flexbody version named in the file, or name another file";
+    CheckpointForeign = "FB710", Error, BadInput, "checkpoint of another model", "name another file for this model";
+    CheckpointTakenUp = "FB711", Note, Done, "search for modes goes on from a checkpoint", "nothing to do";
+    BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/format.md says how a program that changes files states new digests";
+    BodyWithoutDigest = "FB713", Note, Done, "flex-body file without a digest: a change since it was written cannot be seen", "convert the model again to get one";
+    BodyUntrustworthy = "FB714", Error, Untrustworthy, "body that was made breaks what must hold for every body; nothing is written", "ask for fewer modes, or look for parts that are joined too weakly or for masses that no body has; report the model to us if it stays";
+    WarningsDenied = "FB715", Error, CheckFailed, "warnings are denied", "see the warnings, or leave out --deny-warnings";
+    ForeignRounded = "FB716", Warning, Done, "inertia data of another program's file carry few digits", "write the file with 17 significant digits, and from one mass matrix: flexbody audit says more";
+    ExportLoses = "FB720", Error, BadInput, "format cannot hold all of the body", "--allow-loss writes the file without it";
+    ExportLost = "FB721", Warning, Done, "file that was written lacks a part of the body", "nothing to do if the simulation does not need it";
+    ExportNeeds = "FB722", Note, Done, "program uses a part of the file only with a setting", "set what the message names in the program's input";
+    ExportPicture = "FB723", Note, Done, "file is a picture of the body", "give multibody programs another format: docs/export.md lists them";
+    ForeignUnreadable = "FB730", Error, BadInput, "flexible-body file of another program cannot be read", "give a SID_FEM, MBDyn .fem, MBSim or Exudyn file as the program writes it";
+    ForeignIncomplete = "FB731", Error, BadInput, "file lacks what a body is made of", "write the file anew with the missing part";
+    ForeignChanged = "FB732", Note, Done, "modes of the file are not normalised or contain rigid motions: combinations of them were taken", "nothing to do: nodes move as before, modal coordinates are others";
+    ForeignDropped = "FB733", Warning, Done, "file lacks terms of the kinetic energy: the body does without them", "take a format that holds them";
+    MotionUnreadable = "FB734", Error, BadInput, "not the motion of a simulation, or a damaged one", "give the file that flexbody simulate -o writes";
+    MotionForeign = "FB735", Error, BadInput, "motion of another body", "simulate this body, or give the body that was simulated";
+    AuditIdentity = "FB740", Error, CheckFailed, "identity of inertia data violated", "write the file anew with the program that made it, or with flexbody export";
+    AuditLumped = "FB741", Error, CheckFailed, "inertia comes from lumped masses", "condense the consistent mass matrix: flexbody convert";
+    AuditLayout = "FB742", Error, CheckFailed, "arrays are laid out in another order than the dialect has", "name the dialect to the reader, or write the file anew with flexbody export";
+    AuditDigits = "FB743", Error, CheckFailed, "digits were lost in writing", "write with 17 significant digits and exponents";
+    AuditUnits = "FB744", Error, CheckFailed, "numbers do not fit each other: units are mixed", "write masses, lengths and times in one system of units";
+    AuditCoupling = "FB745", Error, CheckFailed, "coupling of rigid and flexible motion is missing", "write the inertia couplings too";
+    AuditImplausible = "FB746", Error, CheckFailed, "numbers are not those of a body", "check what the file was made of";
+    AuditSurplus = "FB747", Error, CheckFailed, "file has more numbers than its header says", "count what the header states, or take out what is too much";
+    AuditFrame = "FB748", Error, CheckFailed, "axes of a frame are no rotation", "write the axes of the frame right-handed and orthonormal";
+    ForeignUnsound = "FB749", Error, BadInput, "file contradicts what every body fulfils", "flexbody audit says what is wrong with the file; write it anew";
+    ClusterUnreadable = "FB760", Error, BadInput, "not a folder of flexbody prepare, or a damaged one", "prepare the folder again, or name the one that was prepared";
+    ClusterChanged = "FB761", Error, CheckFailed, "file of a cluster changed since it was written", "copy the folder again as the cluster wrote it, or run the driver again";
+    ClusterForeign = "FB762", Error, BadInput, "result of a cluster that belongs to another model", "name the model that was prepared, or prepare this one and run the driver";
+    ClusterUnfinished = "FB763", Error, BadInput, "cluster has no result yet", "run the driver; it goes on from what is kept";
+    ClusterInaccurate = "FB764", Error, Untrustworthy, "modes of a cluster are not those of the model", "run the driver again, with --solver mumps where another was taken";
+    CompletenessElsewhere = "FB765", Note, Done, "completeness rests on the count of another program", "flexbody assemble --prove counts once more";
+    EngineMissing = "FB766", Error, BadInput, "MPI, PETSc or SLEPc is not at hand", "install them (docs/cluster.md), name them with --mpiexec and --python, or take --engine built-in";
+    EngineFailed = "FB767", Error, Untrustworthy, "solver on MPI ended without a result", "run the same command again: it goes on from the modes that are kept";
+    BatchSyntax = "FB770", Error, BadInput, "list of bodies cannot be read", "see docs/cluster.md for the keys";
+    BatchFailed = "FB771", Error, CheckFailed, "bodies of a batch failed", "see what is said of each; the others are there, and a second run makes the missing ones only";
+    // FB8xx: usage
+    Usage = "FB801", Error, BadInput, "command line not understood", "see flexbody help";
+    LumpedScheme = "FB802", Error, BadInput, "unknown lumping scheme", "row-sum, diagonal-scaling, user=FILE or none";
+    LumpedMassTable = "FB803", Error, BadInput, "nodal masses cannot be used", "header `node,mass`, one finite mass for every node";
+    Internal = "FB999", Error, Bug, "internal error", "this is a bug: please report it with the input";
+}
+
+/// `docs/codes.md`: the table of codes and the exit codes.
+pub fn codes_markdown() -> String {
+    let mut out = String::from(
+        "<!-- Generated from the table in crates/base/src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
+         # Diagnostics and exit codes\n\n\
+         | exit code | meaning |\n|---|---|\n\
+         | 0 | the work was done |\n\
+         | 1 | a check failed or a tolerance was exceeded; the inputs themselves were readable |\n\
+         | 2 | bad input or usage |\n\
+         | 3 | no trustworthy numerical result: not converged, mechanism, indefinite mass |\n\
+         | 4 | not enough memory or disk, or an output that may not be written (no permission, a read-only file system: FB121) |\n\
+         | 70 | a bug of ours |\n\
+         | 130 | interrupted (Ctrl-C), told to end (SIGTERM) or left by its terminal (SIGHUP); no unfinished file is left |\n\n\
+         Other signals that end a program end this one too, after its unfinished files: a shell tells 128 + the number\n\
+         of the signal. With exit code 0 all outputs are in their places; with 2, 3, 4, 70, 130 and after a signal none\n\
+         is, and the files that they would have replaced are there ([README](../README.md#output-files)).\n\n\
+         A process ends with the exit code of its first error; warnings and notes do not change it, unless\n\
+         `--deny-warnings` takes a warning as a failed check (1): then nothing is written.\n\n\
+         | code | severity | exit code | meaning | help |\n|---|---|---|---|---|\n",
+    );
+    for code in Code::ALL {
+        let severity = code.severity().name();
+        let exit = if code.severity() == Severity::Error {
+            (code.exit_code() as u8).to_string()
+        } else {
+            String::new()
+        };
+        let (id, title, help) = (code.id(), code.title(), code.help());
+        out.push_str(&format!("| {id} | {severity} | {exit} | {title} | {help} |\n"));
+    }
+    out
+}
+
+/// One finding: what, where, and what to do.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostic {
+    code: Code,
+    message: String,
+    file: Option<PathBuf>,
+    line: Option<usize>,
+    help: Option<String>,
+}
+
+impl Diagnostic {
+    /// A finding with `message`: a lowercase fragment that says what is wrong, with the facts in it.
+    pub fn new(code: Code, message: impl Into<String>) -> Self {
+        Self { code, message: message.into(), file: None, line: None, help: None }
+    }
+
+    /// Adds the file it is about.
+    pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
+        self.file = Some(file.as_ref().to_path_buf());
+        self
+    }
+
+    /// Adds the line (from 1) of that file.
+    pub fn at_line(mut self, line: usize) -> Self {
+        self.line = Some(line);
+        self
+    }
+
+    /// Replaces the table's help by a more precise one.
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Puts what it is about in front of the message.
+    pub fn about(mut self, what: impl std::fmt::Display) -> Self {
+        self.message = format!("{what}: {}", self.message);
+        self
+    }
+
+    /// Leaves out what the message quotes between backticks.
+    pub fn without_quotes(mut self) -> Self {
+        let parts: Vec<&str> = self.message.split('`').collect();
+        // Every second part stands between backticks.
+        let shown =
+            |(k, part): (usize, &&str)| if k % 2 == 1 { "...".to_owned() } else { (*part).to_owned() };
+        self.message = parts.iter().enumerate().map(shown).collect::<Vec<_>>().join("`");
+        self
+    }
+
+    /// Its code.
+    pub fn code(&self) -> Code {
+        self.code
+    }
+
+    /// Its severity, by the table.
+    pub fn severity(&self) -> Severity {
+        self.code.severity()
+    }
+
+    /// What is wrong, with the facts.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    /// File it is about.
+    pub fn file(&self) -> Option<&Path> {
+        self.file.as_deref()
+    }
+
+    /// Line (from 1) of that file.
+    pub fn line(&self) -> Option<usize> {
+        self.line
+    }
+
+    /// What to do.
+    pub fn help(&self) -> &str {
+        self.help.as_deref().unwrap_or(self.code.help())
+    }
+}
+
+impl std::fmt::Display for Diagnostic {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let severity = self.severity().name();
+        write!(f, "{severity}[{}]: {}", self.code.id(), printable(&self.message))?;
+        if let Some(file) = &self.file {
+            let name = file.display().to_string().replace('\n', "\\n");
+            write!(f, "\n  in {}", printable(&name))?;
+            if let Some(line) = self.line {
+                write!(f, ", line {line}")?;
+            }
+        }
+        write!(f, "\n  help: {}", printable(self.help()))
+    }
+}
+
+/// Returns a text without characters that a terminal takes as commands: control characters but line ends and tabs, and
+/// those that turn the direction of writing, are shown by their numbers, as `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_command) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c: char| if is_command(c) { c.escape_unicode().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(shown).collect())
+}
+
+fn is_command(c: char) -> bool {
+    c.is_control() && !matches!(c, '\n' | '\t')
+        || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{200e}' | '\u{200f}')
+}
+
+impl serde::Serialize for Diagnostic {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        use serde::ser::SerializeStruct;
+        let mut s = serializer.serialize_struct("Diagnostic", 6)?;
+        s.serialize_field("code", self.code.id())?;
+        s.serialize_field("severity", &self.severity())?;
+        s.serialize_field("message", &self.message)?;
+        s.serialize_field("file", &self.file.as_ref().map(|f| f.display().to_string()))?;
+        s.serialize_field("line", &self.line)?;
+        s.serialize_field("help", self.help())?;
+        s.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_terminal_would_take_for_a_command_is_shown_by_its_number() {
+        let diagnostic = Diagnostic::new(Code::Hdf5Layout, "group `\u{1b}]0;t\u{7}K\u{9b}31m` \u{202e}x")
+            .in_file("a\nb\u{1b}[31m.h5")
+            .with_help("\u{1b}[2J");
+        let told = diagnostic.to_string();
+        assert!(!told.contains(is_command), "{told:?}");
+        assert!(
+            told.contains("`\\u{1b}]0;t\\u{7}K\\u{9b}31m`") && told.contains("a\\nb\\u{1b}[31m.h5"),
+            "{told}"
+        );
+        assert_eq!(printable("a\tb\nc"), "a\tb\nc");
+    }
+
+    #[test]
+    fn quotes_are_left_out() {
+        let of = |message: &str| Diagnostic::new(Code::TableHeader, message).without_quotes().message;
+        assert_eq!(of("column `root:$6$` is not `node`"), "column `...` is not `...`");
+        assert_eq!(of("file does not exist"), "file does not exist");
+        assert_eq!(of("an open `quote"), "an open `...");
+    }
+}

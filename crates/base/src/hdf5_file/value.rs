@@ -1,0 +1,249 @@
+//! Single values out of an HDF5 file whose declarations may be false.
+//!
+//! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
+
+use crate::memory::{left, or_go_without};
+use hdf5::dataset::Layout;
+use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, VarLenAscii, VarLenUnicode};
+use hdf5::{IndexType, IterationOrder, LinkType};
+use hdf5_metno as hdf5;
+
+/// Deflate cannot shrink data further than this.
+const HIGHEST_COMPRESSION: u64 = 1032;
+
+/// Longest text attribute of fixed length: the limit of HDF5 for an attribute.
+const LONGEST_FIXED_TEXT: usize = 65536;
+
+/// Chunks may be larger than a small dataset, but the library reserves memory for one whole chunk.
+const SMALL_CHUNK: usize = 1 << 20;
+
+/// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
+/// data many times over end here.
+#[derive(Debug)]
+pub struct Stored {
+    left: u64,
+}
+
+impl Stored {
+    /// A file of this many bytes of which nothing was read yet.
+    pub fn new(file_bytes: u64) -> Self {
+        Self { left: file_bytes }
+    }
+}
+
+/// What [`open_group`] finds where no group is.
+pub const NOTHING: &str = "nothing";
+
+/// Opens a group by its absolute path through hard links only: a file must not lead out of itself.
+pub fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> {
+    let mut group = file.as_group().map_err(|e| e.to_string())?;
+    for name in path.split('/').filter(|name| !name.is_empty()) {
+        if !has(&group, name)? {
+            return Err(NOTHING.to_owned());
+        }
+        group = group.group(name).map_err(|_| "another object".to_owned())?;
+    }
+    Ok(group)
+}
+
+/// Names of the members of a group, in creation order where the file tracks it.
+pub fn members(group: &hdf5::Group) -> Result<Vec<String>, String> {
+    group
+        .member_names_by(IndexType::CreationOrder, IterationOrder::Increasing)
+        .or_else(|_| group.member_names_by(IndexType::Name, IterationOrder::Increasing))
+        .map_err(|e| format!("an unreadable member list ({e})"))
+}
+
+/// Names of the attributes, in creation order where the file tracks it.
+pub fn attribute_names(place: &hdf5::Location) -> Result<Vec<String>, String> {
+    place
+        .attr_names_by(IndexType::CreationOrder, IterationOrder::Increasing)
+        .or_else(|_| place.attr_names())
+        .map_err(|e| format!("expected a list of attributes, found an unreadable one ({e})"))
+}
+
+fn has(group: &hdf5::Group, name: &str) -> Result<bool, String> {
+    let link = group
+        .find_link(IndexType::Name, IterationOrder::Native, |member, info| {
+            Ok((member == name).then_some(info.link_type))
+        })
+        .map_err(|e| format!("an unreadable member list ({e})"))?;
+    match link {
+        None => Ok(false),
+        Some(LinkType::Hard) => Ok(true),
+        Some(_) => Err("a soft or external link".to_owned()),
+    }
+}
+
+/// Opens a dataset of a group.
+pub fn open_dataset(place: &hdf5::Group, name: &str) -> Result<Option<hdf5::Dataset>, String> {
+    if !has(place, name).map_err(|found| format!("expected a dataset, found {found}"))? {
+        return Ok(None);
+    }
+    place.dataset(name).map(Some).map_err(|e| format!("expected a dataset, found {e}"))
+}
+
+/// Element types of datasets.
+pub trait Element: hdf5::H5Type + Copy + Default {
+    /// The type as HDF5 describes it.
+    const TYPE: TypeDescriptor;
+    /// The name of the type in messages.
+    const NAME: &'static str;
+}
+
+impl Element for f64 {
+    const TYPE: TypeDescriptor = TypeDescriptor::Float(FloatSize::U8);
+    const NAME: &'static str = "64-bit floats";
+}
+
+impl Element for f32 {
+    const TYPE: TypeDescriptor = TypeDescriptor::Float(FloatSize::U4);
+    const NAME: &'static str = "32-bit floats";
+}
+
+impl Element for i64 {
+    const TYPE: TypeDescriptor = TypeDescriptor::Integer(IntSize::U8);
+    const NAME: &'static str = "64-bit integers";
+}
+
+impl Element for i32 {
+    const TYPE: TypeDescriptor = TypeDescriptor::Integer(IntSize::U4);
+    const NAME: &'static str = "32-bit integers";
+}
+
+/// Values in row-major order, and the extents.
+pub type Array<T> = (Vec<T>, Vec<usize>);
+
+/// Reads a dataset, with its extents. `fit` judges these and gives the number of elements.
+pub fn dataset<T: Element>(
+    place: &hdf5::Group,
+    name: &str,
+    stored: &mut Stored,
+    fit: impl FnOnce(&[usize]) -> Result<usize, String>,
+) -> Result<Option<Array<T>>, String> {
+    let Some(dataset) = open_dataset(place, name)? else { return Ok(None) };
+    let found = dataset.dtype().and_then(|t| t.to_descriptor());
+    if !matches!(&found, Ok(found) if *found == T::TYPE) {
+        let found = found.map_or_else(|e| e.to_string(), |t| t.to_string());
+        return Err(format!("expected {}, found type {found}", T::NAME));
+    }
+    let dims = dataset.get_shape().map_err(|e| format!("expected a shape, found {e}"))?;
+    let elements = fit(&dims)?;
+    storage(&dataset, elements, size_of::<T>(), stored)?;
+    let mut values = Vec::new();
+    or_go_without(|| values.try_reserve_exact(elements))
+        .map_err(|_| format!("expected an array that fits into memory, found {elements} values"))?;
+    values.resize(elements, T::default());
+    dataset.read_into_raw(&mut values).map_err(|e| format!("expected readable data, found {e}"))?;
+    Ok(Some((values, dims)))
+}
+
+/// Number of elements of an array with these extents.
+pub fn elements(dims: &[usize]) -> Result<usize, String> {
+    let elements = dims.iter().try_fold(1usize, |product, &d| product.checked_mul(d));
+    // 2^48 values are beyond any memory; below it products with sizes of types cannot overflow.
+    elements
+        .filter(|&e| e < 1 << 48)
+        .ok_or_else(|| format!("expected a shape that fits into memory, found {dims:?}"))
+}
+
+/// Refuses data that lie in other files, and sizes that the stored bytes cannot hold.
+pub(super) fn storage(
+    dataset: &hdf5::Dataset,
+    elements: usize,
+    size: usize,
+    stored: &mut Stored,
+) -> Result<(), String> {
+    let plist = dataset.create_plist().map_err(|e| format!("expected a storage layout, found {e}"))?;
+    let layout = plist.get_layout().map_err(|e| format!("expected a storage layout, found {e}"))?;
+    let external = plist.get_external().map_err(|e| format!("expected a storage layout, found {e}"))?;
+    if layout == Layout::Virtual || !external.is_empty() {
+        return Err("expected data inside the file, found references to other files".to_owned());
+    }
+    let bytes = dataset.storage_size();
+    let most = if layout == Layout::Chunked { bytes.saturating_mul(HIGHEST_COMPRESSION) } else { bytes };
+    let unpacked = (elements as u64).saturating_mul(size as u64);
+    if unpacked > most {
+        return Err(format!("expected stored data for {elements} values, found {bytes} bytes"));
+    }
+    if left().is_some_and(|left| unpacked > left) {
+        return Err(format!("expected an array that fits into memory, found {elements} values"));
+    }
+    let Some(left) = stored.left.checked_sub(bytes) else {
+        return Err(format!(
+            "expected datasets that fit into the file, found {bytes} bytes more than it has"
+        ));
+    };
+    stored.left = left;
+    if layout == Layout::Chunked {
+        let chunk =
+            plist.get_chunk().map_err(|e| format!("expected a chunk shape, found {e}"))?.unwrap_or_default();
+        let size = chunk.iter().try_fold(1usize, |product, &d| product.checked_mul(d));
+        if size.is_none_or(|size| size > elements.max(SMALL_CHUNK)) {
+            return Err(format!("expected chunks within the dataset, found chunks of {chunk:?}"));
+        }
+    }
+    Ok(())
+}
+
+fn attribute(
+    place: &hdf5::Location,
+    name: &str,
+    expected: &str,
+) -> Result<Option<(hdf5::Attribute, TypeDescriptor)>, String> {
+    // A name that cannot be looked up is not there; a damaged attribute is seen when it is opened.
+    if place.attr_info(name).is_err() && !attribute_names(place)?.iter().any(|n| n == name) {
+        return Ok(None);
+    }
+    let attribute = place.attr(name).map_err(|e| format!("expected {expected}, found {e}"))?;
+    let kind = attribute
+        .dtype()
+        .and_then(|t| t.to_descriptor())
+        .map_err(|e| format!("expected {expected}, found {e}"))?;
+    Ok(Some((attribute, kind)))
+}
+
+/// Reads a text attribute of fixed or variable length.
+pub fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>, String> {
+    const EXPECTED: &str = "a text attribute";
+    let Some((attribute, kind)) = attribute(place, name, EXPECTED)? else { return Ok(None) };
+    let bytes = match kind {
+        TypeDescriptor::VarLenUnicode => {
+            attribute.read_scalar::<VarLenUnicode>().map(|t| t.as_bytes().to_vec())
+        }
+        TypeDescriptor::VarLenAscii => attribute.read_scalar::<VarLenAscii>().map(|t| t.as_bytes().to_vec()),
+        TypeDescriptor::FixedUnicode(n) if n <= LONGEST_FIXED_TEXT => {
+            attribute.read_scalar::<FixedUnicode<LONGEST_FIXED_TEXT>>().map(|t| t.as_bytes().to_vec())
+        }
+        TypeDescriptor::FixedAscii(n) if n <= LONGEST_FIXED_TEXT => {
+            attribute.read_scalar::<FixedAscii<LONGEST_FIXED_TEXT>>().map(|t| t.as_bytes().to_vec())
+        }
+        other => return Err(format!("expected {EXPECTED}, found type {other}")),
+    };
+    let bytes = bytes.map_err(|e| format!("expected {EXPECTED}, found {e}"))?;
+    String::from_utf8(bytes)
+        .map(Some)
+        .map_err(|_| format!("expected {EXPECTED}, found bytes that are not UTF-8"))
+}
+
+/// Reads an integer attribute.
+pub fn int(place: &hdf5::Location, name: &str) -> Result<Option<i64>, String> {
+    let Some((attribute, kind)) = attribute(place, name, "an integer attribute")? else { return Ok(None) };
+    match kind {
+        TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) => {
+            attribute.read_scalar().map(Some).map_err(|e| format!("expected an integer attribute, found {e}"))
+        }
+        other => Err(format!("expected an integer attribute, found type {other}")),
+    }
+}
+
+/// Reads a float attribute.
+pub fn float(place: &hdf5::Location, name: &str) -> Result<Option<f64>, String> {
+    let Some((attribute, kind)) = attribute(place, name, "a float attribute")? else { return Ok(None) };
+    match kind {
+        TypeDescriptor::Float(_) => {
+            attribute.read_scalar().map(Some).map_err(|e| format!("expected a float attribute, found {e}"))
+        }
+        other => Err(format!("expected a float attribute, found type {other}")),
+    }
+}

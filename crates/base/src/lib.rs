@@ -1,0 +1,25 @@
+//! What every room may use: errors and the one table of diagnostic codes, units, provenance,
+//! memory, and files that appear whole or not at all. Nothing here knows matrices, models or bodies.
+
+#![deny(
+    clippy::exit,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used
+)]
+
+pub mod children;
+pub mod diagnostic;
+pub mod error;
+mod exit_code;
+mod file_mode;
+#[cfg(feature = "hdf5")]
+pub mod hdf5_file;
+pub mod memory;
+pub mod numbers;
+pub mod output;
+pub mod provenance;
+pub mod read_files;
+pub mod text;
+pub mod units;

@@ -1,0 +1,49 @@
+//! Numbers as people read them. Files never use these: their floats round-trip.
+
+/// `value` with `digits` significant digits: plain between 1e-4 and 1e7, else with an exponent; no trailing
+/// zeros.
+pub fn significant(value: f64, digits: usize) -> String {
+    if !value.is_finite() {
+        return "not finite".to_owned();
+    }
+    let scientific = format!("{value:.*e}", digits.saturating_sub(1));
+    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if value != 0.0 && !(-4..7).contains(&exponent) {
+        return format!("{}e{exponent}", trimmed(mantissa));
+    }
+    let decimals = usize::try_from(digits as i32 - 1 - exponent).unwrap_or(0);
+    let plain = trimmed(&format!("{value:.decimals$}")).to_owned();
+    if plain == "-0" { "0".to_owned() } else { plain }
+}
+
+/// A number with decimals without the zeros at its end.
+fn trimmed(number: &str) -> &str {
+    if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_keep_their_significant_digits() {
+        for (value, digits, expected) in [
+            (0.0, 5, "0"),
+            (-0.0, 5, "0"),
+            (1234.5678, 5, "1234.6"),
+            (999.999, 5, "1000"),
+            (0.00012345678, 5, "0.00012346"),
+            (0.000012345678, 5, "1.2346e-5"),
+            (12345678.0, 5, "1.2346e7"),
+            (9999999.9, 5, "1e7"),
+            (123456.7, 5, "123457"),
+            (-1.5, 5, "-1.5"),
+            (1e300, 3, "1e300"),
+            (5e-324, 3, "4.94e-324"),
+            (f64::NAN, 3, "not finite"),
+        ] {
+            assert_eq!(significant(value, digits), expected);
+        }
+    }
+}

@@ -1,0 +1,517 @@
+//! Output files that appear whole or not at all: a temporary file in the same folder, synced, then renamed.
+//!
+//! A temporary file is locked as long as its process lives. A later run removes those in its output folders
+//! that nobody holds: what a process left that was killed. Several outputs of one run appear together, see
+//! [`OutputSlot::commit_all`].
+//!
+//! In a run of the program ([`begin_run`]) outputs that have their names are still taken back where the run ends
+//! otherwise than with its results: the files that stood there before get their names again. [`end_run`] makes them
+//! final; from there on the exit code is known, and a signal no longer changes it.
+
+use crate::diagnostic::{Code, Diagnostic};
+use crate::error::{Error, ExitCode, Result};
+#[cfg(unix)]
+use crate::file_mode::WORKING_MODE;
+use crate::file_mode::take_over;
+use crate::read_files::{followed, refuse_read};
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::{ErrorKind, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::time::Duration;
+use tempfile::TempPath;
+
+/// What the names of temporary files begin and end with.
+const PREFIX: &str = ".flexbody-";
+const SUFFIX: &str = ".tmp";
+
+/// A place for one output file, reserved before the work starts.
+///
+/// Making a slot proves that the folder exists and can be written. The target is touched only by
+/// [`OutputSlot::commit`]; dropping the slot removes the temporary file and leaves an existing target as it
+/// is.
+#[derive(Debug)]
+pub struct OutputSlot {
+    asked: PathBuf,
+    target: PathBuf,
+    temporary: Temporary,
+    /// Properties of the file that stood there when the slot was made.
+    replaced: Option<Metadata>,
+}
+
+/// The temporary files and the outputs of this process, for the case that it is interrupted.
+#[derive(Debug)]
+struct Book {
+    /// Temporary files that exist.
+    unfinished: Vec<PathBuf>,
+    /// Folders that were searched for what killed processes left.
+    swept: Vec<PathBuf>,
+    /// Outputs of the run that have their names and can still be taken back.
+    placed: Vec<Placed>,
+    run: Run,
+}
+
+/// State of the run of the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Run {
+    /// The library is used without the program: outputs are final at once.
+    None,
+    Going,
+    /// The outputs are final, and the process ends with this code.
+    Ended(ExitCode),
+}
+
+static BOOK: Mutex<Book> =
+    Mutex::new(Book { unfinished: Vec::new(), swept: Vec::new(), placed: Vec::new(), run: Run::None });
+
+/// True from the moment on at which the unfinished files are removed; the book is then locked for ever.
+static IS_ABANDONED: AtomicBool = AtomicBool::new(false);
+
+fn book() -> MutexGuard<'static, Book> {
+    BOOK.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Begins a run of the program: from here on outputs can be taken back until [`end_run`].
+pub fn begin_run() {
+    book().run = Run::Going;
+}
+
+/// Waits for ever in a process that an interruption is ending, so that nothing more is printed.
+pub fn stand_by() {
+    drop(book());
+}
+
+/// Ends the run: the exit code of the process is `code`, and its outputs are final. Where the run `has_results` no
+/// more, they are taken back: what stood in their places before is there again.
+pub fn end_run(code: ExitCode, has_results: bool) {
+    let mut book = book();
+    if has_results {
+        book.placed.iter().for_each(Placed::forget_old);
+    } else {
+        book.take_back();
+    }
+    book.placed.clear();
+    book.run = Run::Ended(code);
+}
+
+/// Removes the temporary file of every slot and takes outputs back, for a process that ends at once: from here on it
+/// can neither reserve nor finish an output file, and a thread that tries to waits for the end. Outputs that are
+/// being put in place together are waited for.
+///
+/// Returns the exit code of a run that has ended already: its outputs are final, and nothing is left to do.
+pub fn abandon_unfinished() -> Option<ExitCode> {
+    abandon(book())
+}
+
+/// Does the work of `abandon_unfinished` without memory: allocates nothing and does not wait for long, since the
+/// thread that is out of memory may hold the list itself. The next run removes the files that then stay.
+pub fn abandon_unfinished_soon() {
+    for _ in 0..100 {
+        if IS_ABANDONED.load(Ordering::SeqCst) {
+            return;
+        }
+        let book = match BOOK.try_lock() {
+            Ok(book) => book,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => {
+                std::thread::sleep(Duration::from_millis(10));
+                continue;
+            }
+        };
+        abandon(book);
+        return;
+    }
+}
+
+fn abandon(book: MutexGuard<'_, Book>) -> Option<ExitCode> {
+    if let Run::Ended(code) = book.run {
+        return Some(code);
+    }
+    book.take_back();
+    for file in &book.unfinished {
+        // Nothing is left to do about a file that cannot be removed.
+        let _ = std::fs::remove_file(file);
+    }
+    IS_ABANDONED.store(true, Ordering::SeqCst);
+    std::mem::forget(book);
+    None
+}
+
+/// A temporary file that the [`Book`] knows as long as it exists, and that is locked as long as this process
+/// lives.
+#[derive(Debug)]
+struct Temporary {
+    /// Both are there until it is finished.
+    parts: Option<(TempPath, File)>,
+}
+
+impl Temporary {
+    fn make(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> std::io::Result<Self> {
+        let mut book = book();
+        book.sweep(folder);
+        // Between making and locking it, another process may take a file for abandoned.
+        for _ in 0..8 {
+            let (file, path) = builder.tempfile_in(folder)?.into_parts();
+            if lock(&file) && is_at(&file, &path) {
+                book.unfinished.push(path.to_path_buf());
+                return Ok(Self { parts: Some((path, file)) });
+            }
+        }
+        Err(std::io::Error::other("temporary files vanish as soon as they are made"))
+    }
+
+    fn path(&self) -> &Path {
+        &self.parts.as_ref().expect("there until it is finished").0
+    }
+
+    fn file(&self) -> &File {
+        &self.parts.as_ref().expect("there until it is finished").1
+    }
+
+    fn take(&mut self) -> (TempPath, File) {
+        self.parts.take().expect("there until it is finished")
+    }
+}
+
+impl Drop for Temporary {
+    fn drop(&mut self) {
+        if let Some((path, _file)) = self.parts.take() {
+            let mut book = book();
+            book.forget(&path);
+            drop(path); // removes the file, while nobody abandons
+        }
+    }
+}
+
+impl Book {
+    /// Gives the files that stood there before their names again, the last one first: an output may have been put
+    /// in the place of another one of the same run.
+    fn take_back(&self) {
+        self.placed.iter().rev().for_each(Placed::put_back);
+    }
+
+    fn forget(&mut self, path: &Path) {
+        self.unfinished.retain(|other| other != path);
+    }
+
+    /// Removes from `folder` the temporary files of processes that are gone; once for every folder.
+    fn sweep(&mut self, folder: &Path) {
+        if self.swept.iter().any(|swept| swept == folder) {
+            return;
+        }
+        self.swept.push(folder.to_path_buf());
+        let Ok(entries) = std::fs::read_dir(folder) else { return };
+        for entry in entries.flatten() {
+            let name = entry.file_name();
+            let is_ours = name.to_str().is_some_and(|n| n.starts_with(PREFIX) && n.ends_with(SUFFIX));
+            if is_ours && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+                remove_if_abandoned(&entry.path());
+            }
+        }
+    }
+}
+
+/// Locks the file of a slot; false where another process has it already. File systems without locks go
+/// without.
+#[cfg(unix)]
+fn lock(file: &File) -> bool {
+    !matches!(file.try_lock(), Err(std::fs::TryLockError::WouldBlock))
+}
+
+/// Elsewhere a lock would keep others from writing, HDF5 among them.
+#[cfg(not(unix))]
+fn lock(_: &File) -> bool {
+    true
+}
+
+#[cfg(unix)]
+fn remove_if_abandoned(path: &Path) {
+    let Ok(file) = OpenOptions::new().read(true).write(true).open(path) else { return };
+    // A file system without locks says nothing about who holds a file.
+    if file.try_lock().is_ok() && is_at(&file, path) {
+        // Somebody else's that cannot be removed does no harm.
+        let _ = std::fs::remove_file(path);
+    }
+}
+
+#[cfg(not(unix))]
+fn remove_if_abandoned(_: &Path) {}
+
+/// Whether the open `file` is the one that has this name.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let (Ok(own), Ok(named)) = (file.metadata(), std::fs::symlink_metadata(path)) else { return false };
+    (own.dev(), own.ino()) == (named.dev(), named.ino())
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+impl OutputSlot {
+    /// Reserves `path`. A symbolic link is followed, so that the file it points to is replaced or made, not
+    /// the link.
+    ///
+    /// # Errors
+    /// [`OutputNotFile`](Code::OutputNotFile) when `path` is a folder, a device, empty or a circle of links;
+    /// [`OutputFolderMissing`](Code::OutputFolderMissing) when the folder does not exist;
+    /// [`OutputForbidden`](Code::OutputForbidden) when `path` is a write-protected file, or no file may be made in
+    /// the folder; [`OutputUnwritable`](Code::OutputUnwritable) when none can be made there.
+    pub fn prepare(path: impl AsRef<Path>) -> Result<Self> {
+        let asked = path.as_ref().to_path_buf();
+        let target = target_of(&asked)?;
+        let unwritable = |e: std::io::Error, why: String| fail(code_of(&e), &asked, why);
+        let folder = folder_of(&target);
+        match std::fs::metadata(folder) {
+            Ok(meta) if meta.is_dir() => {}
+            Ok(_) => {
+                let why = format!("{} is not a folder", folder.display());
+                return Err(fail(Code::OutputFolderMissing, &asked, why));
+            }
+            Err(e) if e.kind() == ErrorKind::NotFound => {
+                let why = format!("folder {} does not exist", folder.display());
+                return Err(fail(Code::OutputFolderMissing, &asked, why));
+            }
+            Err(e) => {
+                let why = format!("folder {}: {e}", folder.display());
+                return Err(unwritable(e, why));
+            }
+        }
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(PREFIX).suffix(SUFFIX);
+        // Temporary files are private by default. A new output has mode 666 less the umask; one that replaces a file
+        // gets the mode of that at the end, and nobody else reads it before.
+        let replaced = std::fs::metadata(&target).ok();
+        #[cfg(unix)]
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(match replaced {
+            Some(_) => WORKING_MODE,
+            None => 0o666,
+        }));
+        let temporary = Temporary::make(&builder, folder).map_err(|e| io(&asked, &e))?;
+        Ok(Self { asked, target, temporary, replaced })
+    }
+
+    /// The path as the user gave it.
+    pub fn path(&self) -> &Path {
+        &self.asked
+    }
+
+    /// The temporary file, for writers that need a path of their own.
+    pub fn temporary(&self) -> &Path {
+        self.temporary.path()
+    }
+
+    /// The error for a write to [`OutputSlot::temporary`] that failed in somebody else's hands.
+    pub fn failure(&self, error: &std::io::Error) -> Error {
+        io(&self.asked, error)
+    }
+
+    /// Writes `bytes` and commits.
+    ///
+    /// # Errors
+    /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable).
+    pub fn write(self, bytes: &[u8]) -> Result<()> {
+        self.fill(bytes)?;
+        self.commit()
+    }
+
+    /// Writes `bytes` to the temporary file; they appear with [`OutputSlot::commit`].
+    ///
+    /// # Errors
+    /// As [`OutputSlot::write`].
+    pub fn fill(&self, bytes: &[u8]) -> Result<()> {
+        let written = OpenOptions::new()
+            .write(true)
+            .truncate(true)
+            .open(self.temporary())
+            .and_then(|mut file| file.write_all(bytes));
+        written.map_err(|e| self.failure(&e))
+    }
+
+    /// Makes the temporary file the output: flushes it to the disk, then renames it over the target.
+    ///
+    /// # Errors
+    /// As [`OutputSlot::write`].
+    pub fn commit(self) -> Result<()> {
+        Self::commit_all([self])
+    }
+
+    /// Does the work of [`OutputSlot::commit_all`] for files that stay however the run ends: a checkpoint, the ledger of
+    /// a batch, the folder of a cluster.
+    ///
+    /// # Errors
+    /// Every error of [`OutputSlot::commit_all`].
+    pub fn keep_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
+        Self::place(slots, Lasting::Final)
+    }
+
+    /// Makes the temporary files the outputs, all of them or none: every file is on the disk before the first
+    /// gets its name, and a signal that ends the program waits until all have theirs. Where one cannot be put
+    /// in place, what stood in the places of the others before comes back, on file systems with hard links; so it does
+    /// where a run of the program ends without results after this.
+    ///
+    /// # Errors
+    /// Every error of [`OutputSlot::write`]; [`Usage`](Code::Usage) where one would replace a file that the run read.
+    pub fn commit_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
+        Self::place(slots, Lasting::UntilEndOfRun)
+    }
+
+    fn place(slots: impl IntoIterator<Item = Self>, lasting: Lasting) -> Result<()> {
+        let mut slots: Vec<Self> = slots.into_iter().collect();
+        for slot in &slots {
+            refuse_read(&slot.asked)?;
+        }
+        for slot in &slots {
+            if let Some(replaced) = std::fs::metadata(&slot.target).ok().or_else(|| slot.replaced.clone()) {
+                take_over(slot.temporary.file(), &replaced);
+            }
+            slot.temporary.file().sync_all().map_err(|e| slot.failure(&e))?;
+        }
+        let placed = place_all(&mut slots, lasting);
+        // The renames themselves are durable once the folders are synced; where folders cannot be opened they
+        // are so already or cannot be made so, and the files are in place either way.
+        let mut folders: Vec<&Path> = slots.iter().map(|slot| folder_of(&slot.target)).collect();
+        folders.dedup();
+        for folder in folders {
+            if let Ok(folder) = File::open(folder) {
+                let _ = folder.sync_all();
+            }
+        }
+        placed
+    }
+
+    /// Another name for the file that stands in the place, for the case that it has to come back.
+    fn keep_old(&self) -> Option<Old> {
+        let mut name = self.temporary.path().file_name()?.to_os_string();
+        name.push(SUFFIX);
+        let path = self.temporary.path().with_file_name(name);
+        std::fs::hard_link(&self.target, &path).ok()?;
+        // A shared lock keeps other runs from removing it as abandoned, and no reader from the file.
+        let lock = File::open(&path).ok().filter(|file| file.try_lock_shared().is_ok());
+        Some(Old { path, _lock: lock })
+    }
+}
+
+/// Time during which an output that has its name can be taken back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Lasting {
+    Final,
+    UntilEndOfRun,
+}
+
+/// Another name of a file that an output has replaced.
+#[derive(Debug)]
+struct Old {
+    path: PathBuf,
+    _lock: Option<File>,
+}
+
+/// An output in its place, and what is needed to undo that.
+#[derive(Debug)]
+struct Placed {
+    target: PathBuf,
+    /// The output itself, locked: a file that another process has put there since is not touched.
+    file: File,
+    old: Option<Old>,
+    replaced: bool,
+}
+
+/// Renames all files, or puts back what stood there before.
+fn place_all(slots: &mut [OutputSlot], lasting: Lasting) -> Result<()> {
+    // Held until the end: who abandons the unfinished waits for it.
+    let mut book = book();
+    let is_final = lasting == Lasting::Final || book.run != Run::Going;
+    let is_undoable = slots.len() > 1 || !is_final;
+    let mut placed: Vec<Placed> = Vec::with_capacity(slots.len());
+    for slot in slots {
+        let replaced = slot.target.exists();
+        let old = is_undoable.then(|| slot.keep_old()).flatten();
+        let (path, file) = slot.temporary.take();
+        book.forget(&path);
+        let renamed = path.persist(&slot.target);
+        let done = Placed { target: slot.target.clone(), file, old, replaced };
+        if let Err(e) = renamed {
+            done.forget_old();
+            placed.iter().rev().for_each(Placed::put_back);
+            return Err(slot.failure(&e.error));
+        }
+        placed.push(done);
+    }
+    if is_final {
+        placed.iter().for_each(Placed::forget_old);
+    } else {
+        book.placed.append(&mut placed);
+    }
+    Ok(())
+}
+
+impl Placed {
+    fn forget_old(&self) {
+        // One that stays is removed by the next run.
+        let _ = self.old.as_ref().map(|old| std::fs::remove_file(&old.path));
+    }
+
+    /// Undoes the rename. What cannot be undone stays as it is; the error of the run is told all the same.
+    fn put_back(&self) {
+        if !is_at(&self.file, &self.target) {
+            return self.forget_old();
+        }
+        let _ = match &self.old {
+            Some(old) => std::fs::rename(&old.path, &self.target),
+            None if !self.replaced => std::fs::remove_file(&self.target),
+            None => Ok(()),
+        };
+    }
+}
+
+/// The file that `asked` stands for, which exists and can be replaced, or does not exist.
+fn target_of(asked: &Path) -> Result<PathBuf> {
+    let not_a_file = |why: &str| fail(Code::OutputNotFile, asked, why.to_owned());
+    if asked.as_os_str().is_empty() {
+        return Err(not_a_file("the path is empty"));
+    }
+    let ends_in_separator = asked.to_string_lossy().ends_with(std::path::is_separator);
+    if asked.is_dir() {
+        return Err(not_a_file("it is a folder"));
+    }
+    if ends_in_separator || asked.file_name().is_none() {
+        return Err(not_a_file("the path does not end in a file name"));
+    }
+    match std::fs::metadata(asked) {
+        Ok(meta) if !meta.is_file() => Err(not_a_file("it is not a regular file")),
+        Ok(meta) if meta.permissions().readonly() => {
+            Err(fail(Code::OutputForbidden, asked, "the existing file is write-protected".to_owned()))
+        }
+        Ok(_) => std::fs::canonicalize(asked).map_err(|e| match e.kind() {
+            ErrorKind::NotFound => not_a_file("the file that it leads to has been removed"),
+            _ => io(asked, &e),
+        }),
+        // A name that is too long: the temporary file, whose own is short, would not show it.
+        Err(e) if e.kind() == ErrorKind::InvalidFilename => Err(not_a_file(&e.to_string())),
+        Err(_) => followed(asked).map_err(|e| not_a_file(&e.to_string())),
+    }
+}
+
+fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn fail(code: Code, path: &Path, why: String) -> Error {
+    Diagnostic::new(code, format!("cannot write {}: {why}", path.display())).into()
+}
+
+fn io(path: &Path, error: &std::io::Error) -> Error {
+    fail(code_of(error), path, error.to_string())
+}
+
+/// The code of an output that cannot be made or written for this reason.
+pub fn code_of(error: &std::io::Error) -> Code {
+    match error.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Code::DiskShort,
+        ErrorKind::PermissionDenied | ErrorKind::ReadOnlyFilesystem => Code::OutputForbidden,
+        _ => Code::OutputUnwritable,
+    }
+}

@@ -1,0 +1,498 @@
+//! Columns of numbers over time, as multibody programs and spreadsheets write them.
+//!
+//! Fields are separated by semicolons, tabs, commas or blanks. Lines that begin with `#`, `%` or `!` are
+//! comments. The names of the columns stand in the first line that is no comment and has no number, or in the
+//! last comment before the first row where that has as many fields; a line below the names without any number
+//! has units, which are not read.
+
+use super::input_file::InputFile;
+use super::table::printable;
+use crate::diagnostic::{Code, Diagnostic};
+use std::borrow::Cow;
+
+/// Number of bad rows that are reported one by one.
+const SHOWN: usize = 5;
+
+/// Rows that there must be.
+const LEAST_ROWS: usize = 2;
+
+/// Distance of two rows, relative to the largest time of a table, below which only rounding may tell them apart: times that
+/// are summed up over ten thousand steps are off by this.
+const ROUNDING: f64 = 1e-12;
+
+/// Part of the usual distance of rows that rows within [`ROUNDING`] of each other lie apart at the least: dates in seconds
+/// have rows every millisecond.
+const UNUSUAL: f64 = 1e-3;
+
+/// The first row that is no further from the one before than rounding of their times; `None` where there is none. Between
+/// such rows a history would change at a rate that nobody has given.
+///
+/// * `times`: ascending.
+pub fn closer_than_rounding(times: &[f64]) -> Option<usize> {
+    let largest = times.iter().fold(0.0f64, |most, time| most.max(time.abs()));
+    let mut apart: Vec<f64> = times.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let ulps = 4.0 * f64::EPSILON * largest;
+    let is_close =
+        |apart: f64, usual: f64| apart <= ulps || (apart < ROUNDING * largest && apart < UNUSUAL * usual);
+    let shortest = apart.iter().copied().fold(f64::INFINITY, f64::min);
+    if shortest >= ROUNDING * largest {
+        return None;
+    }
+    let middle = apart.len() / 2;
+    let usual = *apart.select_nth_unstable_by(middle, f64::total_cmp).1;
+    times.windows(2).position(|pair| is_close(pair[1] - pair[0], usual)).map(|row| row + 1)
+}
+
+/// A column of a file, by its name or by its place.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ColumnKey {
+    /// Its name in the file, with or without the unit in brackets behind it.
+    Name(String),
+    /// Its place, from 1.
+    Number(usize),
+}
+
+/// Columns of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Ascending times, two at least.
+    pub times: Vec<f64>,
+    /// As many values of every column that was asked for.
+    pub columns: Vec<Vec<f64>>,
+    /// The lines of the file that they stand in, from 1.
+    pub lines: Vec<usize>,
+}
+
+/// Reads the column of times and other columns.
+///
+/// # Errors
+/// FB215 for columns that the file does not have, all of them; FB216 for rows that cannot be read, the first
+/// few and how many more, for times that do not ascend and for fewer than two rows.
+pub fn read_series(
+    file: &InputFile,
+    time: &ColumnKey,
+    wanted: &[ColumnKey],
+) -> Result<Series, Vec<Diagnostic>> {
+    let bytes = file.bytes();
+    let bad = |line: usize, message: String| vec![row_error(file, line, message)];
+    if bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff") {
+        return Err(vec![
+            row_error(file, 1, "file is UTF-16".to_owned()).with_help("save it as UTF-8 or ASCII text"),
+        ]);
+    }
+    let Some(layout) = Layout::of(bytes) else {
+        return Err(bad(1, "file has no rows".to_owned()));
+    };
+    let places = layout.places(file, std::iter::once(time).chain(wanted))?;
+    let mut reading = Reading::new(file, &layout, places);
+    for (number, line) in layout.rows(bytes) {
+        reading.take(number, line);
+    }
+    reading.finish()
+}
+
+fn row_error(file: &InputFile, line: usize, message: String) -> Diagnostic {
+    Diagnostic::new(Code::SeriesRow, message).in_file(file.path()).at_line(line)
+}
+
+/// What separates the fields of a line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Separator {
+    Byte(u8),
+    Blanks,
+}
+
+impl Separator {
+    /// That of a line.
+    fn of(line: &[u8]) -> Self {
+        let has = |byte: &u8| line.contains(byte);
+        match [b';', b'\t', b','].into_iter().find(has) {
+            // Commas between digits of numbers that blanks separate are decimal commas.
+            Some(b',')
+                if Self::Blanks.split(line).iter().all(|field| is_plain_or_with_decimal_comma(field)) =>
+            {
+                Self::Blanks
+            }
+            Some(byte) => Self::Byte(byte),
+            None => Self::Blanks,
+        }
+    }
+
+    /// Fields without blanks and quotes around them; what stands in quotes separates nothing.
+    fn split(self, line: &[u8]) -> Vec<&[u8]> {
+        let (mut fields, mut from, mut quoted) = (Vec::new(), 0, false);
+        let separates = |byte: u8| match self {
+            Self::Byte(separator) => byte == separator,
+            Self::Blanks => byte == b' ' || byte == b'\t',
+        };
+        for (at, &byte) in line.iter().enumerate() {
+            quoted ^= byte == b'"';
+            if separates(byte) && !quoted {
+                fields.push(&line[from..at]);
+                from = at + 1;
+            }
+        }
+        fields.push(&line[from..]);
+        fields.iter_mut().for_each(|field| *field = unquoted(field));
+        match self {
+            Self::Blanks => fields.retain(|field| !field.is_empty()),
+            // A separator at the end of a line ends its last field.
+            Self::Byte(_) if fields.last().is_some_and(|field| field.is_empty()) => {
+                fields.pop();
+            }
+            Self::Byte(_) => (),
+        }
+        fields
+    }
+}
+
+fn unquoted(field: &[u8]) -> &[u8] {
+    let field = field.trim_ascii();
+    field.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).map_or(field, <[u8]>::trim_ascii)
+}
+
+/// A whole number, or one with digits on both sides of its only comma.
+fn is_plain_or_with_decimal_comma(field: &[u8]) -> bool {
+    field.iter().all(u8::is_ascii_digit) && !field.is_empty() || has_decimal_comma(field)
+}
+
+fn has_decimal_comma(field: &[u8]) -> bool {
+    let mut parts = field.split(|&byte| byte == b',');
+    let (Some(whole), Some(fraction), None) = (parts.next(), parts.next(), parts.next()) else {
+        return false;
+    };
+    whole.last().is_some_and(u8::is_ascii_digit)
+        && fraction.first().is_some_and(u8::is_ascii_digit)
+        && number(&[whole, b".", fraction].concat()).is_some()
+}
+
+/// A number; exponents may have the letter D, as Fortran writes them.
+fn number(field: &[u8]) -> Option<f64> {
+    let text: Cow<'_, [u8]> = match field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
+        true => field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect(),
+        false => field.into(),
+    };
+    fast_float2::parse(text.as_ref()).ok()
+}
+
+/// Lines with their numbers, trimmed.
+fn numbered(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
+    bytes.split(|&byte| byte == b'\n').enumerate().map(|(at, line)| (at + 1, line.trim_ascii()))
+}
+
+fn is_comment(line: &[u8]) -> bool {
+    matches!(line.first(), Some(b'#' | b'%' | b'!'))
+}
+
+/// How the file is written: what separates fields, how many there are, and the names of the columns.
+struct Layout<'f> {
+    separator: Separator,
+    fields: usize,
+    names: Vec<&'f [u8]>,
+    /// The line with the names, or the first row.
+    line: usize,
+    /// The first line that may be a row.
+    first_row: usize,
+}
+
+impl<'f> Layout<'f> {
+    /// `None` without a line that is no comment.
+    fn of(bytes: &'f [u8]) -> Option<Self> {
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        let mut comment = None;
+        let mut lines = numbered(bytes).filter(|(_, line)| !line.is_empty());
+        let (line, first) = lines.by_ref().find(|&(_, line)| {
+            let found = is_comment(line);
+            comment = if found { Some(line) } else { comment };
+            !found
+        })?;
+        let separator = Separator::of(first);
+        let head = separator.split(first);
+        let has_numbers =
+            |fields: &[&[u8]]| fields.iter().any(|f| number(f).is_some() || has_decimal_comma(f));
+        if has_numbers(&head) {
+            let names = comment.and_then(|comment| names_in(comment, separator, head.len()));
+            let names = names.unwrap_or_default();
+            return Some(Self { separator, fields: head.len(), names, line, first_row: line });
+        }
+        // The rows tell better than names with blanks in them what separates.
+        let below = lines.find(|(_, line)| !is_comment(line));
+        let separator = below.map_or(separator, |(_, below)| match Separator::of(below) {
+            Separator::Byte(byte) if first.contains(&byte) => Separator::Byte(byte),
+            _ => separator,
+        });
+        let head = separator.split(first);
+        let has_units = below.is_some_and(|(_, below)| !has_numbers(&separator.split(below)));
+        let first_row = if has_units { below.map_or(line, |(line, _)| line) + 1 } else { line + 1 };
+        Some(Self { separator, fields: head.len(), names: head, line, first_row })
+    }
+
+    /// The lines of rows.
+    fn rows(&self, bytes: &'f [u8]) -> impl Iterator<Item = (usize, &'f [u8])> + use<'f> {
+        let first = self.first_row;
+        let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+        numbered(bytes).filter(move |(at, line)| *at >= first && !line.is_empty() && !is_comment(line))
+    }
+
+    /// Where the columns stand.
+    fn places<'k>(
+        &self,
+        file: &InputFile,
+        keys: impl Iterator<Item = &'k ColumnKey>,
+    ) -> Result<Vec<usize>, Vec<Diagnostic>> {
+        let (mut places, mut found) = (Vec::new(), Vec::new());
+        for key in keys {
+            match self.place(key) {
+                Ok(place) => places.push(place),
+                Err((message, help)) => {
+                    let wrong = Diagnostic::new(Code::SeriesColumn, message).with_help(help);
+                    found.push(wrong.in_file(file.path()).at_line(self.line));
+                }
+            }
+        }
+        found.dedup();
+        if found.is_empty() { Ok(places) } else { Err(found) }
+    }
+
+    /// Where a column stands; or a message and a help.
+    fn place(&self, key: &ColumnKey) -> Result<usize, (String, String)> {
+        let name = match key {
+            ColumnKey::Number(number) if (1..=self.fields).contains(number) => return Ok(number - 1),
+            ColumnKey::Number(number) => {
+                let message = format!("there is no column {number}: the file has {}", self.fields);
+                return Err((message, self.all()));
+            }
+            ColumnKey::Name(name) => name.as_bytes(),
+        };
+        if self.names.is_empty() {
+            let message = format!("there is no column `{}`: the columns have no names", printable(name));
+            return Err((message, format!("give its number, 1 to {}", self.fields)));
+        }
+        let whole = |own: &[u8]| own == name;
+        let without_unit = |own: &[u8]| before_unit(own) == name;
+        for matches in [&whole as &dyn Fn(&[u8]) -> bool, &without_unit] {
+            let places: Vec<usize> = (0..self.names.len()).filter(|&at| matches(self.names[at])).collect();
+            match places[..] {
+                [place] => return Ok(place),
+                [] => (),
+                [first, second, ..] => {
+                    let name = printable(name);
+                    let message = format!("columns {} and {} are both `{name}`", first + 1, second + 1);
+                    return Err((message, "give the number of the column".to_owned()));
+                }
+            }
+        }
+        Err((format!("there is no column `{}`", printable(name)), self.nearest(name)))
+    }
+
+    /// The name that is nearest to one that is not there, and all names.
+    fn nearest(&self, name: &[u8]) -> String {
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).to_lowercase();
+        let distance = |own: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(own)));
+        let near = |own: &&&[u8]| distance(own) <= 2 && distance(own) < before_unit(own).len();
+        match self.names.iter().filter(near).min_by_key(distance) {
+            Some(own) => format!("did you mean `{}`? {}", printable(own), self.all()),
+            None => self.all(),
+        }
+    }
+
+    /// All columns.
+    fn all(&self) -> String {
+        let names: Vec<String> = self.names.iter().map(|name| printable(name)).collect();
+        match names.is_empty() {
+            true => format!("the columns have the numbers 1 to {}", self.fields),
+            false => format!("the columns are: {}", names.join(", ")),
+        }
+    }
+}
+
+/// The names in a comment with as many fields as the rows have.
+fn names_in(comment: &[u8], of_rows: Separator, fields: usize) -> Option<Vec<&[u8]>> {
+    let text = comment.trim_ascii_start();
+    let begin = text.iter().position(|byte| !matches!(byte, b'#' | b'%' | b'!' | b' ' | b'\t'))?;
+    let text = &text[begin..];
+    let separators = [of_rows, Separator::of(text), Separator::Blanks];
+    separators.into_iter().map(|separator| separator.split(text)).find(|names| names.len() == fields)
+}
+
+/// A name without what stands in brackets behind it.
+fn before_unit(name: &[u8]) -> &[u8] {
+    let bracket = name.iter().position(|byte| matches!(byte, b'[' | b'('));
+    let behind = matches!(name.last(), Some(b']' | b')'));
+    match bracket {
+        Some(at) if behind && at > 0 => name[..at].trim_ascii_end(),
+        _ => name,
+    }
+}
+
+/// Reads row by row.
+struct Reading<'r> {
+    file: &'r InputFile,
+    layout: &'r Layout<'r>,
+    /// Where the time stands, and the columns.
+    places: Vec<usize>,
+    series: Series,
+    shown: Vec<Diagnostic>,
+    bad: usize,
+    /// The line of the first bad row that is only counted.
+    first_not_shown: Option<usize>,
+}
+
+impl<'r> Reading<'r> {
+    fn new(file: &'r InputFile, layout: &'r Layout<'r>, places: Vec<usize>) -> Self {
+        let columns = vec![Vec::new(); places.len() - 1];
+        let series = Series { times: Vec::new(), columns, lines: Vec::new() };
+        Self { file, layout, places, series, shown: Vec::new(), bad: 0, first_not_shown: None }
+    }
+
+    fn take(&mut self, line: usize, text: &[u8]) {
+        if let Err(diagnostic) = self.row(line, text) {
+            self.bad += 1;
+            match self.bad {
+                bad if bad <= SHOWN => self.shown.push(diagnostic),
+                _ => self.first_not_shown = self.first_not_shown.or(Some(line)),
+            }
+        }
+    }
+
+    fn row(&mut self, line: usize, text: &[u8]) -> Result<(), Diagnostic> {
+        let fields = self.layout.separator.split(text);
+        if fields.len() != self.layout.fields {
+            let count = match fields.len() {
+                1 => "1 field".to_owned(),
+                count => format!("{count} fields"),
+            };
+            let message = format!("row has {count}, the first line has {}", self.layout.fields);
+            return Err(row_error(self.file, line, message));
+        }
+        let numbers: Vec<f64> = self
+            .places
+            .iter()
+            .map(|&place| self.cell(line, place, fields[place]))
+            .collect::<Result<_, _>>()?;
+        let time = numbers[0];
+        if let (Some(&before), Some(above)) = (self.series.times.last(), self.series.lines.last())
+            && time <= before
+        {
+            let message = format!("time {time} does not increase: line {above} has {before}");
+            let help = "times must ascend: leave one row of an instant, and one of several runs in a file";
+            return Err(row_error(self.file, line, message).with_help(help));
+        }
+        self.series.times.push(time);
+        self.series.lines.push(line);
+        self.series.columns.iter_mut().zip(&numbers[1..]).for_each(|(column, value)| column.push(*value));
+        Ok(())
+    }
+
+    /// The number in a field.
+    fn cell(&self, line: usize, place: usize, field: &[u8]) -> Result<f64, Diagnostic> {
+        let told = |what: &str| {
+            let column = match self.layout.names.get(place) {
+                Some(name) => format!("`{}`", printable(name)),
+                None => format!("{}", place + 1),
+            };
+            row_error(self.file, line, format!("`{}` in column {column} {what}", printable(field)))
+        };
+        match number(field) {
+            Some(value) if value.is_finite() => Ok(value),
+            Some(_) => Err(told("is not a finite number")),
+            None if has_decimal_comma(field) => {
+                Err(told("has a decimal comma").with_help("write numbers with decimal points"))
+            }
+            None => Err(told("is not a number")),
+        }
+    }
+
+    /// Complaint about a row at the time of the one before, but for rounding.
+    fn too_close(&self, row: usize) -> Diagnostic {
+        let Series { times, lines, .. } = &self.series;
+        let [before, time] = [times[row - 1], times[row]];
+        let message = format!(
+            "time {time:?} is the time of line {} ({before:?}) but for rounding: between the two rows the history would change without time",
+            lines[row - 1]
+        );
+        let help = "leave one of the two rows out; a jump needs rows that are further apart";
+        row_error(self.file, lines[row], message).with_help(help)
+    }
+
+    fn finish(mut self) -> Result<Series, Vec<Diagnostic>> {
+        let more = self.bad - self.shown.len();
+        if let Some(line) = self.first_not_shown {
+            let message = format!("{more} more rows are bad, from this one on");
+            self.shown.push(row_error(self.file, line, message));
+        }
+        let rows = self.series.times.len();
+        if self.bad == 0 && rows < LEAST_ROWS {
+            let count = if rows == 0 { "no rows" } else { "only one row" };
+            let message = format!("file has {count}, a history needs two at least");
+            self.shown.push(Diagnostic::new(Code::SeriesRow, message).in_file(self.file.path()));
+        }
+        if let (0, Some(row)) = (self.bad, closer_than_rounding(&self.series.times)) {
+            self.shown.push(self.too_close(row));
+        }
+        if self.shown.is_empty() { Ok(self.series) } else { Err(self.shown) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, time: &str, wanted: &[&str]) -> Result<Series, Vec<Diagnostic>> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("run.csv");
+        std::fs::write(&path, text).expect("written");
+        let key = |text: &&str| match text.parse() {
+            Ok(number) => ColumnKey::Number(number),
+            Err(_) => ColumnKey::Name((*text).to_owned()),
+        };
+        let keys: Vec<ColumnKey> = wanted.iter().map(key).collect();
+        read_series(&InputFile::open(&path).expect("a file"), &key(&time), &keys)
+    }
+
+    /// The same two rows as different programs write them.
+    #[test]
+    fn every_way_of_writing_is_understood() {
+        for (text, time, value) in [
+            ("t,x,F\n0,9,1.5\n0.5,9,-2e1\n", "t", "F"),
+            ("\u{feff}t;x;F\r\n0;9;1.5\r\n0.5;9;-2.0E+01\r\n", "t", "F"),
+            ("# made by a solver\n%\n! 3 columns\nt x F\n0 9 1.5\n  0.5\t9   -20\n", "t", "F"),
+            ("\"t [s]\",\"x, far [m]\",\"F (N)\"\n0,9,1.5\n0.5,9,-20\n", "t", "F"),
+            ("t [s];x;F\ns;m;N\n0;9;1.5\n0.5;9;-20;\n", "t [s]", "F"),
+            ("0 9 1.5\n0.5 9 -2.0D+01\n", "1", "3"),
+            ("# t, x, F\n0, 9, 1.5\n# between\n\n0.5, 9, -20\n", "t", "F"),
+            ("#t x F\n0 9 1.5\n0.5 9 -20", "t", "F"),
+            ("my time\tthe x\tF\n0\t9\t1.5\n0.5\t9\t-20\n", "my time", "F"),
+            ("t,name,F\n0,ab,1.5\n0.5,\"c,d\",-20\n", "t", "F"),
+        ] {
+            let series =
+                read(text, time, &[value, value]).unwrap_or_else(|found| panic!("{text}: {found:?}"));
+            assert_eq!(series.times, [0.0, 0.5], "{text}");
+            assert_eq!(series.columns, [[1.5, -20.0], [1.5, -20.0]], "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_is_told_where_it_stands() {
+        for (text, time, value, line, message) in [
+            ("t,Fx\n0,1\n1,2\n", "t", "fy", 1, "there is no column `fy`"),
+            ("t,F,F\n0,1,2\n1,2,3\n", "t", "F", 1, "columns 2 and 3 are both `F`"),
+            ("t,F\n0,1\n1,2\n", "t", "3", 1, "there is no column 3: the file has 2"),
+            ("0,1\n1,2\n", "1", "F", 1, "there is no column `F`: the columns have no names"),
+            ("t;F\n0;1,5\n1;2,5\n", "t", "F", 2, "`1,5` in column `F` has a decimal comma"),
+            ("t F\n0,0 1,5\n1,0 2,5\n", "t", "F", 2, "`0,0` in column `t` has a decimal comma"),
+            ("t,F\n0,1,5\n1,2,5\n", "t", "F", 2, "row has 3 fields, the first line has 2"),
+            ("t,F\n0,1\n\n1,x\n", "t", "F", 4, "`x` in column `F` is not a number"),
+            ("t,F\n0,1\n1,NaN\n", "t", "F", 3, "`NaN` in column `F` is not a finite number"),
+            ("t,F\n0,1\n1,-inf\n", "t", "F", 3, "`-inf` in column `F` is not a finite number"),
+            ("t,F\n0,1\n1,\n", "t", "F", 3, "row has 1 field, the first line has 2"),
+            ("t,F\n0,1\n1,2\n1,3\n", "t", "F", 4, "time 1 does not increase: line 3 has 1"),
+        ] {
+            let found = read(text, time, &[value]).expect_err(text);
+            assert_eq!((found[0].line(), found[0].message()), (Some(line), message), "{text}");
+        }
+        for text in ["t,F\n", "t,F\n0,1\n", "# nothing\n"] {
+            assert!(read(text, "t", &["F"]).is_err(), "{text}");
+        }
+    }
+}

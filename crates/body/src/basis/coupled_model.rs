@@ -1,0 +1,161 @@
+//! A model under the couplings that every mode of a body keeps: interfaces that move as rigid bodies (theory
+//! section 5).
+
+use super::echelon::Echelon;
+use super::interface_rows::{CoupledInterface, coupled_sets};
+use super::modal_basis::problem_of_span;
+use super::rigid_modes::rigid_modes;
+use faer::{Mat, MatRef};
+use flexbody_base::error::Result;
+use flexbody_eigen::{EigenProblem, Resume};
+use flexbody_linalg::{Dependents, Elimination, Pencil, ReducedPencil, combine, gram, larger};
+use flexbody_model::{Coupling, FeModel, NodeSet};
+use std::borrow::Cow;
+use std::collections::HashSet;
+use std::ops::Range;
+
+/// Largest deformation of a rigid interface, relative to the largest motion of any node, that is the rounding of modes in
+/// single precision.
+const RIGID: f64 = 1e-6;
+
+/// A model whose rigid interfaces move as rigid bodies: displacements u = T y, with the pencil (T'KT, T'MT). Forces and
+/// displacements are those of all rows of the model; without such interfaces T = 1.
+pub struct CoupledModel<'m> {
+    model: &'m FeModel,
+    coupling: Option<RigidInterfaces>,
+}
+
+/// Interfaces of several rows that have six degrees of freedom each, in the plane three.
+struct RigidInterfaces {
+    joints: Vec<CoupledInterface>,
+    elimination: Elimination,
+    reduced: ReducedPencil,
+}
+
+impl<'m> CoupledModel<'m> {
+    /// The model as it is, with interfaces that deform.
+    pub fn uncoupled(model: &'m FeModel) -> Self {
+        Self { model, coupling: None }
+    }
+
+    /// The model in which those of the rigid interfaces among `sets` are rigid that no mode deforms.
+    ///
+    /// * `vectors`: modes Psi of a body (N x nf), in the rows of the model.
+    pub fn of_modes(model: &'m FeModel, sets: &[NodeSet], vectors: MatRef<'_, f64>) -> Self {
+        let rigid: Vec<NodeSet> =
+            sets.iter().filter(|set| set.coupling == Some(Coupling::Rigid)).cloned().collect();
+        let mut taken = HashSet::new();
+        let mut is_apart = |joint: &CoupledInterface| {
+            let apart = !joint.rows.iter().any(|row| taken.contains(row));
+            taken.extend(joint.rows.iter().copied());
+            apart
+        };
+        let joints: Vec<CoupledInterface> = coupled_sets(model, &rigid)
+            .into_iter()
+            .filter(|joint| deformation(model, joint, vectors) <= RIGID && is_apart(joint))
+            .collect();
+        if joints.is_empty() {
+            return Self::uncoupled(model);
+        }
+        let dependents = joints.iter().map(rigid_rows).collect();
+        let elimination = Elimination::new(model.pencil().n(), &[], dependents);
+        let reduced = elimination.reduced(&model.pencil());
+        Self { model, coupling: Some(RigidInterfaces { joints, elimination, reduced }) }
+    }
+
+    /// The model without the couplings.
+    pub fn model(&self) -> &'m FeModel {
+        self.model
+    }
+
+    /// Names of the interfaces that are rigid here.
+    pub fn rigid_interfaces(&self) -> Vec<String> {
+        self.coupling.iter().flat_map(|own| &own.joints).map(|joint| joint.name.clone()).collect()
+    }
+
+    /// (T'KT, T'MT).
+    pub fn pencil(&self) -> Pencil<'_> {
+        self.coupling.as_ref().map_or_else(|| self.model.pencil(), |own| own.reduced.pencil())
+    }
+
+    /// T'f (m x k): what nodal forces f (N x k) do to the degrees of freedom that are left.
+    pub fn restrict(&self, forces: Mat<f64>) -> Mat<f64> {
+        match &self.coupling {
+            Some(own) => own.elimination.restrict(forces.as_ref()),
+            None => forces,
+        }
+    }
+
+    /// T y (N x k).
+    pub fn expand<'y>(&self, y: &'y Mat<f64>) -> Cow<'y, Mat<f64>> {
+        match &self.coupling {
+            Some(own) => Cow::Owned(own.elimination.expand(y.as_ref())),
+            None => Cow::Borrowed(y),
+        }
+    }
+
+    /// The rigid modes in the degrees of freedom that are left (m x 6, in the plane m x 3), orthonormal in T'MT.
+    ///
+    /// # Errors
+    /// Every error of [`rigid_modes`].
+    pub fn rigid_modes(&self) -> Result<Mat<f64>> {
+        let rigid = rigid_modes(self.model, &self.model.pencil())?;
+        Ok(match &self.coupling {
+            Some(own) => own.elimination.free_rows(rigid.as_ref()),
+            None => rigid,
+        })
+    }
+
+    /// Replaces the forces f at the nodes of each rigid interface by those of their resultant, A R'f with the rigid
+    /// motions R of the interface and their averages A: what the interface carries in itself moves nothing.
+    pub fn without_inner_forces(&self, forces: &mut Mat<f64>) {
+        for joint in self.coupling.iter().flat_map(|own| &own.joints) {
+            let resultant = gram(joint.motion(), joint.gather(forces.as_ref()).as_ref());
+            let spread = combine(joint.measure(), resultant.as_ref());
+            for (i, &row) in joint.rows.iter().enumerate() {
+                (0..forces.ncols()).for_each(|j| forces[(row, j)] = spread[(i, j)]);
+            }
+        }
+    }
+
+    /// The eigenproblem for responses; nothing is searched in it, so no estimate of an eigenvalue is needed.
+    pub(super) fn problem<'a>(&'a self, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
+        let whole = problem_of_span(self.model, rigid, Resume::default());
+        match &self.coupling {
+            Some(own) => EigenProblem { pencil: own.reduced.pencil(), order: None, ..whole },
+            None => whole,
+        }
+    }
+}
+
+/// Difference of an interface's motion in the modes from the rigid motion that fits it best, displacements and
+/// rotations each relative to the largest of any node in any mode.
+fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f64>) -> f64 {
+    let own = joint.gather(vectors);
+    let left = &own - combine(joint.motion(), gram(joint.measure(), own.as_ref()).as_ref());
+    let largest = |a: MatRef<'_, f64>, rows: Range<usize>| match rows.is_empty() {
+        true => 0.0,
+        false => a.subrows(rows.start, rows.len()).norm_max(),
+    };
+    let part = |of_joint: Range<usize>, of_all: Range<usize>| match largest(left.as_ref(), of_joint) {
+        0.0 => 0.0,
+        left => left / largest(vectors, of_all),
+    };
+    let (displaced, all) = (joint.displaced_rows(), model.rows().displacements());
+    let rotations = all..all + model.rows().rotations().len();
+    larger(part(0..displaced, 0..all), part(displaced..own.nrows(), rotations))
+}
+
+/// u = R q of a rigid interface solved for its other rows: as many rows as it has rigid motions determine them, chosen
+/// by complete pivoting (three nodes that lie far apart, one of them held in all directions).
+fn rigid_rows(joint: &CoupledInterface) -> Dependents {
+    let Echelon { pivots, others, weights } = Echelon::new(joint.balanced().transpose().to_owned());
+    // From displacements and turns of one size to those in the units of the model.
+    let size = |row: usize| if row < joint.displaced_rows() { 1.0 } else { joint.length() };
+    let weight = |i: usize, j: usize| weights[(j, i)] * size(pivots[j]) / size(others[i]);
+    Dependents {
+        rows: others.iter().map(|&j| joint.rows[j]).collect(),
+        on: pivots.iter().map(|&j| joint.rows[j]).collect(),
+        weights: Mat::from_fn(others.len(), pivots.len(), weight),
+    }
+}

@@ -1,0 +1,527 @@
+//! Craig-Bampton basis: modes with the interfaces held, and static shapes for unit motions of the interfaces
+//! (Craig and Bampton, AIAA J. 6 (1968) 1313; theory section 5), turned into pseudo-free-surface modes.
+//!
+//! All couplings are one transformation, u = D q + T y: D q moves the nodes of the interfaces as a rigid body
+//! with the interface coordinates q, and T y leaves q zero. A node of a rigid or free interface has no y; of
+//! an averaging one all but as many degrees of freedom as it has coordinates are free, and the mean
+//! determines these. The fixed-interface problem is then the pencil (T'KT, T'MT): the search, its proof of
+//! completeness and its residuals are those of any other.
+
+use super::failure::explain;
+use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
+use super::free_surface::{polynomial_estimate, single_precision_note};
+use super::held_interfaces::{check_prescribable, hold, unit_motions};
+use super::interface_coordinates::InterfaceCoordinates;
+use super::interface_rows::{CoupledInterface, coupled_interfaces};
+use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
+use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
+use super::rigid_modes::rigid_modes;
+use super::{FixedInterface, ModeSettings};
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_eigen::{
+    Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof,
+    ResponseAccuracy, Resume, Wanted, modes_of_span, solve, static_responses_twice,
+};
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::{
+    Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side,
+    subtract_combination, symmetric_eigen,
+};
+use flexbody_model::{Coupling, FeModel, rigid_count};
+
+/// Part of the M-norm of a shape that must be left beside those before it.
+const LEFT: f64 = 1e-8;
+
+/// Copies of the shapes that are held at the same time while they are made independent (measured: 18).
+const COPIES: u64 = 20;
+
+/// Modes with all interfaces held, constraint modes of all interfaces.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CraigBampton;
+
+impl Basis for CraigBampton {
+    fn name(&self) -> &'static str {
+        "craig-bampton"
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        let Task { model, settings, resume, watch } = *task;
+        check_possible(model, settings)?;
+        let joints = coupled_interfaces(model, "interface coordinates")?;
+        check_prescribable(model, &joints)?;
+        let parts = Parts::new(model, &joints, settings, watch)?;
+        let rigid = rigid_modes(model, &model.pencil())?;
+        let problem = problem_of_span(model, rigid.as_ref(), resume);
+        watch(Event::Phase("pseudo-free-surface modes"));
+        let failed = |failure| explain(model, failure);
+        let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
+        let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
+            .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+        let mut notes = parts.notes(model, settings);
+        notes.extend(parts.removed(&found, rigid_count(model.dimension())));
+        if found.kept.is_empty() {
+            return Err(nothing_deforms().into());
+        }
+        let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
+        let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
+        let span = found.vectors;
+        let mut solution = modes_of_span(&problem, span.clone(), &all, watch).map_err(failed)?;
+        let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
+        let provenance = parts.provenance(&found.kept, parted.as_ref());
+        let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
+        let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
+        solution.completeness = parts.completeness(model, &solution);
+        let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
+        solution.plan = parts.fixed.plan.map(|plan| Plan { bytes: plan.bytes.max(bytes), ..plan });
+        add_work(&mut solution, &parts.fixed);
+        let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
+        basis.provenance = provenance;
+        basis.coordinates = Some(coordinates);
+        basis.fixed_interface = fixed_interface;
+        basis.diagnostics.extend(notes);
+        Ok(basis)
+    }
+}
+
+/// Refuses what the basis cannot promise, and what does not fit the memory, before anything of that size is
+/// made.
+fn check_possible(model: &FeModel, settings: &ModeSettings) -> Result<()> {
+    if settings.accuracy == Accuracy::Certified {
+        let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
+        return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+    }
+    let coordinates = model.interfaces().iter().map(|set| match set.coupling() {
+        Coupling::Free => model.dimension() * set.nodes.len(),
+        _ => rigid_count(model.dimension()),
+    });
+    let bytes = shape_bytes(model.pencil().n(), coordinates.sum());
+    if let Some(available) = settings.memory.filter(|&available| bytes > available) {
+        return Err(explain(model, EigenFailure::Memory { bytes, available }));
+    }
+    Ok(())
+}
+
+fn nothing_deforms() -> Diagnostic {
+    let message = "no shape deforms the body: one interface alone has no constraint modes, and no fixed-interface mode was asked for";
+    Diagnostic::new(Code::ShapesNone, message).with_help("ask for more modes, or raise --max-frequency")
+}
+
+/// Fixed-interface modes and constraint modes.
+struct Parts<'a> {
+    joints: &'a [CoupledInterface],
+    names: Vec<String>,
+    elimination: Elimination,
+    reduced: ReducedPencil,
+    /// Fixed-interface modes y = Phi, (T'MT)-orthonormal.
+    fixed: EigenSolution,
+    /// D + T Y (N x c): the body for unit interface coordinates, nothing loaded but the interfaces, (T'KT) Y
+    /// = -T'K D.
+    constraint: Mat<f64>,
+    /// What the basis lacks of the responses to the inertia of the constraint modes.
+    lacking: MissingResponses,
+}
+
+impl<'a> Parts<'a> {
+    fn new(
+        model: &FeModel,
+        joints: &'a [CoupledInterface],
+        settings: &ModeSettings,
+        watch: Watch<'_>,
+    ) -> Result<Self> {
+        watch(Event::Phase("interfaces"));
+        let pencil = model.pencil();
+        let failed = |failure| explain(model, failure);
+        let elimination = hold(pencil.n(), joints, settings.memory).map_err(failed)?;
+        if elimination.is_empty() {
+            let message = "the interfaces hold every node of the body: nothing is left to deform";
+            return Err(Diagnostic::new(Code::InterfaceCoupling, message)
+                .with_help("give the interfaces fewer nodes")
+                .into());
+        }
+        let names = joints.iter().flat_map(|joint| {
+            joint.coordinates.iter().map(|coordinate| format!("{} {coordinate}", joint.name))
+        });
+        let moved = unit_motions(pencil.n(), joints);
+        let reduced = elimination.reduced(&pencil);
+        let held = reduced.pencil();
+        // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of
+        // the free body will do.
+        let rigid = rigid_modes(model, &pencil)?;
+        let first_estimate = polynomial_estimate(model, &pencil, rigid.as_ref());
+        let none = Mat::zeros(held.n(), 0);
+        let problem = EigenProblem {
+            pencil: held,
+            rigid: none.as_ref(),
+            first_estimate,
+            input_error: input_error(model),
+            order: None,
+            resume: Resume::default(),
+        };
+        let in_model = |failure| failed(expanded(failure, &elimination));
+        let own = reduced.bytes();
+        let left =
+            ModeSettings { memory: settings.memory.map(|bytes| bytes.saturating_sub(own)), ..*settings };
+        let mut fixed = fixed_modes(&problem, &left, watch).map_err(in_model)?;
+        fixed.plan = fixed.plan.map(|plan| Plan { bytes: plan.bytes + own, ..plan });
+        watch(Event::Phase("constraint modes"));
+        let lowest = fixed.eigenvalues.first().copied().or(fixed.next_eigenvalue).unwrap_or(first_estimate);
+        let precision = fixed.plan.map_or(Precision::Double, |plan| plan.precision);
+        let mut loads = elimination.restrict(pencil.apply_stiffness(moved.as_ref()).as_ref());
+        loads *= faer::Scale(-1.0);
+        let inertia = |interior: &Mat<f64>| {
+            let constraint = &moved + elimination.expand(interior.as_ref());
+            elimination.restrict(pencil.apply_mass(constraint.as_ref()).as_ref())
+        };
+        let (accuracy, counters) = (ResponseAccuracy::FULL, &mut fixed.counters);
+        let [interior, correction] =
+            static_responses_twice(&problem, loads, inertia, lowest, precision, accuracy, counters)
+                .map_err(in_model)?;
+        let lacking = lacking(&problem, correction, &fixed);
+        let mut constraint = moved + elimination.expand(interior.as_ref());
+        restore_rigid_motion(joints, rigid.as_ref(), &mut constraint)
+            .ok_or_else(|| failed(EigenFailure::Inaccurate { residual: f64::NAN }))?;
+        Ok(Self { joints, names: names.collect(), elimination, reduced, fixed, constraint, lacking })
+    }
+
+    fn fixed_shapes(&self) -> Mat<f64> {
+        self.elimination.expand(self.fixed.vectors.as_ref())
+    }
+
+    /// Kind and name of a shape: fixed-interface modes come first.
+    fn name(&self, shape: usize) -> (&'static str, String) {
+        match shape.checked_sub(self.fixed.eigenvalues.len()) {
+            None => ("fixed-interface mode", format!("number {}", shape + 1)),
+            Some(constraint) => ("constraint mode", self.names[constraint].clone()),
+        }
+    }
+
+    /// Shapes that add nothing, ascending.
+    fn removed_shapes(found: &Independent) -> Vec<usize> {
+        let removed = found.rigid.iter().chain(found.dependent.iter().map(|(j, _)| j));
+        let mut removed: Vec<usize> = removed.chain(&found.massless).copied().collect();
+        removed.sort_unstable();
+        removed
+    }
+
+    /// Whether the shapes that add nothing are constraint modes, as many as there are rigid motions, which
+    /// the constraint modes hold.
+    fn lacks_rigid_motion_only(&self, found: &Independent, rigid: usize) -> bool {
+        let removed = Self::removed_shapes(found);
+        removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
+    }
+
+    /// The shape with the largest share in each mode; `parted` are the products of the shapes `kept` with the
+    /// modes.
+    fn provenance(&self, kept: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
+        let told = |(j, share): (usize, f64)| {
+            let (kind, name) = self.name(kept[j]);
+            format!("{kind}: {:.0} % {name}", 100.0 * share)
+        };
+        largest_shares(parted).into_iter().map(told).collect()
+    }
+
+    /// What became of shapes that add nothing.
+    fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
+        let removed = Self::removed_shapes(found);
+        let all = found.kept.len() + removed.len();
+        let note = if self.lacks_rigid_motion_only(found, rigid) {
+            let (fixed, motions) = (self.fixed.eigenvalues.len(), self.constraint.ncols());
+            let message = format!(
+                "the {motions} interface motions contain the {rigid} rigid-body motions, which the body frame carries out: with {fixed} fixed-interface modes that leaves {} ways to deform",
+                found.kept.len()
+            );
+            Diagnostic::new(Code::ShapesRigid, message)
+                .with_help("nothing to do: every Craig-Bampton body is counted in this way")
+        } else {
+            let which = removed.iter().map(|&j| self.name(j)).map(|(kind, name)| format!("{kind} {name}"));
+            let which = named(which.collect());
+            let message = format!(
+                "{} of {all} shapes are left out, they are rigid motions, move no mass, or add less than {LEFT:.0e} of their M-norm ({rigid} rigid motions were expected): {which}",
+                removed.len()
+            );
+            Diagnostic::new(Code::ShapesDependent, message)
+        };
+        vec![note]
+    }
+
+    /// What the basis is made of; `whole`: it spans all motions of the interfaces, without which there are no
+    /// lower bounds. `None` where the estimates leave the range of numbers.
+    fn fixed_interface(
+        &self,
+        rigid: MatRef<'_, f64>,
+        solution: &EigenSolution,
+        whole: bool,
+    ) -> Option<FixedInterface> {
+        let Completeness { proof, shift, negative_pivots, .. } = self.fixed.completeness;
+        let modes = self.fixed.eigenvalues.len();
+        let counted = negative_pivots.filter(|_| proof == Proof::InertiaCount);
+        // A mode that is left out although it is below the shift is known by its eigenvalue.
+        let next = self.fixed.next_eigenvalue.filter(|_| counted.is_some_and(|counted| counted > modes));
+        let cut = counted.and(next.map(|next| next * (1.0 - KNOWN)).or(Some(shift)));
+        let (of_rigid, of_modes) =
+            (coordinates_of(self.joints, rigid), coordinates_of(self.joints, solution.vectors.as_ref()));
+        let FreeEstimate { estimate, lower } = free_estimate(
+            &solution.eigenvalues,
+            of_rigid.as_ref(),
+            of_modes.as_ref(),
+            &self.lacking,
+            cut.filter(|_| whole),
+        )?;
+        Some(FixedInterface {
+            modes,
+            interface_motions: self.constraint.ncols(),
+            counted,
+            shift,
+            next,
+            residual: self.fixed.residuals.iter().copied().fold(0.0, f64::max),
+            free_estimate: estimate,
+            free_lower: lower,
+        })
+    }
+
+    /// What the user should know of the fixed-interface modes.
+    fn notes(&self, model: &FeModel, settings: &ModeSettings) -> Vec<Diagnostic> {
+        let given = self.fixed.eigenvalues.len();
+        let mut notes: Vec<Diagnostic> = single_precision_note(&self.fixed, settings).into_iter().collect();
+        if let Wanted::Lowest(wanted) = settings.wanted
+            && given < wanted
+            && wanted < usize::MAX
+        {
+            let message = format!("{wanted} fixed-interface modes were asked for, there are {given}");
+            notes.push(Diagnostic::new(Code::ModesClamped, message));
+        }
+        let completeness = &self.fixed.completeness;
+        if given > 0 && completeness.proof == Proof::NotProved {
+            let message = format!(
+                "completeness of the {given} fixed-interface modes is not proved: {}",
+                completeness.remark
+            );
+            notes.push(Diagnostic::new(Code::CompletenessUnproved, message));
+        }
+        if let (Wanted::Lowest(1..), Some(more)) =
+            (settings.wanted, completeness.modes_below.checked_sub(given).filter(|more| *more > 0))
+        {
+            let hertz =
+                self.fixed.eigenvalues.last().map_or(0.0, |&lambda| model.units().frequency_of(lambda));
+            let message = format!(
+                "fixed-interface mode {given} ({hertz:.6} Hz) shares its eigenvalue with {more} that are left out"
+            );
+            notes.push(
+                Diagnostic::new(Code::RepeatedSplit, message)
+                    .with_help(format!("ask for {} modes to keep the body's symmetry", given + more)),
+            );
+        }
+        notes
+    }
+
+    /// The modes of the span are no eigenvectors of the free body; what is proved is proved of the
+    /// fixed-interface modes.
+    fn completeness(&self, model: &FeModel, solution: &EigenSolution) -> Completeness {
+        let (fixed, held) = (self.fixed.eigenvalues.len(), &self.fixed.completeness);
+        let hertz = model.units().frequency_of(held.shift);
+        let more = held.modes_below.saturating_sub(fixed);
+        let proved = match held.proof {
+            Proof::NotProved => {
+                format!("its {fixed} fixed-interface modes are not proved complete: {}", held.remark)
+            }
+            Proof::InertiaCount if more == 0 => {
+                format!(
+                    "its {fixed} fixed-interface modes are all there are below {hertz:.6} Hz (inertia count)"
+                )
+            }
+            Proof::InertiaCount => format!(
+                "of the {} fixed-interface modes below {hertz:.6} Hz (inertia count) it has {fixed}",
+                held.modes_below
+            ),
+        };
+        Completeness {
+            proof: Proof::NotProved,
+            shift: solution.eigenvalues.last().copied().unwrap_or(0.0),
+            negative_pivots: None,
+            modes_below: solution.eigenvalues.len(),
+            remark: format!("a Craig-Bampton basis has no modes of the free body; {proved}"),
+        }
+    }
+
+    /// K and M in the coordinates of the interfaces and of the fixed-interface modes, and what the modes are
+    /// in them.
+    fn coordinates(
+        &self,
+        problem: &EigenProblem<'_>,
+        modes: MatRef<'_, f64>,
+        dimension: usize,
+    ) -> InterfaceCoordinates {
+        let (pencil, rigid) = (&problem.pencil, problem.rigid);
+        let (c, lambda) = (self.constraint.ncols(), &self.fixed.eigenvalues);
+        // K annihilates rigid motion: without it the energies keep their digits, and R'K R = 0 to the last.
+        let mut deformed = self.constraint.clone();
+        for _ in 0..2 {
+            let along = gram(rigid, pencil.apply_mass(deformed.as_ref()).as_ref());
+            subtract_combination(deformed.as_mut(), rigid, along.as_ref());
+        }
+        let stiffness = gram(deformed.as_ref(), pencil.apply_stiffness(deformed.as_ref()).as_ref());
+        let shapes = side_by_side(&[self.constraint.as_ref(), self.fixed_shapes().as_ref()]);
+        let mass = gram(shapes.as_ref(), pencil.apply_mass(shapes.as_ref()).as_ref());
+        let mean = |a: &Mat<f64>, i: usize, j: usize| 0.5 * (a[(i, j)] + a[(j, i)]);
+        let size = c + lambda.len();
+        let q = coordinates_of(self.joints, modes);
+        // T y = psi - (D + T Y) q, and eta = Phi' (T'MT) y.
+        let mut left = modes.to_owned();
+        subtract_combination(left.as_mut(), self.constraint.as_ref(), q.as_ref());
+        let y = self.elimination.free_rows(left.as_ref());
+        let eta = gram(self.fixed.vectors.as_ref(), self.reduced.pencil().apply_mass(y.as_ref()).as_ref());
+        let modal = (1..=lambda.len()).map(|j| format!("fixed-interface mode {j}"));
+        InterfaceCoordinates {
+            names: self.names.iter().cloned().chain(modal).collect(),
+            vectors: self.vectors(dimension),
+            stiffness: Mat::from_fn(size, size, |i, j| match (i < c, j < c) {
+                (true, true) => mean(&stiffness, i, j),
+                (false, false) if i == j => lambda[i - c],
+                _ => 0.0,
+            }),
+            mass: Mat::from_fn(size, size, |i, j| mean(&mass, i, j)),
+            of_modes: Mat::from_fn(
+                size,
+                modes.ncols(),
+                |i, j| if i < c { q[(i, j)] } else { eta[(i - c, j)] },
+            ),
+        }
+    }
+
+    /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in
+    /// space.
+    fn vectors(&self, d: usize) -> Vec<usize> {
+        let starts_of_vectors = |(joint, first): (&CoupledInterface, usize)| {
+            let (moving, all) = (joint.displacements, joint.coordinates.len());
+            // In the plane a rotation is a number.
+            let turning = if d == 3 { (all - moving) / 3 } else { 0 };
+            (0..moving / d + turning).map(move |i| first + d * i)
+        };
+        starts(self.joints).flat_map(starts_of_vectors).collect()
+    }
+}
+
+/// Relative error of a fixed-interface eigenvalue that was computed, far above what the residuals leave.
+const KNOWN: f64 = 1e-8;
+
+/// The fixed-interface modes that are wanted. Where none are (static condensation) the first is computed
+/// nevertheless: it says how far the basis goes.
+fn fixed_modes(
+    problem: &EigenProblem<'_>,
+    settings: &ModeSettings,
+    watch: Watch<'_>,
+) -> std::result::Result<EigenSolution, EigenFailure> {
+    if settings.wanted != Wanted::Lowest(0) {
+        return solve(problem, settings, watch);
+    }
+    let first = solve(problem, &ModeSettings { wanted: Wanted::Lowest(1), ..*settings }, watch)?;
+    Ok(EigenSolution {
+        next_eigenvalue: first.eigenvalues.first().copied(),
+        eigenvalues: Vec::new(),
+        vectors: Mat::zeros(problem.pencil.n(), 0),
+        residuals: Vec::new(),
+        rounding_floors: Vec::new(),
+        bounds: None,
+        ..first
+    })
+}
+
+/// G and H of the responses y to the inertia of the constraint modes, without their part along the
+/// fixed-interface modes.
+fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> MissingResponses {
+    let pencil = &problem.pencil;
+    let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
+    for _ in 0..2 {
+        let along = gram(fixed.vectors.as_ref(), pencil.apply_mass(response.as_ref()).as_ref());
+        subtract_combination(response.as_mut(), fixed.vectors.as_ref(), along.as_ref());
+    }
+    let symmetric = |products: Mat<f64>| {
+        let a = gram(response.as_ref(), products.as_ref());
+        Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))
+    };
+    MissingResponses {
+        whole,
+        stiffness: symmetric(pencil.apply_stiffness(response.as_ref())),
+        mass: symmetric(pencil.apply_mass(response.as_ref())),
+    }
+}
+
+/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi +
+/// (R - Psi Q) Q^+ with their coordinates Q = C'R: K annihilates them only as well as its digits allow, and
+/// a slender body magnifies that. The coordinates of the shapes stay what they are.
+fn restore_rigid_motion(
+    joints: &[CoupledInterface],
+    rigid: MatRef<'_, f64>,
+    constraint: &mut Mat<f64>,
+) -> Option<()> {
+    let q = coordinates_of(joints, rigid);
+    let scale: Vec<f64> = (0..q.nrows()).map(|i| q.row(i).norm_l2()).collect();
+    // Coordinates of one size: rotations are in other units than displacements.
+    let weighted =
+        Mat::from_fn(
+            q.nrows(),
+            q.ncols(),
+            |i, j| {
+                if scale[i] > 0.0 { q[(i, j)] / scale[i].powi(2) } else { 0.0 }
+            },
+        );
+    let eigen = symmetric_eigen(gram(weighted.as_ref(), q.as_ref()).as_ref())?;
+    let root = Mat::from_fn(q.ncols(), q.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
+    let root = combine(root.as_ref(), root.as_ref().transpose());
+    let inverse = combine(root.as_ref(), weighted.as_ref().transpose());
+    for _ in 0..2 {
+        let mut missing = rigid.to_owned();
+        subtract_combination(missing.as_mut(), constraint.as_ref(), q.as_ref());
+        add_combination(constraint.as_mut(), missing.as_ref(), inverse.as_ref());
+    }
+    Some(())
+}
+
+/// C'u: the interface coordinates of displacements (N x k).
+fn coordinates_of(joints: &[CoupledInterface], u: MatRef<'_, f64>) -> Mat<f64> {
+    let blocks = joints.iter().map(|joint| gram(joint.measure(), joint.gather(u).as_ref()));
+    let blocks: Vec<Mat<f64>> = blocks.collect();
+    let rows: Vec<_> = blocks.iter().flat_map(|block| block.row_iter()).collect();
+    Mat::from_fn(rows.len(), u.ncols(), |i, j| rows[i][j])
+}
+
+/// The joints, each with its first coordinate.
+fn starts(joints: &[CoupledInterface]) -> impl Iterator<Item = (&CoupledInterface, usize)> {
+    joints.iter().scan(0, |next, joint| {
+        let first = *next;
+        *next += joint.coordinates.len();
+        Some((joint, first))
+    })
+}
+
+/// A failure of the fixed-interface problem with its vectors in the rows of the model.
+fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
+    match failure {
+        EigenFailure::NegativeEigenvalue { eigenvalue, vector } => {
+            EigenFailure::NegativeEigenvalue { eigenvalue, vector: elimination.expand(vector.as_ref()) }
+        }
+        EigenFailure::ZeroEnergy { count, eigenvalues, vectors } => {
+            let vectors = elimination.expand(vectors.as_ref());
+            EigenFailure::ZeroEnergy { count, eigenvalues, vectors }
+        }
+        EigenFailure::SinglePrecision(inner) => {
+            EigenFailure::SinglePrecision(Box::new(expanded(*inner, elimination)))
+        }
+        other => other,
+    }
+}
+
+/// Bytes for so many shapes of n rows.
+fn shape_bytes(n: usize, count: usize) -> u64 {
+    8 * COPIES * (n as u64) * (count as u64)
+}
+
+/// Adds the work of the fixed-interface problem.
+fn add_work(solution: &mut EigenSolution, fixed: &EigenSolution) {
+    let own = solution.counters;
+    solution.counters = fixed.counters;
+    solution.counters.stiffness_columns += own.stiffness_columns;
+    solution.counters.mass_columns += own.mass_columns;
+}

@@ -1,0 +1,50 @@
+//! Linear conditions solved for some of their unknowns.
+
+use faer::Mat;
+
+/// The reduced echelon form \[1, W\] of a matrix A (r x n) with its columns in another order: of the rank of A, with
+/// pivots that are the largest entries left.
+pub(super) struct Echelon {
+    /// Columns of A of the unit matrix, and all others.
+    pub pivots: Vec<usize>,
+    pub others: Vec<usize>,
+    /// W (rank x others).
+    pub weights: Mat<f64>,
+}
+
+impl Echelon {
+    /// Pivots below this part of the first one are rounding.
+    const ROUNDING: f64 = 1e-9;
+
+    /// The form of `a`.
+    pub(super) fn new(mut a: Mat<f64>) -> Self {
+        let (r, columns) = (a.nrows(), a.ncols());
+        let mut pivots: Vec<usize> = Vec::new();
+        let mut first = 0.0;
+        for step in 0..r.min(columns) {
+            let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
+            let open = places.filter(|(_, j)| !pivots.contains(j));
+            let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
+            if step == 0 {
+                first = a[(i, j)].abs();
+            }
+            if a[(i, j)].abs() <= Self::ROUNDING * first {
+                break;
+            }
+            for column in 0..columns {
+                let (upper, lower) = (a[(step, column)], a[(i, column)]);
+                (a[(step, column)], a[(i, column)]) = (lower, upper);
+            }
+            let pivot = a[(step, j)];
+            (0..columns).for_each(|column| a[(step, column)] /= pivot);
+            for other in (0..r).filter(|&other| other != step) {
+                let factor = a[(other, j)];
+                (0..columns).for_each(|column| a[(other, column)] -= factor * a[(step, column)]);
+            }
+            pivots.push(j);
+        }
+        let others: Vec<usize> = (0..columns).filter(|j| !pivots.contains(j)).collect();
+        let weights = Mat::from_fn(pivots.len(), others.len(), |i, j| a[(i, others[j])]);
+        Self { pivots, others, weights }
+    }
+}

@@ -1,0 +1,323 @@
+//! Free-surface modes: mass-normalised modes of the unsupported body, M-orthogonal to its rigid motions.
+
+use super::failure::explain;
+use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
+use super::residual_vectors::{NamedLoads, interface_truncation, with_residual_vectors};
+use super::rigid_modes::rigid_modes;
+use super::{Loads, ModeSettings};
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_eigen::{
+    Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted,
+    energy_noise, planned_bytes, solve,
+};
+use flexbody_linalg::progress::Watch;
+use flexbody_linalg::{Pencil, Tall, combine, contiguous_mut, gram, subtract_combination, symmetric_eigen};
+use flexbody_model::{FeModel, centre_and_length};
+use rayon::prelude::*;
+
+/// Columns that are multiplied by K or M at a time where only products with others are wanted: as many as the
+/// product itself takes.
+const PANEL: usize = 8;
+
+/// The lowest free-surface modes.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FreeSurface {
+    /// Loads whose static responses join the modes.
+    pub residual_vectors: Vec<Loads>,
+}
+
+impl Basis for FreeSurface {
+    fn name(&self) -> &'static str {
+        "free"
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        if self.residual_vectors.is_empty() {
+            let Task { model, settings, resume, watch } = *task;
+            let mut free = free_surface_resumed(model, settings, resume, watch)?;
+            free.truncation = interface_truncation(model, &free.solution, settings, watch);
+            return Ok(free);
+        }
+        free_modes_with(&self.residual_vectors, "residual vector", task)
+    }
+}
+
+/// Free-surface modes and the static responses to `loads`, each called `what` where modes are named after it.
+pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> Result<ModalBasis> {
+    let Task { model, settings, resume, watch } = *task;
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let problem = problem_of_span(model, rigid.as_ref(), resume);
+    let loads = NamedLoads::new(model, loads, what, settings)?;
+    let free = free_surface_resumed(model, settings, resume, watch)?;
+    with_residual_vectors(model, &problem, free, &loads, settings, watch)
+}
+
+/// Computes the free-surface modes of `model`.
+///
+/// # Errors
+/// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
+pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<ModalBasis> {
+    free_surface_resumed(model, settings, Resume::default(), watch)
+}
+
+/// The same with a search that starts where an earlier one stood, or that is kept.
+///
+/// # Errors
+/// As [`free_surface`].
+pub fn free_surface_resumed(
+    model: &FeModel,
+    settings: &ModeSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<ModalBasis> {
+    let pencil = model.pencil();
+    let rigid = rigid_modes(model, &pencil)?;
+    let first_estimate = polynomial_estimate(model, &pencil, rigid.as_ref());
+    let problem = EigenProblem {
+        pencil,
+        rigid: rigid.as_ref(),
+        first_estimate,
+        input_error: input_error(model),
+        order: model.elimination(),
+        resume,
+    };
+    let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
+    let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
+    describe(&basis.solution, settings, &problem, &mut basis.diagnostics);
+    basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
+    Ok(basis)
+}
+
+/// What the user should know about the precision of the factor.
+pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
+    let plan = solution.plan.filter(|_| settings.factor == FactorChoice::Auto)?;
+    let message = match plan.precision {
+        _ if plan.multigrid == Multigrid::Used => {
+            "no factor: the modes are found by cycles over levels of groups of nodes, and corrected in double precision"
+        }
+        _ if plan.multigrid == Multigrid::Failed => {
+            "cycles over levels of groups of nodes do not converge for this model: factored instead"
+        }
+        Precision::Single => "the factor is in single precision; the modes are corrected in double precision",
+        Precision::Double if plan.single_failed => {
+            "a single-precision factor is too poor for the conditioning of this model: factored in double precision"
+        }
+        Precision::Double => return None,
+    };
+    Some(Diagnostic::new(Code::FactorPrecision, message))
+}
+
+/// Notes about how many modes there are and how they end.
+fn describe(
+    solution: &EigenSolution,
+    settings: &ModeSettings,
+    problem: &EigenProblem<'_>,
+    notes: &mut Vec<Diagnostic>,
+) {
+    let given = solution.eigenvalues.len();
+    // Known from the rank of M, or because all there are were found.
+    let mut finite = solution.finite_modes;
+    if let Wanted::Lowest(wanted) = settings.wanted
+        && given < wanted
+    {
+        let message = format!(
+            "{wanted} modes were asked for, the model has {given} flexible modes with finite frequency"
+        );
+        notes.push(Diagnostic::new(Code::ModesClamped, message));
+        finite = finite.or(Some(given));
+    }
+    notes.extend(singular_mass_note(problem, finite));
+    let below = solution.completeness.modes_below;
+    if matches!(settings.wanted, Wanted::Lowest(_)) && below > given {
+        let message = format!("mode {given} shares its eigenvalue with {} that are left out", below - given);
+        notes.push(
+            Diagnostic::new(Code::RepeatedSplit, message)
+                .with_help(format!("ask for {below} modes to keep the body's symmetry")),
+        );
+    }
+    if solution.completeness.proof == Proof::NotProved {
+        let message =
+            format!("completeness of the {given} modes is not proved: {}", solution.completeness.remark);
+        let note = Diagnostic::new(Code::CompletenessUnproved, message);
+        notes.push(match settings.accuracy {
+            Accuracy::Fast => note,
+            _ => note.with_help(
+                "the modes keep their accuracy; a larger --memory-limit or machine allows the proof",
+            ),
+        });
+    }
+}
+
+/// A note about a mass matrix that leaves some motions without mass; `finite` modes have a frequency, where
+/// that is known.
+fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Option<Diagnostic> {
+    let pencil = &problem.pencil;
+    let at_most = pencil.n() - problem.rigid.ncols();
+    let massless = (0..pencil.mass().n()).filter(|&i| pencil.mass().row(i).0.is_empty()).count();
+    let singular = match finite {
+        Some(finite) if finite < at_most => {
+            format!("{finite} of {at_most} flexible modes have a finite frequency")
+        }
+        None if massless > 0 => format!(
+            "{} without mass: {massless}; at most {} of {at_most} flexible modes have a finite frequency",
+            if pencil.block() == 1 { "rows" } else { "nodes" },
+            at_most - pencil.block() * massless
+        ),
+        _ => return None,
+    };
+    Some(Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {singular}")))
+}
+
+/// An upper bound of the first flexible eigenvalue of a model with these rigid modes, near it for a uniform
+/// body: the scale of a shift.
+pub fn first_eigenvalue_estimate(model: &FeModel, rigid: MatRef<'_, f64>) -> f64 {
+    polynomial_estimate(model, &model.pencil(), rigid)
+}
+
+/// Bytes that the search for the free modes of a model holds at the most.
+///
+/// # Errors
+/// Those of the analysis of a model that has no factor.
+pub fn memory_estimate(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<u64> {
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+    planned_bytes(&problem, settings, watch).map_err(|failure| explain(model, failure))
+}
+
+/// The smallest Rayleigh quotient of polynomial fields, M-orthogonal to the rigid modes: an upper bound of the first
+/// flexible eigenvalue. Fields of the second degree come within a factor of two for a uniform solid; those of the
+/// third degree bend a curved shell nearly without stretching it (a cylinder with u_x = x^3, u_y = -y^3 exactly), and
+/// are taken where nodes have rotations. Rows without a place stay zero.
+pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
+    let has_rotations = !model.rows().rotations().is_empty();
+    let monomials = if has_rotations { [QUADRATIC, CUBIC].concat() } else { QUADRATIC.to_vec() };
+    let mut fields = polynomial_fields(model, pencil.n(), &monomials);
+    let mass = |x: MatRef<'_, f64>| pencil.apply_mass(x);
+    let before = gram_in_panels(fields.as_ref(), mass);
+    let m_rigid = pencil.apply_mass(rigid);
+    for _ in 0..2 {
+        let along = gram(m_rigid.as_ref(), fields.as_ref());
+        subtract_combination(fields.as_mut(), rigid, along.as_ref());
+    }
+    let mut m = gram_in_panels(fields.as_ref(), mass);
+    for i in 0..m.nrows() {
+        // A rigid field, or one that a singular mass matrix does not see: rounding only.
+        if m[(i, i)] < 1e-10 * before[(i, i)] {
+            m[(i, i)] = 0.0;
+        }
+    }
+    let k = gram_in_panels(fields.as_ref(), |x| pencil.apply_stiffness(x));
+    // Bending is a small difference of the fields of a shell.
+    let bending = has_rotations.then(|| smallest_ratio(&k, &m, 1e-8)).flatten();
+    bending
+        .and_then(|(_, field)| resolved_ratio(pencil, combine(fields.as_ref(), field.as_ref()).as_ref()))
+        .or_else(|| smallest_ratio(&k, &m, 1e-6).map(|(ratio, _)| ratio))
+        .filter(|ratio| *ratio > 0.0 && ratio.is_finite())
+        .unwrap_or_else(|| trace_ratio(pencil))
+}
+
+/// Monomials of the coordinates by their factors: of the first and second degree, and of the third.
+const QUADRATIC: &[&[usize]] = &[&[0], &[1], &[2], &[0, 0], &[1, 1], &[2, 2], &[0, 1], &[1, 2], &[0, 2]];
+const CUBIC: &[&[usize]] = &[
+    &[0, 0, 0],
+    &[1, 1, 1],
+    &[2, 2, 2],
+    &[0, 0, 1],
+    &[0, 0, 2],
+    &[0, 1, 1],
+    &[1, 1, 2],
+    &[0, 2, 2],
+    &[1, 2, 2],
+    &[0, 1, 2],
+];
+
+/// Fields with a monomial as their component along each axis; nodal rotations are half the curl of the field. Made
+/// side by side.
+fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Tall {
+    let positions = &model.nodes().positions;
+    let (centre, length) = centre_and_length(positions);
+    let d = model.dimension();
+    let local: Vec<[f64; 3]> =
+        positions.iter().map(|r| [0, 1, 2].map(|k| (r[k] - centre[k]) / length)).collect();
+    let rows = model.rows();
+    let rotations = rows.displacements()..;
+    let mut fields = Tall::zeros(n, monomials.len() * d);
+    let columns: Vec<&mut [f64]> = fields.as_mut().col_iter_mut().map(contiguous_mut).collect();
+    columns.into_par_iter().enumerate().for_each(|(column, field)| {
+        let (monomial, component) = (monomials[column / d], column % d);
+        for (r, at) in local.iter().zip((component..).step_by(d)) {
+            field[at] = monomial.iter().map(|&k| r[k]).product();
+        }
+        for (row, &(node, axis)) in rotations.clone().zip(rows.rotations()) {
+            let slope = |along: usize| slope(monomial, &local[node as usize], along) / length;
+            let (next, after) = ((usize::from(axis) + 1) % 3, (usize::from(axis) + 2) % 3);
+            // (curl u) along an axis = d u_after / d next - d u_next / d after.
+            if component == after {
+                field[row] = 0.5 * slope(next);
+            } else if component == next {
+                field[row] = -0.5 * slope(after);
+            }
+        }
+    });
+    fields
+}
+
+/// The derivative of a monomial along an axis.
+fn slope(monomial: &[usize], r: &[f64; 3], along: usize) -> f64 {
+    let without = |at: usize| -> f64 {
+        monomial.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, &k)| r[k]).product()
+    };
+    (0..monomial.len()).filter(|&at| monomial[at] == along).map(without).sum()
+}
+
+/// The Rayleigh quotient of a field, where that is more than rounding of the stiffness makes of it.
+fn resolved_ratio(pencil: &Pencil<'_>, x: MatRef<'_, f64>) -> Option<f64> {
+    let energy = gram(x, pencil.apply_stiffness(x).as_ref())[(0, 0)];
+    let noise = energy_noise(pencil.stiffness(), x, f64::EPSILON)[0];
+    (energy > RESOLVED * noise).then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
+}
+
+/// Energy beside its rounding from which on a field tells of the first eigenvalue.
+const RESOLVED: f64 = 1e3;
+
+/// X' f(X), where f takes a few columns at a time: the products of all need no room at once.
+fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> Mat<f64> {
+    let mut whole = Mat::zeros(x.ncols(), x.ncols());
+    for start in (0..x.ncols()).step_by(PANEL) {
+        let width = PANEL.min(x.ncols() - start);
+        let panel = gram(x, product(x.subcols(start, width)).as_ref());
+        whole.as_mut().subcols_mut(start, width).copy_from(&panel);
+    }
+    whole
+}
+
+/// The smallest eigenvalue of the small pencil (K, M) on the part of M above so much of its largest eigenvalue, and its
+/// eigenvector (one column).
+fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, Mat<f64>)> {
+    let scale: Vec<f64> =
+        (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
+    let scaled = |a: &Mat<f64>| {
+        Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]) * scale[i] * scale[j])
+    };
+    let eigen = symmetric_eigen(scaled(m).as_ref())?;
+    let largest = *eigen.values.last()?;
+    let kept: Vec<usize> =
+        (0..eigen.values.len()).filter(|&i| eigen.values[i] > kept_above * largest).collect();
+    let root = Mat::from_fn(m.nrows(), kept.len(), |i, c| {
+        eigen.vectors[(i, kept[c])] / eigen.values[kept[c]].sqrt()
+    });
+    let projected = gram(root.as_ref(), combine(scaled(k).as_ref(), root.as_ref()).as_ref());
+    let ratios = symmetric_eigen(projected.as_ref())?;
+    let ratio = *ratios.values.first()?;
+    let field = combine(root.as_ref(), ratios.vectors.as_ref().subcols(0, 1));
+    Some((ratio, Mat::from_fn(m.nrows(), 1, |i, _| scale[i] * field[(i, 0)])))
+}
+
+/// Mean stiffness over mean mass: a scale when nothing better is known.
+fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
+    let k: f64 = pencil.stiffness().diagonal().iter().sum();
+    let m: f64 = pencil.mass().diagonal().iter().sum::<f64>() * pencil.block() as f64;
+    k / m
+}

@@ -1,0 +1,157 @@
+//! Shapes that were computed elsewhere, in a file or from a motion: checked, brought into the order of the
+//! model, freed from rigid motion, M-orthonormalised. Nothing is factored unless eigenvectors are to be
+//! proved complete.
+
+use super::columns::{Given, columns};
+use super::failure::explain;
+use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
+use super::nodal_modes::{StatedModes, along_the_model, by_rows};
+use super::pseudo_free_surface::independent;
+use super::rigid_modes::rigid_modes;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
+use flexbody_eigen::{Accuracy, EigenFailure, Proof, Wanted, modes_of_span};
+use flexbody_model::{FeModel, RawModes, RawShapes};
+
+/// Shapes in the order of a model's degrees of freedom.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedShapes {
+    /// N x k, by internal rows.
+    shapes: Mat<f64>,
+    digits: u8,
+    source: Option<SourceFile>,
+    origin: Origin,
+    /// What the file says of the modes that the shapes are.
+    stated: Option<StatedModes>,
+    /// What was done to the shapes.
+    notes: Vec<Diagnostic>,
+}
+
+/// Where shapes come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Origin {
+    /// The user, who names a file.
+    User,
+    /// The motion of a body in a scene.
+    Motion,
+}
+
+/// Digits of numbers that were computed here.
+const COMPUTED_DIGITS: u8 = 15;
+
+impl ImportedShapes {
+    /// Shapes for `model`, given by its matrix rows.
+    ///
+    /// # Errors
+    /// [`ShapesSize`](Code::ShapesSize) when the rows are not those of the matrices,
+    /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
+    pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
+        let (digits, source) = (raw.digits, raw.source.clone());
+        let shapes = columns(model, raw, Given::Shapes)?;
+        Ok(Self { shapes, digits, source, origin: Origin::User, stated: None, notes: Vec::new() })
+    }
+
+    /// Modes of `model` that an FE program has written by nodes. Rows that they lack follow from the others
+    /// by the equations of motion, and the eigenvalues of the file are compared with those of K and M.
+    ///
+    /// # Errors
+    /// [`ShapesSize`](Code::ShapesSize) when the nodes are not those of the model, or too few of them;
+    /// [`ShapesZero`](Code::ShapesZero).
+    pub fn of_modes(model: &FeModel, raw: RawModes) -> Result<Self> {
+        let raw = along_the_model(model, raw)?;
+        let (shapes, notes) = by_rows(model, &raw)?;
+        let (digits, source, stated) = (raw.digits, Some(raw.source.clone()), Some(StatedModes::of(raw)));
+        Ok(Self { shapes, digits, source, origin: Origin::User, stated, notes })
+    }
+
+    /// Shapes that a motion was found to be made of (N x k, by the rows of the model).
+    pub fn of_motion(shapes: Mat<f64>) -> Self {
+        let digits = COMPUTED_DIGITS;
+        Self { shapes, digits, source: None, origin: Origin::Motion, stated: None, notes: Vec::new() }
+    }
+
+    /// What one of them is called, and several.
+    fn names(&self) -> (&'static str, &'static str) {
+        match self.origin {
+            Origin::User => ("imported shape", "imported shapes"),
+            Origin::Motion => ("shape of the motion", "shapes of the motion"),
+        }
+    }
+
+    /// The file that they were read from.
+    pub fn source(&self) -> Option<&SourceFile> {
+        self.source.as_ref()
+    }
+
+    /// Part of its M-norm that must be left of a shape after those before it: digits that the values do not
+    /// have say nothing.
+    fn dependent(&self) -> f64 {
+        10f64.powi(2 - i32::from(self.digits)).clamp(1e-8, 0.1)
+    }
+}
+
+impl Basis for ImportedShapes {
+    fn name(&self) -> &'static str {
+        match self.origin {
+            Origin::User => "imported",
+            Origin::Motion => "scene",
+        }
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        let Task { model, settings, resume, watch } = *task;
+        let rigid = rigid_modes(model, &model.pencil())?;
+        let problem = problem_of_span(model, rigid.as_ref(), resume);
+        let criterion = self.dependent();
+        let (one, several) = self.names();
+        let failed = |failure| explain(model, failure);
+        let independent = independent(&problem.pencil, rigid.as_ref(), self.shapes.clone(), criterion)
+            .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
+        let notes = independent.notes(several, criterion, |j| format!("shape {}", j + 1));
+        if independent.kept.is_empty() {
+            let message = format!("none of {} {several} deforms the body", self.shapes.ncols());
+            return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
+        }
+        let solution = modes_of_span(&problem, independent.vectors, settings, watch).map_err(failed)?;
+        let mut basis = ModalBasis::new(model, &problem, settings, solution, one)?;
+        let compared = self
+            .stated
+            .as_ref()
+            .map(|stated| stated.beside(model, self.shapes.as_ref(), &independent.kept, &basis.solution));
+        basis.diagnostics.extend(self.notes.iter().cloned().chain(compared.flatten()).chain(notes));
+        let given = basis.solution.eigenvalues.len();
+        if let Wanted::Lowest(wanted) = settings.wanted
+            && wanted > given
+            && wanted < usize::MAX
+        {
+            let message = format!("{wanted} modes were asked for, the shapes give {given}");
+            basis.diagnostics.push(Diagnostic::new(Code::ModesClamped, message));
+        }
+        basis.describe_span(settings.accuracy);
+        Ok(basis)
+    }
+}
+
+impl ModalBasis {
+    /// Notes about modes of a subspace: which are no eigenvectors, and whether the others are complete.
+    fn describe_span(&mut self, accuracy: Accuracy) {
+        let solution = &self.solution;
+        let (residuals, completeness) = (&solution.residuals, &solution.completeness);
+        let promised = accuracy.residual();
+        let worst = residuals.iter().copied().fold(0.0, f64::max);
+        let others = solution.residuals.len() - solution.eigenvectors(accuracy);
+        if others > 0 {
+            let message = format!(
+                "{others} of {} modes are no eigenvectors but the best that the span of the shapes has: K-residual up to {worst:.0e}, eigenvectors have {promised:.0e}",
+                residuals.len()
+            );
+            self.diagnostics.push(Diagnostic::new(Code::ShapesSpan, message));
+        }
+        if completeness.proof == Proof::NotProved && others < residuals.len() {
+            let message = format!("completeness of the modes is not proved: {}", completeness.remark);
+            self.diagnostics.push(Diagnostic::new(Code::CompletenessUnproved, message));
+        }
+    }
+}

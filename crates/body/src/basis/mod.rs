@@ -1,0 +1,44 @@
+//! Modal bases: which shapes span the deformation of a body, each kind in one file behind [`Basis`].
+
+mod choice;
+mod columns;
+mod coupled_model;
+mod craig_bampton;
+mod craig_chang;
+mod echelon;
+mod failure;
+mod fixed_interface;
+mod free_estimate;
+mod free_surface;
+mod held_interfaces;
+mod imported;
+mod interface_coordinates;
+mod interface_rows;
+mod massless;
+mod modal_basis;
+mod nodal_modes;
+mod oscillating;
+mod pseudo_free_surface;
+mod residual_vectors;
+mod rigid_modes;
+mod solved;
+
+pub use choice::BasisChoice;
+pub use coupled_model::CoupledModel;
+pub use craig_bampton::CraigBampton;
+pub use craig_chang::CraigChang;
+pub use fixed_interface::FixedInterface;
+/// What is asked for.
+pub use flexbody_eigen::EigenSettings as ModeSettings;
+pub use free_surface::{
+    FreeSurface, first_eigenvalue_estimate, free_surface, free_surface_resumed, memory_estimate,
+};
+pub use imported::ImportedShapes;
+pub use interface_coordinates::InterfaceCoordinates;
+pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
+pub use oscillating::oscillating_responses;
+pub use residual_vectors::{
+    Loads, UserLoads, free_static_responses, free_static_responses_twice, interface_loads,
+};
+pub use rigid_modes::rigid_modes;
+pub use solved::{CountElsewhere, SolvedModes};

@@ -1,0 +1,250 @@
+//! Modes that an FE program has written by nodes: in the order of the model, with the rows that the file
+//! lacks, and beside what K and M say of them.
+
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_eigen::EigenSolution;
+use flexbody_linalg::{Analysis, CscMatrix, Indefinite, Pencil, SymmetricMatrix, column_products, gram};
+use flexbody_model::{FeModel, RawModes};
+use std::collections::HashMap;
+use std::path::PathBuf;
+
+/// Backward error of a factorisation beyond which rows are not completed by it: the digits that shapes have.
+const INACCURATE: f64 = 1e-7;
+
+/// Returns modes with their values along the axes of the model.
+///
+/// # Errors
+/// [`ShapesSize`](Code::ShapesSize) for a node that lacks directions which turn together.
+pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawModes> {
+    if std::mem::take(&mut raw.along_nodes) {
+        model.given_rows().turn(&raw.labels, &mut raw.matrix).map_err(|node| {
+            let message = format!(
+                "values of node {node} stand along axes of its own, and the file does not have all three directions of them"
+            );
+            Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path)
+        })?;
+    }
+    Ok(raw)
+}
+
+/// Shapes by internal rows (N x k), and what was done to get them.
+///
+/// # Errors
+/// [`ShapesSize`](Code::ShapesSize), [`ShapesZero`](Code::ShapesZero).
+pub(super) fn by_rows(model: &FeModel, raw: &RawModes) -> Result<(Mat<f64>, Vec<Diagnostic>)> {
+    let places: HashMap<_, usize> =
+        raw.labels.iter().enumerate().map(|(place, label)| (*label, place)).collect();
+    let n = model.stiffness().n();
+    let place: Vec<Option<usize>> = (0..n).map(|row| places.get(&model.label(row)).copied()).collect();
+    let missing: Vec<usize> = (0..n).filter(|row| place[*row].is_none()).collect();
+    refuse_too_few(model, raw, &missing)?;
+    let value = |row: usize, mode: usize| place[row].map_or(0.0, |at| raw.matrix[(at, mode)]);
+    let mut shapes = Mat::from_fn(n, raw.matrix.ncols(), value);
+    if let Some(mode) = (0..shapes.ncols()).find(|mode| shapes.col(*mode).norm_max() == 0.0) {
+        let message = format!("mode {} is zero at all nodes of the model", mode + 1);
+        return Err(Diagnostic::new(Code::ShapesZero, message).in_file(&raw.path).into());
+    }
+    if missing.is_empty() {
+        return Ok((shapes, Vec::new()));
+    }
+    complete(model, &mut shapes, &missing, raw)?;
+    let message = format!("the file lacks {} of {n} rows, of {}", missing.len(), some_nodes(model, &missing));
+    Ok((shapes, vec![Diagnostic::new(Code::ModesCompleted, message).in_file(&raw.path)]))
+}
+
+/// Less than half of the displacements of the nodes say too little of the others.
+fn refuse_too_few(model: &FeModel, raw: &RawModes, missing: &[usize]) -> Result<()> {
+    let all = model.dimension() * model.nodes().len();
+    let absent = missing.partition_point(|row| *row < all);
+    if 2 * absent < all {
+        return Ok(());
+    }
+    let message = format!(
+        "the file has no values for {absent} of {all} displacements of the model, as of {}",
+        some_nodes(model, missing)
+    );
+    let help = "write the modes of all nodes, by the numbers that they have in the model";
+    Err(Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).with_help(help).into())
+}
+
+/// The first nodes that rows belong to.
+fn some_nodes(model: &FeModel, rows: &[usize]) -> String {
+    let mut nodes: Vec<i64> = rows.iter().map(|row| model.label(*row).node).collect();
+    nodes.dedup();
+    let named: Vec<String> = nodes.iter().take(5).map(i64::to_string).collect();
+    let more = if nodes.len() > named.len() { ", ..." } else { "" };
+    format!("node{} {}{more}", if nodes.len() == 1 { "" } else { "s" }, named.join(", "))
+}
+
+/// The rows i that the file lacks, from (K - lambda M) x = 0 there: x_i = -(K - lambda M)_ii^-1 (K - lambda
+/// M)_ib x_b.
+fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &RawModes) -> Result<()> {
+    let whole = model.pencil();
+    let stiffness = whole.stiffness().principal(missing);
+    let mass = principal_mass(&whole, missing);
+    let own = Pencil::new(&stiffness, &mass, 1);
+    let refuse = |why: &str| {
+        let message = format!("the file lacks rows of {}, and {why}", some_nodes(model, missing));
+        let help = "write the modes of all nodes, with their rotations where the model has them";
+        Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).with_help(help)
+    };
+    let analysis =
+        Analysis::new(&own).ok_or_else(|| refuse("they are too many to follow from the others"))?;
+    for (mode, eigenvalue) in raw.eigenvalues.iter().enumerate() {
+        let lambda = eigenvalue.unwrap_or(0.0).max(0.0);
+        let shape = shapes.as_ref().subcols(mode, 1);
+        let (elastic, inertial) = (whole.apply_stiffness(shape), whole.apply_mass(shape));
+        let force = |i: usize, _| lambda * inertial[(missing[i], 0)] - elastic[(missing[i], 0)];
+        let mut values = Mat::from_fn(missing.len(), 1, force);
+        let factor = Indefinite::<f64>::new(&analysis, &own, lambda);
+        let inertia = factor.inertia();
+        if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > INACCURATE {
+            return Err(refuse("they do not follow from the others").into());
+        }
+        factor.solve_in_place(values.as_mut());
+        missing.iter().enumerate().for_each(|(i, row)| shapes[(*row, mode)] = values[(i, 0)]);
+    }
+    Ok(())
+}
+
+/// Some rows, ascending, of M and the same columns.
+fn principal_mass(pencil: &Pencil<'_>, rows: &[usize]) -> SymmetricMatrix {
+    let (mass, block) = (pencil.mass(), pencil.block());
+    if block == 1 {
+        return mass.principal(rows);
+    }
+    let mut entries = Vec::new();
+    for (i, row) in rows.iter().enumerate() {
+        let (columns, values) = mass.row(row / block);
+        for (column, value) in columns.iter().zip(values) {
+            if let Ok(j) = rows.binary_search(&(*column as usize * block + row % block)) {
+                entries.push((i as u32, j as u32, *value));
+            }
+        }
+    }
+    let matrix = CscMatrix::from_triplets(rows.len(), rows.len(), &entries);
+    SymmetricMatrix::new(matrix).expect("rows and the same columns of a symmetric matrix")
+}
+
+/// What a file says of the modes whose shapes it has.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct StatedModes {
+    eigenvalues: Vec<Option<f64>>,
+    eigenvalue_digits: u8,
+    digits: u8,
+    path: PathBuf,
+}
+
+/// Share of a mode, in the norm of M, that must lie in modes of its frequency.
+const ASSURED: f64 = 0.99;
+
+/// Modes within this part of an eigenvalue have one frequency: any mixture of their shapes is right.
+const CLOSE: f64 = 1e-3;
+
+/// Modes that are named one by one.
+const NAMED: usize = 3;
+
+/// A mode that is not what its file says.
+struct Difference {
+    mode: usize,
+    stated: f64,
+    /// x'Kx / x'Mx.
+    rayleigh: f64,
+    /// Modal assurance criterion: the share of the mode in modes of its frequency.
+    assurance: f64,
+    /// Whether the digits of its shape explain the difference.
+    rounded: bool,
+}
+
+impl StatedModes {
+    pub(super) fn of(raw: RawModes) -> Self {
+        let RawModes { eigenvalues, eigenvalue_digits, digits, path, .. } = raw;
+        Self { eigenvalues, eigenvalue_digits, digits, path }
+    }
+
+    /// The modes of the file (columns of `shapes`, of which those in `flexible` deform the body) beside what
+    /// K and M say of them; `None` where they agree.
+    pub(super) fn beside(
+        &self,
+        model: &FeModel,
+        shapes: MatRef<'_, f64>,
+        flexible: &[usize],
+        solution: &EigenSolution,
+    ) -> Option<Diagnostic> {
+        let different = self.differences(model, shapes, flexible, solution);
+        let worst = different.first()?;
+        let hertz = |eigenvalue: f64| model.units().frequency_of(eigenvalue.max(0.0));
+        let said = |one: &Difference| {
+            let (stated, own) = (hertz(one.stated), hertz(one.rayleigh));
+            let assurance = match one.assurance < ASSURED {
+                true => format!(", MAC {:.2}", one.assurance),
+                false => String::new(),
+            };
+            format!("mode {} has {stated:.6} Hz in the file, {own:.6} Hz by K and M{assurance}", one.mode + 1)
+        };
+        let named: Vec<String> = different.iter().take(NAMED).map(said).collect();
+        let more = if different.len() > NAMED { "; ..." } else { "" };
+        let message = format!(
+            "{} of {} flexible modes differ: {}{more}",
+            different.len(),
+            flexible.len(),
+            named.join("; ")
+        );
+        let diagnostic = Diagnostic::new(Code::ModesDiffer, message).in_file(&self.path);
+        Some(match worst.rounded && different.iter().all(|one| one.rounded) {
+            true => diagnostic.with_help(format!(
+                "the {} digits of the shapes explain it: write them with more, or compute the modes here",
+                self.digits
+            )),
+            false => diagnostic,
+        })
+    }
+
+    fn differences(
+        &self,
+        model: &FeModel,
+        shapes: MatRef<'_, f64>,
+        flexible: &[usize],
+        solution: &EigenSolution,
+    ) -> Vec<Difference> {
+        let pencil = model.pencil();
+        let moved = pencil.apply_mass(shapes);
+        let masses = column_products(shapes, moved.as_ref());
+        let energies = column_products(shapes, pencil.apply_stiffness(shapes).as_ref());
+        let stiffness = pencil.stiffness().diagonal();
+        let shares = gram(solution.vectors.as_ref(), moved.as_ref());
+        // A share can be told where all modes are there.
+        let is_whole = solution.eigenvalues.len() == flexible.len();
+        let precision = 10f64.powi(2 - i32::from(self.eigenvalue_digits));
+        let of_mode = |&mode: &usize| {
+            let stated = self.eigenvalues[mode]?;
+            let rayleigh = energies[mode] / masses[mode];
+            let square = |p: usize| shares[(p, mode)].powi(2);
+            let all: f64 = (0..solution.eigenvalues.len()).map(square).sum();
+            let is_close = |p: &usize| (solution.eigenvalues[*p] - rayleigh).abs() <= CLOSE * rayleigh;
+            let close = (0..solution.eigenvalues.len()).filter(is_close).map(square).fold(0.0, |a, b| a + b);
+            let assurance = if is_whole && all > 0.0 { close / all } else { 1.0 };
+            let difference = (stated - rayleigh).abs();
+            if difference <= precision * stated.abs().max(rayleigh) && assurance >= ASSURED {
+                return None;
+            }
+            let noise = self.rounding_energy(&stiffness, shapes, mode) / masses[mode];
+            let rounded = difference <= precision * stated.abs() + 10.0 * noise && stated > 0.0;
+            Some(Difference { mode, stated, rayleigh, assurance, rounded })
+        };
+        flexible.iter().filter_map(of_mode).collect()
+    }
+
+    /// Strain energy that rounding the values of a shape to their digits is expected to have, times two: the
+    /// sum of K_ii u_i^2 / 12, where u_i is one unit of the last digit of the value.
+    fn rounding_energy(&self, stiffness: &[f64], shapes: MatRef<'_, f64>, mode: usize) -> f64 {
+        let unit = |value: f64| match value == 0.0 {
+            true => 0.0,
+            false => 10f64.powi(value.abs().log10().floor() as i32 + 1 - i32::from(self.digits)),
+        };
+        let column = shapes.col(mode);
+        stiffness.iter().zip(column.iter()).map(|(k, value)| k * unit(*value).powi(2) / 12.0).sum()
+    }
+}

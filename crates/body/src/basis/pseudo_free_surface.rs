@@ -1,0 +1,304 @@
+//! Pseudo-free-surface modes from any shapes (theory section 5): the rigid part is removed, what is left
+//! M-orthonormalised, and the small eigenproblem solved. Every identity of theory section 10 then holds,
+//! whatever the shapes were.
+
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::{
+    Pencil, column_products, combine, gram, side_by_side, subtract_combination, symmetric_eigen,
+};
+
+/// A shape of which rigid motion leaves less than this part of its M-norm is a rigid motion: those that
+/// eigen-solvers give stand at 1e-6 and below.
+const RIGID: f64 = 1e-5;
+
+/// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which it moves no mass: rounding leaves
+/// 1e-15.
+const MASSLESS: f64 = 1e-12;
+
+/// The same for what is left of a shape beside others: a singular M sees almost nothing of some combinations
+/// of shapes that it sees. Below, such a shape would be so large, and its eigenvalue so high, that the others
+/// lose their digits beside it.
+const NEARLY_MASSLESS: f64 = 1e-4;
+
+/// Elastic energy of what is left of a shape beside others, relative to its own, above which it is a motion without mass
+/// and not the rounding of a shape that depends on others.
+const ELASTIC: f64 = 1e-10;
+
+/// The part of a set of shapes that spans deformations, and what became of the rest (indices from 0).
+#[derive(Debug, Clone)]
+pub(super) struct Independent {
+    /// M-orthonormal to rounding over the criterion of dependence; M-orthogonal to the rigid modes.
+    pub vectors: Mat<f64>,
+    /// Which shapes they are made of: column j lies in the span of the shapes up to kept\[j\].
+    pub kept: Vec<usize>,
+    pub rigid: Vec<usize>,
+    pub massless: Vec<usize>,
+    /// Those that the shapes before them span, with the part of the M-norm that is left.
+    pub dependent: Vec<(usize, f64)>,
+}
+
+/// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns in
+/// their order by the modified Gram-Schmidt process, twice. A column of which less than `dependent` of its
+/// M-norm is left after those before it, or after the rigid motions, is left out.
+///
+/// `None`: a column has a negative M-norm beyond rounding, M is indefinite.
+pub(super) fn independent(
+    pencil: &Pencil<'_>,
+    rigid: MatRef<'_, f64>,
+    shapes: Mat<f64>,
+    dependent: f64,
+) -> Option<Independent> {
+    let mut set = ShapeSet::new(pencil, shapes);
+    set.scale_to_unit_size();
+    set.scale_to_unit_mass()?;
+    // Twice: a shape may be rigid motion but for its last digits.
+    set.remove_rigid(rigid);
+    set.leave_out_rigid(RIGID.max(dependent));
+    set.remove_rigid(rigid);
+    let (mut found, without_mass) = set.orthonormalised(dependent);
+    found.vectors = in_equilibrium(pencil, rigid, found.vectors, &without_mass);
+    Some(found)
+}
+
+/// Shapes on the way to be independent.
+struct ShapeSet<'a> {
+    pencil: &'a Pencil<'a>,
+    mass_diagonal: Vec<f64>,
+    shapes: Mat<f64>,
+    /// Whether each shape is still in the set.
+    is_in: Vec<bool>,
+    /// Directions that move no mass, or next to none, of shapes that are left out.
+    without_mass: Vec<Mat<f64>>,
+    outcome: Independent,
+}
+
+impl<'a> ShapeSet<'a> {
+    fn new(pencil: &'a Pencil<'a>, shapes: Mat<f64>) -> Self {
+        let outcome = Independent {
+            vectors: Mat::zeros(0, 0),
+            kept: Vec::new(),
+            rigid: Vec::new(),
+            massless: Vec::new(),
+            dependent: Vec::new(),
+        };
+        let is_in = vec![true; shapes.ncols()];
+        let (mass_diagonal, without_mass) = (pencil.mass_diagonal(), Vec::new());
+        Self { pencil, mass_diagonal, shapes, is_in, without_mass, outcome }
+    }
+
+    /// Unit size first: squares of shapes in any unit stay in range.
+    fn scale_to_unit_size(&mut self) {
+        for j in 0..self.shapes.ncols() {
+            let factor = 1.0 / self.shapes.col(j).norm_max();
+            if factor.is_finite() {
+                scale(&mut self.shapes, j, factor);
+            }
+        }
+    }
+
+    /// Squares of the M-norms.
+    fn squares(&self) -> Vec<f64> {
+        column_products(self.shapes.as_ref(), self.pencil.apply_mass(self.shapes.as_ref()).as_ref())
+    }
+
+    /// Unit M-norms; shapes that move no mass are left out. `None` when one has less than none.
+    fn scale_to_unit_mass(&mut self) -> Option<()> {
+        for (j, square) in self.squares().into_iter().enumerate() {
+            let bound = diagonal_square(&self.mass_diagonal, &self.shapes, j);
+            if square < -MASSLESS.sqrt() * bound {
+                return None;
+            }
+            if square <= MASSLESS * bound {
+                self.outcome.massless.push(j);
+                self.without_mass.push(self.shapes.as_ref().subcols(j, 1).to_owned());
+                self.is_in[j] = false;
+            } else {
+                scale(&mut self.shapes, j, 1.0 / square.sqrt());
+            }
+        }
+        Some(())
+    }
+
+    fn remove_rigid(&mut self, rigid: MatRef<'_, f64>) {
+        let products = self.pencil.apply_mass(self.shapes.as_ref());
+        let along = gram(rigid, products.as_ref());
+        subtract_combination(self.shapes.as_mut(), rigid, along.as_ref());
+    }
+
+    /// Leaves out what was rigid motion; unit M-norms again for the others.
+    fn leave_out_rigid(&mut self, rigid: f64) {
+        for (j, square) in self.squares().into_iter().enumerate() {
+            let left = square.max(0.0).sqrt();
+            if self.is_in[j] && left < rigid {
+                self.outcome.rigid.push(j);
+                self.is_in[j] = false;
+            } else if self.is_in[j] {
+                scale(&mut self.shapes, j, 1.0 / left);
+            }
+        }
+    }
+
+    /// The Gram-Schmidt process, and what it leaves out that moves no mass. The vectors found so far are the first columns
+    /// of the shapes and of their products.
+    fn orthonormalised(self, dependent: f64) -> (Independent, Vec<Mat<f64>>) {
+        let Self { pencil, mass_diagonal, mut shapes, is_in, mut without_mass, mut outcome } = self;
+        let mut products = pencil.apply_mass(shapes.as_ref());
+        for j in (0..shapes.ncols()).filter(|&j| is_in[j]) {
+            let found = outcome.kept.len();
+            let (vector, product) = beside_first(found, &shapes, &products, j);
+            let left = column_products(vector.as_ref(), product.as_ref())[0].max(0.0).sqrt();
+            if left < dependent {
+                if is_elastic(pencil, &vector, shapes.as_ref().subcols(j, 1)) {
+                    without_mass.push(vector);
+                }
+                outcome.dependent.push((j, left));
+                continue;
+            }
+            // Afresh: the product was the difference of larger ones.
+            let product = pencil.apply_mass(vector.as_ref());
+            let square = column_products(vector.as_ref(), product.as_ref())[0];
+            // A singular M: what is left of shapes with mass may have none.
+            let bound = diagonal_square(&mass_diagonal, &vector, 0);
+            if square <= NEARLY_MASSLESS * bound {
+                outcome.massless.push(j);
+                if square <= MASSLESS * bound {
+                    without_mass.push(vector);
+                }
+                continue;
+            }
+            let norm = square.sqrt();
+            for i in 0..shapes.nrows() {
+                shapes[(i, found)] = vector[(i, 0)] / norm;
+                products[(i, found)] = product[(i, 0)] / norm;
+            }
+            outcome.kept.push(j);
+        }
+        outcome.vectors = shapes.as_ref().subcols(0, outcome.kept.len()).to_owned();
+        (outcome, without_mass)
+    }
+}
+
+/// True if what is `left` of a shape beside others has elastic energy of its own.
+fn is_elastic(pencil: &Pencil<'_>, left: &Mat<f64>, shape: MatRef<'_, f64>) -> bool {
+    let energy = |x: MatRef<'_, f64>| column_products(x, pencil.apply_stiffness(x).as_ref())[0];
+    energy(left.as_ref()) > ELASTIC * energy(shape)
+}
+
+/// The vectors V with the motions Z `without_mass` where their elastic forces hold them, V - Z (Z'K Z)^-1 Z'K V, and
+/// M-orthonormal again, to the `rigid` motions as well: Ritz vectors of finite frequency in the span of both have no other
+/// part of Z.
+fn in_equilibrium(
+    pencil: &Pencil<'_>,
+    rigid: MatRef<'_, f64>,
+    mut vectors: Mat<f64>,
+    without_mass: &[Mat<f64>],
+) -> Mat<f64> {
+    if without_mass.is_empty() || vectors.ncols() == 0 {
+        return vectors;
+    }
+    let motions = side_by_side(&without_mass.iter().map(Mat::as_ref).collect::<Vec<_>>());
+    let forces = pencil.apply_stiffness(motions.as_ref());
+    let energy = gram(motions.as_ref(), forces.as_ref());
+    let sizes: Vec<f64> = (0..energy.nrows()).map(|j| energy[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
+    let scaled = Mat::from_fn(sizes.len(), sizes.len(), |i, j| energy[(i, j)] / (sizes[i] * sizes[j]));
+    let Some(eigen) = symmetric_eigen(scaled.as_ref()) else { return vectors };
+    let kept: Vec<usize> = (0..sizes.len()).filter(|&k| eigen.values[k] > ELASTIC).collect();
+    let unit = |j: usize, k: usize| eigen.vectors[(j, kept[k])] / (sizes[j] * eigen.values[kept[k]].sqrt());
+    let unit = Mat::from_fn(sizes.len(), kept.len(), unit);
+    let (motions, forces) =
+        (combine(motions.as_ref(), unit.as_ref()), combine(forces.as_ref(), unit.as_ref()));
+    let part = gram(forces.as_ref(), vectors.as_ref());
+    subtract_combination(vectors.as_mut(), motions.as_ref(), part.as_ref());
+    let along = gram(rigid, pencil.apply_mass(vectors.as_ref()).as_ref());
+    subtract_combination(vectors.as_mut(), rigid, along.as_ref());
+    let mut products = pencil.apply_mass(vectors.as_ref());
+    for j in 0..vectors.ncols() {
+        let (vector, _) = beside_first(j, &vectors, &products, j);
+        let product = pencil.apply_mass(vector.as_ref());
+        let norm = column_products(vector.as_ref(), product.as_ref())[0].sqrt();
+        for i in 0..vectors.nrows() {
+            vectors[(i, j)] = vector[(i, 0)] / norm;
+            products[(i, j)] = product[(i, 0)] / norm;
+        }
+    }
+    vectors
+}
+
+/// What is left of shape j beside the first `found` columns, and its product with M.
+fn beside_first(found: usize, shapes: &Mat<f64>, products: &Mat<f64>, j: usize) -> (Mat<f64>, Mat<f64>) {
+    let mut vector = shapes.as_ref().subcols(j, 1).to_owned();
+    let mut product = products.as_ref().subcols(j, 1).to_owned();
+    for _ in 0..2 {
+        let along = gram(shapes.as_ref().subcols(0, found), product.as_ref());
+        subtract_combination(vector.as_mut(), shapes.as_ref().subcols(0, found), along.as_ref());
+        subtract_combination(product.as_mut(), products.as_ref().subcols(0, found), along.as_ref());
+    }
+    (vector, product)
+}
+
+/// sum_i M_ii psi_i^2 of column j.
+fn diagonal_square(mass_diagonal: &[f64], a: &Mat<f64>, j: usize) -> f64 {
+    mass_diagonal.iter().zip(a.col(j).iter()).map(|(m, s)| m * s * s).sum()
+}
+
+impl Independent {
+    /// What the user should know of the shapes that were left out; `what` names them, as in
+    /// `imported shapes`, and `name` each.
+    pub(super) fn notes(
+        &self,
+        what: &str,
+        criterion: f64,
+        name: impl Fn(usize) -> String,
+    ) -> Vec<Diagnostic> {
+        let all = self.kept.len() + self.rigid.len() + self.massless.len() + self.dependent.len();
+        let mut notes = Vec::new();
+        if !self.rigid.is_empty() {
+            let which = named(self.rigid.iter().map(|&j| name(j)).collect());
+            let message =
+                format!("{} of {all} {what} are rigid motions and are removed: {which}", self.rigid.len());
+            notes.push(Diagnostic::new(Code::ShapesRigid, message));
+        }
+        if !self.massless.is_empty() {
+            let which = named(self.massless.iter().map(|&j| name(j)).collect());
+            let message =
+                format!("{} of {all} {what} move no mass and are left out: {which}", self.massless.len());
+            notes.push(Diagnostic::new(Code::ShapesDependent, message));
+        }
+        if !self.dependent.is_empty() {
+            let left = |&(j, left): &(usize, f64)| format!("{} ({})", name(j), part_in_words(left));
+            let which = named(self.dependent.iter().map(left).collect());
+            let message = format!(
+                "{} of {all} {what} depend on those before them (less than {criterion:.0e} of the M-norm is left) and are left out: {which}",
+                self.dependent.len()
+            );
+            notes.push(Diagnostic::new(Code::ShapesDependent, message));
+        }
+        notes
+    }
+}
+
+/// The part that is left of a norm, as messages name it: that below the rounding of one has no digits.
+pub(super) fn part_in_words(left: f64) -> String {
+    if left < f64::EPSILON { "rounding".to_owned() } else { format!("{left:.0e}") }
+}
+
+/// `a, b, c`, or `a, b, c, d, e and 7 more`.
+pub(super) fn named(columns: Vec<String>) -> String {
+    match columns.len() {
+        0..=6 => columns.join(", "),
+        count => format!("{} and {} more", columns[..5].join(", "), count - 5),
+    }
+}
+
+fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
+    a.as_mut().col_mut(j).iter_mut().for_each(|value| *value *= factor);
+}
+
+/// For each mode, the shape with the largest share in it, and that share: the square of its amplitude in
+/// `parts` (shapes x modes) for M-orthonormal shapes and modes.
+pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {
+    let shares = |p: usize| parts.col(p).iter().map(|a| a * a).enumerate();
+    let largest = |p: usize| shares(p).fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most });
+    (0..parts.ncols()).map(largest).collect()
+}

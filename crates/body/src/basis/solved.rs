@@ -1,0 +1,182 @@
+//! Free-surface modes that another eigen-solver found for the same K and M: Rayleigh quotients and residuals
+//! are computed anew, and nothing is taken on trust but, where no count of our own is wanted, the count.
+
+use super::failure::explain;
+use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
+use super::rigid_modes::rigid_modes;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
+use flexbody_eigen::{
+    Accuracy, Completeness, EigenSettings, EigenSolution, Proof, SAME_EIGENVALUE, Wanted, modes_of_span,
+};
+use flexbody_linalg::larger;
+use flexbody_model::FeModel;
+
+/// The inertia count of another program.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CountElsewhere {
+    /// Negative pivots of K - shift M.
+    pub negative: usize,
+    /// Pivots that were zero.
+    pub zero: usize,
+    /// The shift.
+    pub shift: f64,
+    /// Whose count it is, as in `MUMPS of PETSc 3.18.5`.
+    pub by: String,
+}
+
+/// Modes of a model as another eigen-solver found them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SolvedModes {
+    /// N x k by internal rows, ascending: the wanted modes and all others of their last eigenvalue.
+    pub vectors: Mat<f64>,
+    /// The eigenvalues that the solver states.
+    pub eigenvalues: Vec<f64>,
+    /// The eigenvalue after them, where the solver has it.
+    pub next_eigenvalue: Option<f64>,
+    /// The count, where there is one.
+    pub count: Option<CountElsewhere>,
+    /// Which solver it was, for settings: `slepc`.
+    pub engine: String,
+    /// Whether the built-in inertia count is made.
+    pub prove: bool,
+    /// The file that they were read from.
+    pub source: SourceFile,
+}
+
+impl Basis for SolvedModes {
+    fn name(&self) -> &'static str {
+        "free"
+    }
+
+    fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
+        let Task { model, settings, resume, watch } = *task;
+        let rigid = rigid_modes(model, &model.pencil())?;
+        let problem = problem_of_span(model, rigid.as_ref(), resume);
+        // All that were found: the modes of one eigenvalue get their canonical form together.
+        let accuracy = match (self.prove, settings.accuracy) {
+            (false, _) => Accuracy::Fast,
+            (true, Accuracy::Fast) => Accuracy::Standard,
+            (true, other) => other,
+        };
+        let whole = EigenSettings { wanted: Wanted::Lowest(usize::MAX), accuracy, ..*settings };
+        let solution = modes_of_span(&problem, self.vectors.clone(), &whole, watch);
+        let mut solution = solution.map_err(|failure| explain(model, failure))?;
+        self.refuse_others(&solution, settings.accuracy)?;
+        solution.completeness = self.completeness(model, rigid.ncols(), solution.completeness)?;
+        let notes = self.cut(model, &mut solution, settings.wanted);
+        let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
+        basis.diagnostics.extend(notes);
+        Ok(basis)
+    }
+}
+
+impl SolvedModes {
+    /// Refuses what are no eigenvectors of the model.
+    fn refuse_others(&self, solution: &EigenSolution, accuracy: Accuracy) -> Result<()> {
+        let inaccurate =
+            |message: String| Err(Error::from(Diagnostic::new(Code::ClusterInaccurate, message)));
+        let (given, exact) = (solution.residuals.len(), solution.eigenvectors(accuracy));
+        if exact < given {
+            let worst = solution.residuals.iter().copied().fold(0.0, larger);
+            return inaccurate(format!(
+                "{} of {given} modes are no eigenvectors of the model: K-residual up to {worst:.0e}, accuracy `{}` promises {:.0e}",
+                given - exact,
+                accuracy.name(),
+                accuracy.residual()
+            ));
+        }
+        let pairs = self.eigenvalues.iter().zip(&solution.eigenvalues);
+        match pairs.enumerate().find(|(_, (own, ours))| (*own - *ours).abs() > SAME_EIGENVALUE * ours.abs()) {
+            Some((j, (own, ours))) => inaccurate(format!(
+                "the result states the eigenvalue {own:.9e} for mode {}, its Rayleigh quotient is {ours:.9e}",
+                j + 1
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// What is known of missed modes: by the count of our own where it was made, else by that of the solver,
+    /// which is then named.
+    fn completeness(&self, model: &FeModel, rigid: usize, own: Completeness) -> Result<Completeness> {
+        let missing = |message: String| {
+            let found = Diagnostic::new(Code::CompletenessFailed, message);
+            Err(Error::from(
+                found.with_help("run the driver again: it searches for the modes that are missing"),
+            ))
+        };
+        if self.prove {
+            return match (own.proof, own.negative_pivots) {
+                (Proof::NotProved, Some(_)) => missing(own.remark),
+                _ => Ok(own),
+            };
+        }
+        let Some(CountElsewhere { negative, zero, shift, by }) = &self.count else {
+            let remark = "the solver made no inertia count".to_owned();
+            return Ok(Completeness { proof: Proof::NotProved, negative_pivots: None, remark, ..own });
+        };
+        let below = self.eigenvalues.iter().filter(|lambda| *lambda < shift).count();
+        let hertz = model.units().frequency_of(*shift);
+        if *negative != rigid + below || *zero > 0 {
+            return missing(format!(
+                "the result has {below} modes below {hertz:.3} Hz, its inertia count is {negative} with {rigid} rigid modes and {zero} pivots of zero"
+            ));
+        }
+        let remark = format!("inertia count {negative} by {by} at {hertz:.3} Hz, not recomputed");
+        let (proof, negative_pivots) = (Proof::NotProved, Some(*negative));
+        Ok(Completeness { proof, shift: *shift, negative_pivots, modes_below: below, remark })
+    }
+
+    /// Leaves the wanted modes; what there is to say of the others.
+    fn cut(&self, model: &FeModel, solution: &mut EigenSolution, wanted: Wanted) -> Vec<Diagnostic> {
+        let found = solution.eigenvalues.len();
+        let given = match wanted {
+            Wanted::Lowest(count) => count.min(found),
+            Wanted::Below(lambda) => solution.eigenvalues.partition_point(|&l| l < lambda),
+        };
+        let mut notes = Vec::new();
+        if let Wanted::Lowest(count) = wanted
+            && count > given
+            && count < usize::MAX
+        {
+            let message = format!("{count} modes were asked for, the result has {given}");
+            notes.push(Diagnostic::new(Code::ModesClamped, message));
+        }
+        let end = match wanted {
+            Wanted::Lowest(_) => solution.completeness.modes_below,
+            Wanted::Below(_) => given,
+        };
+        if end > given {
+            let message =
+                format!("mode {given} shares its eigenvalue with {} that are left out", end - given);
+            notes.push(
+                Diagnostic::new(Code::RepeatedSplit, message)
+                    .with_help(format!("ask for {end} modes to keep the body's symmetry")),
+            );
+        }
+        solution.next_eigenvalue = solution.eigenvalues.get(given).copied().or(self.next_eigenvalue);
+        solution.eigenvalues.truncate(given);
+        solution.residuals.truncate(given);
+        solution.rounding_floors.truncate(given);
+        solution.vectors = solution.vectors.as_ref().subcols(0, given).to_owned();
+        notes.extend(self.told(model, &solution.completeness));
+        notes
+    }
+
+    /// Whose word completeness is.
+    fn told(&self, model: &FeModel, completeness: &Completeness) -> Option<Diagnostic> {
+        let Completeness { proof, negative_pivots, remark, .. } = completeness;
+        let help = "flexbody assemble --prove counts once more, where its factor fits the memory";
+        match (proof, negative_pivots) {
+            (Proof::InertiaCount, _) => None,
+            (_, Some(_)) => Some(Diagnostic::new(Code::CompletenessElsewhere, remark).with_help(help)),
+            (_, None) => {
+                let message =
+                    format!("completeness of the modes of {} is not proved: {remark}", model.name());
+                Some(Diagnostic::new(Code::CompletenessUnproved, message).with_help(help))
+            }
+        }
+    }
+}

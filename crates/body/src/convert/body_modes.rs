@@ -1,0 +1,253 @@
+//! Modes of a model in the frame of its body, and back.
+
+use crate::flex_body::{FlexBody, Frame, InternalRows};
+use crate::invariants::{
+    InertiaStiffness, Invariants, MassProduct, RigidMotion, condense, condense_general,
+    condense_general_linear, condense_linear, rigid_first_moment, symmetric_part,
+};
+use faer::{Mat, MatRef};
+use flexbody_eigen::canonical_sign;
+use flexbody_linalg::{
+    SymmetricMatrix, contiguous_mut, copied, gram, multiply, projection_compensated, zeros,
+};
+use flexbody_model::{DirectorMass, FeModel, NodeMoments, rigid_count};
+use nalgebra::Vector3;
+use rayon::prelude::*;
+
+/// The body frame and the node positions in it.
+pub struct NodesInFrame {
+    /// Origin and axes of the body frame in model coordinates.
+    pub frame: Frame,
+    /// Positions of the nodes (n) in the body frame.
+    pub positions: Vec<[f64; 3]>,
+}
+
+impl NodesInFrame {
+    /// Moves the nodes of `model` into `frame`.
+    pub fn new(model: &FeModel, frame: Frame) -> Self {
+        Self { frame, positions: frame.to_body(&model.nodes().positions) }
+    }
+}
+
+/// Unit translations along the axes of a frame and unit rotations about them (rows of the model).
+fn rigid_fields(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let mut fields = model.rigid_fields(frame.origin.into(), 1.0);
+    frame.rotate_rigid(&mut fields);
+    fields
+}
+
+/// R'MR of the unit translations and rotations of a frame.
+pub fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
+    let rigid = rigid_fields(model, frame);
+    gram(rigid.as_ref(), model.pencil().apply_mass(rigid.as_ref()).as_ref())
+}
+
+/// Psi' A Psi, where the matrix A and the modes are in model axes.
+pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
+    let mut product = zeros(vectors.nrows(), vectors.ncols());
+    multiply(a, 1, vectors, product.as_mut());
+    symmetric_part(&gram(vectors, product.as_ref()))
+}
+
+/// [`reduced`], rounded once at its end.
+pub(super) fn reduced_in_twice_the_precision(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
+    let projection = projection_compensated(a, vectors);
+    Mat::from_fn(vectors.ncols(), vectors.ncols(), |i, j| projection[i][j].hi)
+}
+
+/// The modes of a body.
+pub struct BodyModes {
+    /// In the rows and axes of the model.
+    pub vectors: Mat<f64>,
+    /// Displacements in body axes, three per node and then per vector without a place.
+    pub displacements: Mat<f64>,
+    /// Rotations in body axes, three per node, zero where a node has none.
+    pub rotations: Option<Mat<f64>>,
+    /// Rows without a place: vectors in body axes, then massless rows.
+    pub internal: Option<InternalRows>,
+    /// What the modes of the search were multiplied by.
+    pub signs: Vec<f64>,
+    nodes: usize,
+}
+
+impl BodyModes {
+    /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest
+    /// magnitude is positive, rotations of nodes times the size of the body.
+    pub fn new(model: &FeModel, place: &NodesInFrame, mut vectors: Mat<f64>) -> Self {
+        let rows = model.rows();
+        let (nodes, nf) = (model.nodes().len(), vectors.ncols());
+        let mut displacements =
+            in_space(vectors.as_ref().subrows(0, rows.displacements()), model.dimension());
+        place.frame.rotate_shapes(&mut displacements);
+        let mut rotations = (!rows.rotations().is_empty()).then(|| {
+            let mut rotations = zeros(3 * nodes, nf);
+            for (row, &(node, axis)) in (rows.displacements()..).zip(rows.rotations()) {
+                for j in 0..nf {
+                    rotations[(3 * node as usize + usize::from(axis), j)] = vectors[(row, j)];
+                }
+            }
+            place.frame.rotate_shapes(&mut rotations);
+            rotations
+        });
+        let size = place.positions.iter().map(|x| Vector3::from(*x).norm()).fold(0.0, f64::max);
+        let sign = |j: usize| {
+            let moved = displacements.col_as_slice(j)[..3 * nodes].iter().copied();
+            let turned = rotations.iter().flat_map(|turned| turned.col_as_slice(j)).map(|angle| size * angle);
+            canonical_sign(moved.chain(turned))
+        };
+        let signs: Vec<f64> = (0..nf).into_par_iter().map(sign).collect();
+        for shapes in [&mut vectors, &mut displacements].into_iter().chain(&mut rotations) {
+            let columns: Vec<_> =
+                shapes.col_iter_mut().zip(&signs).filter(|(_, sign)| **sign < 0.0).collect();
+            columns
+                .into_par_iter()
+                .for_each(|(shape, _)| contiguous_mut(shape).iter_mut().for_each(|x| *x = -*x));
+        }
+        let internal = internal(model, &vectors, &displacements);
+        Self { vectors, displacements, rotations, internal, signs, nodes }
+    }
+
+    /// The modes of a body that was made of `model`; `None` when it lacks rows of the model, or has others.
+    pub fn of_body(model: &FeModel, body: &FlexBody) -> Option<Self> {
+        let modes = body.modes();
+        Some(Self {
+            vectors: body.vectors_of(model)?,
+            displacements: body.displacements_of(model)?,
+            rotations: modes.rotation.clone(),
+            internal: modes.internal.clone(),
+            signs: vec![1.0; body.n_modes()],
+            nodes: model.nodes().len(),
+        })
+    }
+
+    /// Displacements of the nodes (3n x nf).
+    pub fn of_nodes(&self) -> MatRef<'_, f64> {
+        self.displacements.as_ref().subrows(0, 3 * self.nodes)
+    }
+
+    /// The invariants, by the formulas that the mass of `model` allows.
+    pub fn condensed(&self, model: &FeModel, place: &NodesInFrame, modal_stiffness: Mat<f64>) -> Invariants {
+        self.by(model, place, modal_stiffness, condense, condense_general)
+    }
+
+    /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
+    pub fn condensed_linear(
+        &self,
+        model: &FeModel,
+        place: &NodesInFrame,
+        modal_stiffness: Mat<f64>,
+    ) -> Invariants {
+        self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
+    }
+
+    /// The stiffnesses of inertia of nodes with rotational mass; `None` where there are none.
+    pub fn inertia_stiffness(&self, model: &FeModel, frame: &Frame) -> Option<InertiaStiffness> {
+        let (mass, rotations) = (model.director_mass()?, self.rotations.as_ref()?);
+        let mut fields = mass.extend_rigid(model.rigid_fields(frame.origin.into(), 1.0).as_ref());
+        frame.rotate_rigid(&mut fields);
+        let nothing = NodeMoments { first: Vector3::zeros(), second: nalgebra::Matrix3::zeros() };
+        let mut moments = vec![nothing; self.nodes];
+        for (&node, own) in mass.nodes().iter().zip(mass.moments(fields.as_ref(), &frame.axes)) {
+            moments[node as usize] = own;
+        }
+        Some(InertiaStiffness::new(moments, rotations.as_ref(), model.dimension()))
+    }
+
+    /// Columns that the condensation with and without W2 or W3 multiplies by M.
+    pub fn condensed_columns(&self, model: &FeModel, linear: bool) -> u64 {
+        let nf = self.vectors.ncols() as u64;
+        match (model.scalar_mass(), linear) {
+            (Some(_), true) => 4,
+            (Some(_), false) => 4 + 3 * nf,
+            (None, true) => rigid_count(model.dimension()) as u64,
+            (None, false) if model.dimension() == 2 => 3 + 2 * nf,
+            (None, false) => 6 + 4 * nf,
+        }
+    }
+
+    /// The invariants by the formulas `solid` or `general`.
+    fn by(
+        &self,
+        model: &FeModel,
+        place: &NodesInFrame,
+        modal_stiffness: Mat<f64>,
+        solid: impl Fn(&SymmetricMatrix, &[[f64; 3]], MatRef<'_, f64>, Mat<f64>) -> Invariants,
+        general: impl Fn(&(dyn MassProduct + 'static), &RigidMotion<'_>, MatRef<'_, f64>, Mat<f64>) -> Invariants,
+    ) -> Invariants {
+        if let Some(mass) = model.scalar_mass() {
+            return solid(mass, &place.positions, self.displacements.as_ref(), modal_stiffness);
+        }
+        if let Some(mass) = model.director_mass() {
+            return self.of_directors(model, mass, place, |mass, motion, shapes| {
+                general(mass, motion, shapes, modal_stiffness)
+            });
+        }
+        let fields = rigid_fields(model, &place.frame);
+        let motion = RigidMotion {
+            fields: fields.as_ref(),
+            displacements: model.rows().displacements(),
+            axes: place.frame.axes,
+        };
+        general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
+    }
+
+    /// The invariants of a mass of points and directors: about the centre of mass, then about the origin of the
+    /// frame. What does not turn with the nodes belongs to no frame but the one it is condensed in; so a body is
+    /// the same whatever frame it is described in.
+    fn of_directors(
+        &self,
+        model: &FeModel,
+        mass: &DirectorMass,
+        place: &NodesInFrame,
+        condensed: impl FnOnce(&DirectorMass, &RigidMotion<'_>, MatRef<'_, f64>) -> Invariants,
+    ) -> Invariants {
+        let offset = centre_of_mass(model, &place.frame);
+        let frame = Frame { origin: place.frame.origin + place.frame.axes * offset, axes: place.frame.axes };
+        let mut fields = mass.extend_rigid(model.rigid_fields(frame.origin.into(), 1.0).as_ref());
+        frame.rotate_rigid(&mut fields);
+        let motion =
+            RigidMotion { fields: fields.as_ref(), displacements: mass.turning_rows(), axes: frame.axes };
+        let shapes = mass.extend(self.vectors.as_ref());
+        condensed(mass, &motion, shapes.as_ref()).without_feeling_of_flight().shifted(-offset)
+    }
+}
+
+/// The centre of mass in a frame.
+fn centre_of_mass(model: &FeModel, frame: &Frame) -> Vector3<f64> {
+    let (mass, first_moment) = rigid_first_moment(rigid_mass(model, frame).as_ref());
+    first_moment / mass
+}
+
+/// The rows without a place of modes in model rows (`vectors`), of which `displacements` has the vectors in
+/// body axes.
+fn internal(model: &FeModel, vectors: &Mat<f64>, displacements: &Mat<f64>) -> Option<InternalRows> {
+    let [moving, massless] = model.rows().without_place();
+    let label = |row: usize| {
+        let label = model.label(row);
+        [label.node, i64::from(label.direction)]
+    };
+    // In the plane vectors have two rows here and three in space, as nodes have.
+    let of_vectors = moving.step_by(model.dimension()).flat_map(|row| {
+        let [node, _] = label(row);
+        (1..=3).map(move |direction| [node, direction])
+    });
+    let dofs: Vec<[i64; 2]> = of_vectors.chain(massless.clone().map(label)).collect();
+    let first = 3 * model.nodes().len();
+    let split = displacements.nrows() - first;
+    let shape = Mat::from_fn(dofs.len(), vectors.ncols(), |row, j| match row.checked_sub(split) {
+        None => displacements[(first + row, j)],
+        Some(after) => vectors[(massless.start + after, j)],
+    });
+    (!dofs.is_empty()).then_some(InternalRows { dofs, shape })
+}
+
+/// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
+fn in_space(shapes: MatRef<'_, f64>, dimension: usize) -> Mat<f64> {
+    if dimension == 3 {
+        return copied(shapes);
+    }
+    Mat::from_fn(shapes.nrows() / 2 * 3, shapes.ncols(), |row, j| match row % 3 {
+        2 => 0.0,
+        k => shapes[(row / 3 * 2 + k, j)],
+    })
+}

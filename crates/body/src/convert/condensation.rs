@@ -1,0 +1,87 @@
+//! The condensation of the mass into invariants, in one or two steps.
+
+use super::ModalModel;
+use crate::flex_body::{Group, Groups, Guarantee, TermDecision};
+use crate::invariants::{Invariants, condense_certified};
+
+/// The mass of a model condensed on its modes: what the invariants are, how sure their digits are, and what
+/// is left out.
+///
+/// Without W2 and W3 no product with M is formed but that of rigid motion, and of solids no nf x nf array but
+/// K_ff and m_ff (theory section 4).
+#[derive(Debug, Clone)]
+pub struct Condensation {
+    pub(super) invariants: Invariants,
+    /// What accuracy `certified` proves.
+    pub(super) guarantee: Option<Guarantee>,
+    /// Why groups of the kinetic energy are there or not; empty where nobody decided.
+    pub(super) terms: Vec<TermDecision>,
+    /// Columns that were multiplied by M.
+    pub(super) columns: u64,
+}
+
+impl ModalModel<'_> {
+    /// I0 and W1: enough for a scene to decide about the groups W2 and W3.
+    pub fn condense_linear(&self) -> Condensation {
+        let stiffness = self.modal_stiffness.clone();
+        let invariants = self.modes.condensed_linear(self.model, &self.place, stiffness);
+        Condensation {
+            terms: invariants.groups().dropped().map(not_computed).collect(),
+            invariants,
+            guarantee: None,
+            columns: self.modes.condensed_columns(self.model, true),
+        }
+    }
+
+    /// All groups.
+    pub fn condense(&self) -> Condensation {
+        let columns = self.modes.condensed_columns(self.model, false);
+        let (invariants, guarantee) = match self.certified() {
+            Some((invariants, guarantee)) => (invariants, Some(guarantee)),
+            None => {
+                let stiffness = self.modal_stiffness.clone();
+                (self.modes.condensed(self.model, &self.place, stiffness), None)
+            }
+        };
+        Condensation { invariants, guarantee, terms: Vec::new(), columns }
+    }
+
+    /// What `terms` keep of the groups, where `linear` is known. Accuracy `certified` condenses everything
+    /// first: its digits are about the whole.
+    pub fn condense_kept(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
+        let dropped = terms.iter().filter(|term| !term.kept);
+        let groups = dropped.fold(Groups::ALL, |groups, term| groups.and(Groups::without(term.group)));
+        let is_enough = !groups.w2 && !groups.w3 && self.found.solution.bounds.is_none();
+        let condensed = match is_enough {
+            true => linear,
+            false => {
+                let whole = self.condense();
+                Condensation { columns: linear.columns + whole.columns, ..whole }
+            }
+        };
+        Condensation { invariants: condensed.invariants.with_groups(groups), terms, ..condensed }
+    }
+
+    /// Invariants in double-double arithmetic with guaranteed digits, where the modes have guaranteed bounds.
+    fn certified(&self) -> Option<(Invariants, Guarantee)> {
+        let (bounds, mass) = (self.found.solution.bounds.as_ref()?, self.model.scalar_mass()?);
+        let shapes = self.modes.displacements.as_ref();
+        let (positions, axes) = (&self.place.positions, &self.place.frame.axes);
+        let own = condense_certified(mass, positions, shapes, self.model.stiffness(), axes);
+        let guarantee = Guarantee {
+            shift_below: bounds.shift_below,
+            pivots_below: bounds.pivots_below,
+            eigenvalue_lower: bounds.lower.clone(),
+            eigenvalue_upper: bounds.upper.clone(),
+            shape_error: bounds.shape_error.clone(),
+            digits: own.digits,
+        };
+        Some((own.invariants, guarantee))
+    }
+}
+
+/// The decision about a group before there is one.
+fn not_computed(group: Group) -> TermDecision {
+    let reason = "not computed yet".to_owned();
+    TermDecision { group, kept: false, tier: 0, bound: 0.0, limit: 0.0, reason }
+}

@@ -1,0 +1,208 @@
+//! The last stage of a conversion: the body, what lumped masses would have given, and what the user should
+//! know.
+
+use super::geometric_stiffness::softening_warning;
+use super::remarks::{free_frequencies, interface_compliance, poor_fits};
+use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
+use crate::basis;
+use crate::flex_body::{
+    FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
+    Storage, Truncation,
+};
+use crate::invariants::{Invariants, MassProperties};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::Result;
+use flexbody_eigen::{Counters, Plan, Resume};
+use flexbody_linalg::copied;
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::FeModel;
+
+/// A finished conversion.
+#[derive(Debug, Clone)]
+pub struct Conversion {
+    /// The product.
+    pub body: FlexBody,
+    /// Mass properties in model axes.
+    pub mass_properties: MassProperties,
+    /// Fully lumped pipelines, where asked for.
+    pub lumped_modes: Vec<LumpedPipeline>,
+    /// Work of the eigen-solver.
+    pub counters: Counters,
+    /// Columns that the condensation multiplied by M, for the consistent mass.
+    pub condensed_columns: u64,
+    /// Memory and precision as decided before the work; none on the dense path.
+    pub plan: Option<Plan>,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Converts a checked model.
+///
+/// # Errors
+/// Those of [`ModalModel::find`], and of a damping that feeds energy to the modes.
+pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
+    convert_resuming(model, settings, Resume::default(), watch)
+}
+
+/// As [`convert`], with a search for modes that starts where an earlier one stood, or that is kept (a
+/// checkpoint).
+///
+/// # Errors
+/// As [`convert`].
+pub fn convert_resuming(
+    model: &FeModel,
+    settings: &ConvertSettings,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<Conversion> {
+    let modal = ModalModel::find(model, settings, resume, watch)?;
+    let condensed = modal.condense();
+    modal.finish(condensed, watch)
+}
+
+impl ModalModel<'_> {
+    /// The body with what is condensed so far, without comparators: what a scene decides on.
+    ///
+    /// # Errors
+    /// Of a damping that feeds energy to the modes.
+    pub fn body(&self, condensed: &Condensation) -> Result<FlexBody> {
+        FlexBody::new(self.parts(condensed, Vec::new())?.0)
+    }
+
+    /// The conversion with what was condensed.
+    ///
+    /// # Errors
+    /// Of a damping that feeds energy to the modes, and of a comparator.
+    pub fn finish(self, condensed: Condensation, watch: Watch<'_>) -> Result<Conversion> {
+        let exact = &condensed.invariants;
+        watch(Event::Phase("lumped comparison"));
+        let lumped = self.schemes.iter().map(|masses| lumped::comparator(&self, masses, exact)).collect();
+        let pipelines = if self.settings.lumped_modes { self.schemes.as_slice() } else { &[] };
+        let lumped_modes = pipelines
+            .iter()
+            .map(|masses| lumped::pipeline(&self, masses, exact, watch))
+            .collect::<Result<_>>()?;
+        let (parts, overdamped) = self.parts(&condensed, lumped)?;
+        let body = FlexBody::new(parts)?;
+        let diagnostics = self.remarks(overdamped, &body);
+        let solution = self.found.solution;
+        Ok(Conversion {
+            body,
+            mass_properties: self.mass_properties,
+            lumped_modes,
+            counters: solution.counters,
+            condensed_columns: condensed.columns,
+            plan: solution.plan,
+            diagnostics,
+        })
+    }
+
+    /// Everything that a body is made of, and a warning about modes that are damped beyond the critical
+    /// damping.
+    fn parts(
+        &self,
+        condensed: &Condensation,
+        lumped: Vec<LumpedBody>,
+    ) -> Result<(Parts, Option<Diagnostic>)> {
+        let (modes, overdamped) = self.damped_modes(&condensed.invariants)?;
+        let parts = Parts {
+            source: self.source(),
+            dimension: self.model.dimension(),
+            units: self.model.units().clone(),
+            frame: self.place.frame,
+            conditions: match &self.settings.interface_frame {
+                Some(name) => ReferenceConditions::Interface(name.clone()),
+                None => ReferenceConditions::MeanAxes,
+            },
+            interfaces: self.interfaces.clone(),
+            coordinates: self.coordinates(),
+            nodes: self.nodes.clone(),
+            mesh: self.settings.surface(self.model),
+            modes,
+            invariants: condensed.invariants.clone(),
+            geometric_stiffness: self.geometric_stiffness.clone(),
+            inertia_stiffness: self.inertia_stiffness.clone(),
+            lumped,
+            certificate: self.certificate(condensed.guarantee.clone()),
+            terms: condensed.terms.clone(),
+            storage: Storage::default(),
+        };
+        Ok((parts, overdamped))
+    }
+
+    /// Where the body comes from.
+    fn source(&self) -> Source {
+        let (model, settings) = (self.model, self.settings);
+        Source {
+            name: model.name().to_owned(),
+            files: model.sources().iter().chain(settings.basis.sources()).cloned().collect(),
+            number: model.number(),
+            n_dofs: model.stiffness().n(),
+            mass_structure: match model.scalar_mass() {
+                None => MassStructure::General,
+                Some(_) if model.has_diagonal_mass() => MassStructure::Diagonal,
+                Some(_) => MassStructure::RotationInvariant,
+            },
+            approximation: self.approximation(),
+            settings: settings.described(model),
+        }
+    }
+
+    /// Part of the mass that does not turn with the nodes, where there is any.
+    fn approximation(&self) -> Option<String> {
+        let share = self.model.fixed_mass_share();
+        (share > 0.0).then(|| {
+            format!(
+                "exact: m, c, I0, C1, C2, m_ff; W1, W2 and W3 keep a part of the mass matrix, entries of up to {share:.1e} of its diagonal, along the axes of the body while the nodes turn: of beams and shells an error that falls with the square of the element size to that of the rotary inertia of their sections"
+            )
+        })
+    }
+
+    /// The modes with the damping that the model states.
+    fn damped_modes(&self, invariants: &Invariants) -> Result<(Modes, Option<Diagnostic>)> {
+        let solution = &self.found.solution;
+        let eigenvalues = &solution.eigenvalues;
+        let damping = modal_damping(self.model, self.modes.vectors.as_ref(), eigenvalues, invariants)?;
+        let (damping_ratio, modal_damping, overdamped) = match damping {
+            Some(damping) => (damping.ratio, Some(damping.matrix), damping.warning),
+            None => (vec![0.0; eigenvalues.len()], None, None),
+        };
+        let truncation = self.found.truncation.iter().cloned();
+        let modes = Modes {
+            damping_ratio,
+            modal_damping,
+            eigenvalue: eigenvalues.clone(),
+            residual: solution.residuals.clone(),
+            provenance: self.found.provenance.clone(),
+            truncation: truncation
+                .map(|basis::Truncation { load, before, after }| Truncation { load, before, after })
+                .collect(),
+            shape: copied(self.modes.of_nodes()),
+            rotation: self.modes.rotations.clone(),
+            internal: self.modes.internal.clone(),
+        };
+        Ok((modes, overdamped))
+    }
+
+    /// Motions of the interfaces as coordinates, in body axes, for bases that have them.
+    fn coordinates(&self) -> Option<InterfaceCoordinates> {
+        let own = self.found.coordinates.as_ref()?;
+        let axes = &self.place.frame.axes;
+        let turned = own.in_axes(axes, self.model.dimension(), &self.modes.signs);
+        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
+        Some(InterfaceCoordinates { names, stiffness, mass, of_modes })
+    }
+
+    /// Warnings and notes about the finished body.
+    fn remarks(&self, overdamped: Option<Diagnostic>, body: &FlexBody) -> Vec<Diagnostic> {
+        let softening = softening_warning(self.model, &self.settings.basis, body);
+        let found = self.found.diagnostics.iter().cloned();
+        found
+            .chain(overdamped)
+            .chain(softening)
+            .chain(poor_fits(body))
+            .chain(free_frequencies(body))
+            .chain(interface_compliance(body))
+            .collect()
+    }
+}

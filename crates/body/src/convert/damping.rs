@@ -1,0 +1,120 @@
+//! Damping of the modes: what the user states, reduced to them.
+
+use super::body_modes::reduced;
+use crate::invariants::Invariants;
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_eigen::energy_noise;
+use flexbody_linalg::{SymmetricMatrix, symmetric_eigen};
+use flexbody_model::{Damping, FeModel, ratio_at};
+
+/// Standard deviations of what the digits of D leave that count as rounding.
+const NOISE_FACTOR: f64 = 30.0;
+
+/// Smallest eigenvalue of the damping, scaled to a unit diagonal, that still is rounding.
+const SEMIDEFINITE: f64 = -1e-8;
+
+/// Damping of modes.
+pub struct ModalDamping {
+    /// Psi' D Psi (nf x nf). Unit: 1/time.
+    pub matrix: Mat<f64>,
+    /// Its diagonal over 2 omega_j.
+    pub ratio: Vec<f64>,
+    /// When modes are damped beyond the critical damping.
+    pub warning: Option<Diagnostic>,
+}
+
+/// Damping of the modes `vectors` (N x nf, model axes); `None` when none is stated.
+///
+/// # Errors
+/// [`DampingIndefinite`](Code::DampingIndefinite).
+pub fn modal_damping(
+    model: &FeModel,
+    vectors: MatRef<'_, f64>,
+    eigenvalues: &[f64],
+    invariants: &Invariants,
+) -> Result<Option<ModalDamping>> {
+    let Some(damping) = model.damping() else { return Ok(None) };
+    let critical: Vec<f64> = eigenvalues.iter().map(|lambda| 2.0 * lambda.sqrt()).collect();
+    let from_ratios = |ratio: Vec<f64>| {
+        let diagonal = |i: usize, j: usize| if i == j { ratio[j] * critical[j] } else { 0.0 };
+        (Mat::from_fn(critical.len(), critical.len(), diagonal), ratio)
+    };
+    let from_matrix = |matrix: Mat<f64>| {
+        // What is below zero here is rounding: anything else was refused.
+        let ratio = critical.iter().enumerate().map(|(j, c)| matrix[(j, j)].max(0.0) / c).collect();
+        (matrix, ratio)
+    };
+    let (matrix, ratio): (Mat<f64>, Vec<f64>) = match damping {
+        Damping::Ratio(ratio) => from_ratios(vec![*ratio; critical.len()]),
+        Damping::Bands(bands) => {
+            let hertz = eigenvalues.iter().map(|&lambda| model.units().frequency_of(lambda));
+            from_ratios(hertz.map(|f| ratio_at(bands, f)).collect())
+        }
+        Damping::Rayleigh { alpha, beta } => {
+            let (m, k) = (invariants.modal_mass(), invariants.modal_stiffness());
+            from_matrix(Mat::from_fn(m.nrows(), m.ncols(), |i, j| alpha * m[(i, j)] + beta * k[(i, j)]))
+        }
+        Damping::Matrix(d) => {
+            let matrix = reduced(d, vectors);
+            check_semidefinite(model, d, vectors, &matrix)?;
+            from_matrix(matrix)
+        }
+    };
+    if let Some(j) = ratio.iter().position(|ratio| !ratio.is_finite()) {
+        let message = format!("damping of mode {} is not a finite number", j + 1);
+        return Err(Diagnostic::new(Code::DampingIndefinite, message).into());
+    }
+    let over = ratio.iter().filter(|ratio| **ratio > 1.0).count();
+    let warning = (over > 0).then(|| {
+        let worst = (0..ratio.len()).fold(0, |w, j| if ratio[j] > ratio[w] { j } else { w });
+        let message = format!(
+            "{over} of {} modes are overdamped, mode {} most: its damping ratio is {:.3e}",
+            ratio.len(),
+            worst + 1,
+            ratio[worst]
+        );
+        Diagnostic::new(Code::ModesOverdamped, message)
+    });
+    Ok(Some(ModalDamping { matrix, ratio, warning }))
+}
+
+/// D must not feed energy to any motion of the modes, but for what its digits leave.
+fn check_semidefinite(
+    model: &FeModel,
+    d: &SymmetricMatrix,
+    vectors: MatRef<'_, f64>,
+    reduced: &Mat<f64>,
+) -> Result<()> {
+    let input_error = 0.5 * 10f64.powi(1 - i32::from(model.digits()));
+    let noise = energy_noise(d, vectors, input_error);
+    let raised = |j: usize| reduced[(j, j)] + NOISE_FACTOR * noise[j];
+    let refuse = |message: String| Err(Diagnostic::new(Code::DampingIndefinite, message).into());
+    if let Some(j) = (0..noise.len()).find(|&j| raised(j).is_nan() || raised(j) < 0.0) {
+        return refuse(format!(
+            "damping of mode {} is negative: psi' D psi = {:.3e}",
+            j + 1,
+            reduced[(j, j)]
+        ));
+    }
+    // Scaled to a unit diagonal, so that slow modes count as much as fast ones.
+    let size: Vec<f64> = (0..noise.len()).map(|j| raised(j).sqrt().max(f64::MIN_POSITIVE)).collect();
+    let scaled = Mat::from_fn(size.len(), size.len(), |i, j| {
+        if i == j { raised(j) / size[j] / size[j] } else { reduced[(i, j)] / size[i] / size[j] }
+    });
+    match symmetric_eigen(scaled.as_ref()) {
+        Some(eigen) if eigen.values[0] >= SEMIDEFINITE => Ok(()),
+        Some(eigen) => {
+            let most = (0..size.len()).fold(0, |w, j| {
+                if eigen.vectors[(j, 0)].abs() > eigen.vectors[(w, 0)].abs() { j } else { w }
+            });
+            refuse(format!(
+                "the reduced damping matrix, scaled to a unit diagonal, has the eigenvalue {:.3e}, most of it in mode {}",
+                eigen.values[0],
+                most + 1
+            ))
+        }
+        None => refuse("the reduced damping matrix has entries that are not finite".to_owned()),
+    }
+}

@@ -1,0 +1,73 @@
+//! Geometric stiffness of the modes: what the user gives for unit loads, reduced to them and turned into body
+//! axes.
+
+use super::body_modes::reduced;
+use crate::basis::{BasisChoice, Loads};
+use crate::flex_body::{FlexBody, SOFTENING, axis_in_words, stiffness_about};
+use faer::{Mat, MatRef, Scale};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
+use nalgebra::{Matrix3, Vector3};
+
+/// Direction cosines up to this are rounding.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+/// Beyond this what follows from the entries would not be finite.
+const LARGEST: f64 = 1e290;
+
+/// Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit loads along
+/// the columns of `axes`. Components that were not given count as zero, so that K_geo of any load is the same
+/// in all axes; what nothing given contributes to is left out. Kinds in the order of the model, components in
+/// theirs.
+///
+/// * `shift`: origin of the frame from the point that spin and angular acceleration were given about, frame axes;
+///   zero but for a frame on an interface. Unit: length.
+///
+/// # Errors
+/// [`MatrixNotFinite`](Code::MatrixNotFinite) when the products overflow.
+pub fn modal_geometric_stiffness(
+    model: &FeModel,
+    vectors: MatRef<'_, f64>,
+    axes: &Matrix3<f64>,
+    shift: &Vector3<f64>,
+) -> Result<Vec<GeometricStiffness<Mat<f64>>>> {
+    let mut out: Vec<GeometricStiffness<Mat<f64>>> = Vec::new();
+    for GeometricStiffness { load, matrix } in model.geometric_stiffness() {
+        let own = reduced(matrix, vectors);
+        if own.col_iter().any(|column| column.iter().any(|v| v.is_nan() || v.abs() > LARGEST)) {
+            let message = format!("geometric stiffness for {load} overflows on the modes");
+            return Err(Diagnostic::new(Code::MatrixNotFinite, message).into());
+        }
+        let along = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);
+        for (component, factor) in along {
+            let load = UnitLoad { kind: load.kind.clone(), component };
+            let part = &own * Scale(factor);
+            match out.iter_mut().find(|known| known.load == load) {
+                Some(sum) => sum.matrix += part,
+                None => out.push(GeometricStiffness { load, matrix: part }),
+            }
+        }
+    }
+    let mut out = stiffness_about(&out, shift, model.dimension());
+    let place = |kind: &LoadKind| model.geometric_stiffness().iter().position(|one| one.load.kind == *kind);
+    out.sort_by_key(|one| (place(&one.load.kind), one.load.component));
+    Ok(out)
+}
+
+/// A warning when centrifugal loads are wanted in the basis, so that the body spins, but geometric stiffness
+/// for spin is not given: at what rate the softening begins to count.
+pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &FlexBody) -> Option<Diagnostic> {
+    let BasisChoice::Free(free) = basis else { return None };
+    let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    if given || !free.residual_vectors.contains(&Loads::Centrifugal) {
+        return None;
+    }
+    let (axis, part) = body.worst_spin().filter(|(_, part)| *part > 0.0)?;
+    let axis = axis_in_words(&axis);
+    let hertz = model.units().frequency_of(SOFTENING / part);
+    let message = format!(
+        "centrifugal loads are wanted without geometric stiffness for spin: the centrifugal term takes 1 % of the stiffness of a motion at {hertz:.4e} Hz about axis {axis} of the model"
+    );
+    Some(Diagnostic::new(Code::GeometricStiffnessNone, message))
+}

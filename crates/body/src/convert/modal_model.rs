@@ -1,0 +1,154 @@
+//! A model with its modes, in the frame of its body: the first stage of a conversion.
+
+use super::body_modes::{reduced, reduced_in_twice_the_precision};
+use super::{
+    BodyModes, ConvertSettings, NodesInFrame, interface_frame, modal_geometric_stiffness, rigid_mass,
+};
+use crate::basis::{BasisChoice, ModalBasis, Task};
+use crate::flex_body::Interface;
+use crate::invariants::{
+    BodyFrame, Frame, InertiaStiffness, LumpedMasses, MassProperties, choose_frame, choose_general_frame,
+    choose_plane_frame,
+};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_eigen::{Accuracy, Resume};
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::{FeModel, GeometricStiffness, Nodes};
+use nalgebra::Vector3;
+
+/// A checked model and its modes in body axes; of the mass nothing is condensed yet.
+pub struct ModalModel<'m> {
+    pub(super) model: &'m FeModel,
+    pub(super) settings: &'m ConvertSettings,
+    /// The comparators that are wanted.
+    pub(super) schemes: Vec<LumpedMasses>,
+    /// What is known of the modes; their vectors are those of `modes`.
+    pub(super) found: ModalBasis,
+    pub(super) mass_properties: MassProperties,
+    pub(super) place: NodesInFrame,
+    pub(super) modes: BodyModes,
+    /// Psi' K Psi.
+    pub(super) modal_stiffness: Mat<f64>,
+    /// Psi' K_geo Psi of unit loads along the body axes.
+    pub(super) geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+    pub(super) inertia_stiffness: Option<InertiaStiffness>,
+    pub(super) nodes: Nodes,
+    pub(super) interfaces: Vec<Interface>,
+}
+
+impl<'m> ModalModel<'m> {
+    /// Finds the modes and chooses the frame.
+    ///
+    /// * `resume`: a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
+    ///
+    /// # Errors
+    /// Those of [`free_surface`](crate::basis::free_surface) and [`choose_frame`];
+    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes (found before any
+    /// work).
+    pub fn find(
+        model: &'m FeModel,
+        settings: &'m ConvertSettings,
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<Self> {
+        refuse_uncertifiable(model, settings.modes.accuracy)?;
+        let schemes =
+            settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
+        let own_frame = own_frame(model, settings)?;
+        let task = Task { model, settings: &settings.modes, resume, watch };
+        let mut found = settings.basis.basis().modes(&task)?;
+        watch(Event::Phase("invariants"));
+        let (frame, mass_properties) = body_frame(model, settings.frame)?;
+        let frame = own_frame.unwrap_or(frame);
+        let place = NodesInFrame::new(model, frame);
+        let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
+        if let Some(name) = &settings.interface_frame {
+            interface_frame::constrain(model, &place, name, coupled, &mut found)?;
+        }
+        let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
+        // `certified` makes its own.
+        let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
+        let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
+        let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
+        let shift = match own_frame {
+            Some(own) => own.origin - mass_properties.centre_of_mass,
+            None => Vector3::zeros(),
+        };
+        let geometric_stiffness =
+            modal_geometric_stiffness(model, modes.vectors.as_ref(), &frame.axes, &shift)?;
+        let inertia_stiffness = modes.inertia_stiffness(model, &frame);
+        let nodes = Nodes { ids: model.nodes().ids.clone(), positions: place.positions.clone() };
+        let interfaces = interface_frame::interfaces_in_frame(model, &frame, coupled);
+        Ok(Self {
+            model,
+            settings,
+            schemes,
+            found,
+            mass_properties,
+            place,
+            modes,
+            modal_stiffness,
+            geometric_stiffness,
+            inertia_stiffness,
+            nodes,
+            interfaces,
+        })
+    }
+
+    /// Number of modes.
+    pub(super) fn n_modes(&self) -> usize {
+        self.modes.vectors.ncols()
+    }
+}
+
+/// Refuses accuracy `certified` for rows that are no displacements, which have no place in the double-double
+/// condensation, and for a mass that is stored otherwise along x, y and z: bounds would be about the mean.
+fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
+    if accuracy == Accuracy::Certified && model.scalar_mass().is_some() && !model.has_exact_scalar_mass() {
+        let message = format!(
+            "accuracy certified bounds the matrices as they are stored, and the mass matrix differs along x, y and z by {:.1e} of its diagonal",
+            model.mass_deviation()
+        );
+        let help = "use --accuracy standard, which takes the mean, or write the same mass along all axes";
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    }
+    let plain = model.scalar_mass().is_some() && model.rows().len() == model.rows().displacements();
+    if accuracy == Accuracy::Certified && !plain {
+        let message = "accuracy certified covers displacements whose mass commutes with rotations";
+        return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
+    }
+    Ok(())
+}
+
+/// The frame on an interface, if one is asked for.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) beside settings that are about free modes; those of
+/// [`frame_of_interface`](interface_frame::frame_of_interface).
+fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
+    let Some(name) = &settings.interface_frame else { return Ok(None) };
+    let refuse = |message: &str, help: &str| {
+        Err(Diagnostic::new(Code::Usage, message.to_owned()).with_help(help.to_owned()).into())
+    };
+    if settings.modes.accuracy == Accuracy::Certified {
+        let message = "accuracy certified bounds the modes of the free body, not those of a body whose frame stands on an interface";
+        return refuse(message, "use --accuracy standard, or a frame at the centre of mass");
+    }
+    if settings.lumped_modes {
+        let message = "--lumped-modes compares modes of the free body, not those of a body whose frame stands on an interface";
+        return refuse(message, "leave --lumped-modes out, or use a frame at the centre of mass");
+    }
+    interface_frame::frame_of_interface(model, name).map(Some)
+}
+
+/// The body frame that is wanted, and the mass properties in model axes.
+fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperties)> {
+    let positions = &model.nodes().positions;
+    match (model.scalar_mass(), model.dimension()) {
+        (Some(mass), 2) => choose_plane_frame(mass, positions, wanted),
+        (Some(mass), _) => choose_frame(mass, positions, wanted),
+        (None, d) => choose_general_frame(|about| rigid_mass(model, &about), positions, d, wanted),
+    }
+}

@@ -1,0 +1,131 @@
+//! What is asked of a conversion.
+
+use crate::basis::{BasisChoice, Loads, ModeSettings};
+use crate::invariants::{BodyFrame, LumpedScheme};
+use flexbody_eigen::Wanted;
+use flexbody_model::{Damping, FeModel, SurfaceMesh};
+
+/// A lumped comparator that is wanted.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Lumping {
+    /// Row sums of Ms.
+    RowSum,
+    /// Diagonal of Ms scaled to the total mass.
+    DiagonalScaling,
+    /// Nodal masses by node number, as a multibody package would import them.
+    User(Vec<(i64, f64)>),
+}
+
+impl Lumping {
+    fn scheme(&self) -> LumpedScheme {
+        match self {
+            Self::RowSum => LumpedScheme::RowSum,
+            Self::DiagonalScaling => LumpedScheme::DiagonalScaling,
+            Self::User(_) => LumpedScheme::User,
+        }
+    }
+}
+
+/// Which surface the body is to have, to be drawn by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MeshChoice {
+    /// That of the model, where it has one.
+    #[default]
+    Whole,
+    /// The same with so many triangles at the most.
+    AtMost(usize),
+    /// None.
+    Without,
+}
+
+/// Settings of a conversion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvertSettings {
+    /// Which modes and how good.
+    pub modes: ModeSettings,
+    /// Which basis.
+    pub basis: BasisChoice,
+    /// Body frame of a body in mean axes.
+    pub frame: BodyFrame,
+    /// Interface that the frame stands on instead: at its reference point, along the axes of the model.
+    pub interface_frame: Option<String>,
+    /// Comparators.
+    pub lumped: Vec<Lumping>,
+    /// Also compute the modes of each lumped mass.
+    pub lumped_modes: bool,
+    /// Surface of the body.
+    pub mesh: MeshChoice,
+}
+
+impl Default for ConvertSettings {
+    /// 20 modes, the centre of mass and the axes of the model as frame, and the two comparators that need nothing but the matrices.
+    fn default() -> Self {
+        Self {
+            modes: ModeSettings::default(),
+            basis: BasisChoice::default(),
+            frame: BodyFrame::default(),
+            interface_frame: None,
+            lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
+            lumped_modes: false,
+            mesh: MeshChoice::default(),
+        }
+    }
+}
+
+impl ConvertSettings {
+    /// The settings that can change the result, for the file.
+    pub(super) fn described(&self, model: &FeModel) -> serde_json::Value {
+        let (modes, below) = match self.modes.wanted {
+            Wanted::Lowest(count) => ((count < usize::MAX).then_some(count), None),
+            Wanted::Below(lambda) => (None, Some(lambda)),
+        };
+        let schemes: Vec<&str> = self.lumped.iter().map(|lumping| lumping.scheme().name()).collect();
+        let loads: Vec<String> = self.basis.residual_vectors().iter().map(Loads::name).collect();
+        let mut described = serde_json::json!({
+            "accuracy": self.modes.accuracy.name(),
+            "basis": self.basis.basis().name(),
+            "frame": self.interface_frame.as_ref().map_or_else(
+                || self.frame.name().to_owned(),
+                |name| format!("interface {name}"),
+            ),
+            "lumped": schemes,
+            "max_eigenvalue": below,
+            "modes": modes,
+            "residual_vectors": loads,
+        });
+        if let Some(damping) = model.damping() {
+            described["damping"] = serde_json::json!({ damping.name(): damping_numbers(damping) });
+        }
+        if let Some(engine) = self.basis.engine() {
+            described["engine"] = serde_json::json!(engine);
+        }
+        // Whether there is a surface at all is seen in the file.
+        if let (MeshChoice::AtMost(most), Some(_)) = (self.mesh, model.mesh()) {
+            described["mesh_triangles"] = serde_json::json!(most);
+        }
+        described
+    }
+
+    /// The surface of the body.
+    pub(super) fn surface(&self, model: &FeModel) -> Option<SurfaceMesh> {
+        let mesh = model.mesh()?;
+        match self.mesh {
+            MeshChoice::Whole => Some(mesh.clone()),
+            MeshChoice::AtMost(most) => mesh.decimated(&model.nodes().positions, most),
+            MeshChoice::Without => None,
+        }
+    }
+}
+
+/// The numbers that a damping is stated by; null for a matrix.
+fn damping_numbers<D>(damping: &Damping<D>) -> serde_json::Value {
+    match damping {
+        Damping::Ratio(ratio) => serde_json::json!(ratio),
+        Damping::Bands(bands) => {
+            let end = |hertz: f64| hertz.is_finite().then_some(hertz);
+            bands.iter().map(|b| serde_json::json!({ "to_hz": end(b.to_hz), "ratio": b.ratio })).collect()
+        }
+        Damping::Rayleigh { alpha, beta } => serde_json::json!({ "alpha": alpha, "beta": beta }),
+        Damping::Matrix(_) => serde_json::Value::Null,
+    }
+}

@@ -1,0 +1,306 @@
+//! The validated body.
+
+use super::validate::problems;
+use super::{
+    Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, ReferenceConditions,
+    Source, Storage, TermDecision,
+};
+use crate::invariants::{
+    BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, Turning, identities,
+};
+use faer::Mat;
+use flexbody_base::error::{Error, Result};
+use flexbody_base::numbers::significant;
+use flexbody_base::units::UnitSystem;
+use flexbody_model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, span};
+
+/// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FlexBody {
+    parts: Parts,
+}
+
+/// Motions at which the stiffness of inertia has a given part of the stiffness of some motion of a body, whatever
+/// their direction; `None` where it is zero at all of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InertiaRates {
+    /// Spin, in hertz.
+    pub spin_hz: Option<f64>,
+    /// Acceleration of the origin less gravity. Unit: length/time^2.
+    pub acceleration: Option<f64>,
+    /// Angular acceleration. Unit: 1/time^2.
+    pub angular_acceleration: Option<f64>,
+}
+
+impl InertiaRates {
+    /// `a spin of 12.3 Hz, an acceleration of 4.5e3 m/s^2, an angular acceleration of 1.2e4 1/s^2`, of the loads
+    /// that are asked for; empty where there is none.
+    pub fn in_words(&self, units: &UnitSystem, asked: impl Fn(&LoadKind) -> bool) -> String {
+        let (length, time) = (units.length.name(), units.time.name());
+        let all = [
+            (LoadKind::Spin, self.spin_hz.map(|hertz| format!("a spin of {} Hz", significant(hertz, 3)))),
+            (
+                LoadKind::Acceleration,
+                self.acceleration
+                    .map(|a| format!("an acceleration of {} {length}/{time}^2", significant(a, 3))),
+            ),
+            (
+                LoadKind::AngularAcceleration,
+                self.angular_acceleration
+                    .map(|a| format!("an angular acceleration of {} 1/{time}^2", significant(a, 3))),
+            ),
+        ];
+        let told: Vec<String> =
+            all.into_iter().filter(|(kind, _)| asked(kind)).filter_map(|(_, told)| told).collect();
+        told.join(", ")
+    }
+}
+
+impl FlexBody {
+    /// Checks `parts` and makes a body of them.
+    ///
+    /// The dimension is 3, or 2 and then nothing has a component along z. With n nodes and nf modes: n >= 1,
+    /// 1 <= nf <= 3n (where the nodes are all of a model); every array has the shape that [`Parts`] states
+    /// and only finite values; the mass is positive; eigenvalues are positive and ascend; residuals and
+    /// damping ratios are not negative; the axes are orthonormal and right-handed to 1e-10; node numbers are
+    /// unique; the body number lies between 1 and the number of bodies; names of lumping schemes and of
+    /// interfaces are unique and not empty; loads of geometric stiffness are those of the dimension, each
+    /// once; surface and interfaces name existing nodes, interfaces declared free have no reference point; matrices in
+    /// interface coordinates are symmetric; a group of the kinetic energy is dropped by a decision of
+    /// [`Parts::terms`] or held, here and by the lumped comparators; no text contains a NUL character (no
+    /// file could hold it).
+    ///
+    /// # Errors
+    /// [`BodySchema`](flexbody_base::diagnostic::Code::BodySchema), one diagnostic per violation.
+    pub fn new(mut parts: Parts) -> Result<Self> {
+        // As files have them.
+        parts.terms.sort_by_key(|term| term.group);
+        let problems = problems(&parts);
+        if problems.is_empty() { Ok(Self { parts }) } else { Err(Error::new(problems)) }
+    }
+
+    /// All parts.
+    pub fn parts(&self) -> &Parts {
+        &self.parts
+    }
+
+    /// All parts, for changes after which everything still holds that [`FlexBody::new`] checks.
+    pub(super) fn parts_mut(&mut self) -> &mut Parts {
+        &mut self.parts
+    }
+
+    /// Gives the parts away, to change them and build a new body.
+    pub fn into_parts(self) -> Parts {
+        self.parts
+    }
+
+    /// Number of nodes n.
+    pub fn n_nodes(&self) -> usize {
+        self.parts.nodes.len()
+    }
+
+    /// Number of modes nf.
+    pub fn n_modes(&self) -> usize {
+        self.parts.modes.eigenvalue.len()
+    }
+
+    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    pub fn dimension(&self) -> usize {
+        self.parts.dimension
+    }
+
+    /// Provenance.
+    pub fn source(&self) -> &Source {
+        &self.parts.source
+    }
+
+    /// Units of all numbers.
+    pub fn units(&self) -> &UnitSystem {
+        &self.parts.units
+    }
+
+    /// Body frame in model coordinates.
+    pub fn frame(&self) -> &Frame {
+        &self.parts.frame
+    }
+
+    /// Reference conditions: what ties the body frame to the deformed body.
+    pub fn conditions(&self) -> &ReferenceConditions {
+        &self.parts.conditions
+    }
+
+    /// Node numbers and positions in the body frame.
+    pub fn nodes(&self) -> &Nodes {
+        &self.parts.nodes
+    }
+
+    /// The surface to draw the body by, where it is known.
+    pub fn mesh(&self) -> Option<&SurfaceMesh> {
+        self.parts.mesh.as_ref()
+    }
+
+    /// Largest distance of two nodes. Unit: length.
+    pub fn extent(&self) -> f64 {
+        span(&self.parts.nodes.positions)
+    }
+
+    /// Largest displacement of a node by mode `j` at unit amplitude.
+    ///
+    /// # Panics
+    /// When `j` is not below the number of modes.
+    pub fn largest_displacement(&self, j: usize) -> f64 {
+        let shape = &self.parts.modes.shape;
+        let square = |i: usize| (0..3).map(|k| shape[(3 * i + k, j)].powi(2)).sum::<f64>();
+        (0..self.n_nodes()).map(square).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Modes.
+    pub fn modes(&self) -> &Modes {
+        &self.parts.modes
+    }
+
+    /// D (nf x nf): the modal damping or, where there is none, diag(2 zeta_j omega_j). Unit: 1/time.
+    pub fn damping(&self) -> Mat<f64> {
+        let modes = &self.parts.modes;
+        let by_ratio = |j: usize| 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt();
+        modes.modal_damping.clone().unwrap_or_else(|| {
+            Mat::from_fn(self.n_modes(), self.n_modes(), |i, j| if i == j { by_ratio(j) } else { 0.0 })
+        })
+    }
+
+    /// f_j = sqrt(lambda_j) / (2 pi) in hertz (nf), whatever the body's unit of time is.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        let hertz = self.parts.units.hertz();
+        self.parts.modes.eigenvalue.iter().map(|l| l.sqrt() / std::f64::consts::TAU * hertz).collect()
+    }
+
+    /// Exact invariants about the frame origin, body axes.
+    pub fn invariants(&self) -> &Invariants {
+        &self.parts.invariants
+    }
+
+    /// Geometric stiffness of unit loads along body axes, reduced to the modes.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<Mat<f64>>] {
+        &self.parts.geometric_stiffness
+    }
+
+    /// Stiffness of inertia of nodes whose rotations carry mass: terms of the kinetic energy of second order in
+    /// their rotations, signs of geometric stiffness (theory sections 6 and 7.4).
+    pub fn inertia_stiffness(&self) -> Option<&InertiaStiffness> {
+        self.parts.inertia_stiffness.as_ref()
+    }
+
+    /// The stiffness of inertia plus the geometric stiffness for a unit of `load`, which is added to K_ff; `None`
+    /// where the body has neither.
+    pub fn stiffness_under(&self, load: &UnitLoad) -> Option<Mat<f64>> {
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let all = of_inertia.chain(self.geometric_stiffness()).filter(|one| one.load == *load);
+        all.fold(None, |sum: Option<Mat<f64>>, one| match sum {
+            None => Some(one.matrix.clone()),
+            Some(sum) => Some(sum + &one.matrix),
+        })
+    }
+
+    /// The motions at which the stiffness of inertia has `part` of the stiffness of some motion of the body; `None`
+    /// where it has none, or K_ff is not positive definite.
+    pub fn inertia_rates(&self, part: f64) -> Option<InertiaRates> {
+        let shares = self.inertia_stiffness()?.shares(self.invariants().modal_stiffness().as_ref())?;
+        let at = |share: f64| (share > 0.0).then_some(part / share);
+        Some(InertiaRates {
+            spin_hz: at(shares.spin_squared).map(|square| self.units().frequency_of(square)),
+            acceleration: at(shares.acceleration),
+            angular_acceleration: at(shares.angular_acceleration),
+        })
+    }
+
+    /// The loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.
+    pub fn stiffening_loads(&self) -> Vec<UnitLoad> {
+        let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let mut loads: Vec<UnitLoad> = Vec::new();
+        for one in self.geometric_stiffness().iter().chain(of_inertia) {
+            if !loads.contains(&one.load) {
+                loads.push(one.load.clone());
+            }
+        }
+        loads
+    }
+
+    /// Lumped comparators.
+    pub fn lumped(&self) -> &[LumpedBody] {
+        &self.parts.lumped
+    }
+
+    /// Proof of completeness and noise floor.
+    pub fn certificate(&self) -> &Certificate {
+        &self.parts.certificate
+    }
+
+    /// Interfaces.
+    pub fn interfaces(&self) -> &[Interface] {
+        &self.parts.interfaces
+    }
+
+    /// Whether an interface was declared to move as a rigid body.
+    pub fn has_rigid_interfaces(&self) -> bool {
+        self.parts.interfaces.iter().any(|interface| interface.coupling == Some(Coupling::Rigid))
+    }
+
+    /// K and M in interface coordinates, of a basis that has them.
+    pub fn coordinates(&self) -> Option<&InterfaceCoordinates> {
+        self.parts.coordinates.as_ref()
+    }
+
+    /// What was decided about the groups of the kinetic energy; empty where nobody asked.
+    pub fn terms(&self) -> &[TermDecision] {
+        &self.parts.terms
+    }
+
+    /// Precision of shapes and of the inertia of the modes.
+    pub fn storage(&self) -> Storage {
+        self.parts.storage
+    }
+
+    /// The groups of the kinetic energy that the body holds.
+    pub fn groups(&self) -> Groups {
+        self.parts.invariants.groups()
+    }
+
+    /// Every identity that the file itself can be held to (theory section 10), those of the interface
+    /// coordinates included; `frame` is what the body frame was meant to be. Limits of a body with 32-bit
+    /// arrays have room for their rounding.
+    pub fn identities(&self, frame: BodyFrame) -> Vec<IdentityCheck> {
+        let expected = Expected {
+            mass_normalised: true,
+            free_surface: self.parts.conditions.is_mean(),
+            frame,
+            origin: self.parts.frame.origin,
+            eigenvalues: Some(&self.parts.modes.eigenvalue),
+            eigenvalue_noise: self.parts.certificate.rigid_noise,
+            eigenvalue_rounding: self.parts.certificate.eigenvalue_rounding,
+            turning: match (&self.parts.inertia_stiffness, &self.parts.source.approximation) {
+                (None, _) => Turning::None,
+                (Some(_), Some(_)) => Turning::InPart,
+                (Some(_), None) => Turning::Whole,
+            },
+        };
+        let checks = identities(&self.parts.invariants, &expected);
+        // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.
+        let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
+        let mut checks = relaxed(checks, rounding + self.parts.certificate.inertia_rounding);
+        checks.extend(self.parts.frame_at_rest());
+        checks.extend(self.parts.interface_identities());
+        checks.extend(self.parts.cross_checks());
+        checks
+    }
+}
+
+/// Limits of identities of a body whose arrays are rounded, which adds `rounding` to what rounding of 64-bit
+/// floats leaves.
+fn relaxed(mut checks: Vec<IdentityCheck>, rounding: f64) -> Vec<IdentityCheck> {
+    // What has no tolerance, as being finite, does not get any.
+    for check in checks.iter_mut().filter(|check| check.limit > 0.0) {
+        check.limit += rounding;
+        check.passed = check.value <= check.limit;
+    }
+    checks
+}

@@ -1,0 +1,67 @@
+//! What parts of a body say of each other that no theorem about one of them alone does (theory section 10): a
+//! file whose digests were stated anew after a change is found by these where mechanics can tell.
+
+use super::{MassStructure, Parts};
+use crate::invariants::{CauchySchwarz, IdentityCheck};
+use flexbody_linalg::{larger, largest};
+
+/// Two ways to the same sum: rounding, relative to its Cauchy-Schwarz bound.
+const ROUNDING: f64 = 1e-12;
+
+impl Parts {
+    /// Masses, modes and damping against each other.
+    pub(super) fn cross_checks(&self) -> Vec<IdentityCheck> {
+        let row_sums =
+            if self.source.mass_structure == MassStructure::General { None } else { self.row_sums() };
+        let all = row_sums.into_iter().chain(self.damping_ratios());
+        all.chain(self.inertia_stiffness_of_moments()).collect()
+    }
+
+    /// Row sums keep the mass, the centre of mass and the linear momentum of every mode.
+    fn row_sums(&self) -> Option<IdentityCheck> {
+        let lumped = &self.lumped.iter().find(|lumped| lumped.scheme == "row-sum")?.invariants;
+        let own = &self.invariants;
+        let bound = CauchySchwarz::of(own);
+        let relative =
+            |difference: f64, bound: f64| if difference == 0.0 { 0.0 } else { difference.abs() / bound };
+        let first =
+            (0..3).map(|k| relative(own.first_moment()[k] - lumped.first_moment()[k], bound.first_moment(k)));
+        // Rows without a place are none of a node's.
+        let modes = if self.modes.internal.is_none() { own.n_modes() } else { 0 };
+        let c1 = (0..modes).flat_map(|p| {
+            let bound = &bound;
+            (0..3).map(move |k| relative(own.c1()[(k, p)] - lumped.c1()[(k, p)], bound.c1(p)))
+        });
+        let value = first.chain(c1).fold(relative(own.mass() - lumped.mass(), own.mass()), larger);
+        Some(IdentityCheck::new(
+            "row_sums",
+            "m, c and C1 of the row sums of M are those of M",
+            value,
+            ROUNDING,
+        ))
+    }
+
+    /// The stiffness of inertia follows from the moments of the nodes and their rotations.
+    fn inertia_stiffness_of_moments(&self) -> Option<IdentityCheck> {
+        let (own, rotation) = (self.inertia_stiffness.as_ref()?, self.modes.rotation.as_ref()?);
+        let formula = "K = sum over the nodes of theta' (sym G - tr G I) theta";
+        // Both rotations of a product are rounded.
+        let limit = ROUNDING + 4.0 * self.storage.rounding();
+        let value = own.deviation(rotation.as_ref(), self.dimension);
+        Some(IdentityCheck::new("inertia_stiffness", formula, value, limit))
+    }
+
+    /// Damping ratios are those of the diagonal of the modal damping.
+    fn damping_ratios(&self) -> Option<IdentityCheck> {
+        let damping = self.modes.modal_damping.as_ref()?;
+        let size = damping.norm_max();
+        // A ratio is never negative: what is below zero on the diagonal is rounding.
+        let difference = |(j, lambda): (usize, &f64)| {
+            let by_ratio = 2.0 * self.modes.damping_ratio[j] * lambda.sqrt();
+            let difference = (by_ratio - damping[(j, j)].max(0.0)).abs();
+            if difference == 0.0 { 0.0 } else { difference / size }
+        };
+        let value = largest(self.modes.eigenvalue.iter().enumerate().map(difference));
+        Some(IdentityCheck::new("damping_ratios", "zeta_j = D_jj / (2 omega_j)", value, ROUNDING))
+    }
+}

@@ -1,0 +1,173 @@
+//! A body with other reference conditions: in mean axes, or with its frame on an interface.
+
+use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
+use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, ReferenceConditions};
+use crate::invariants::{BodyFrame, Groups, Invariants, error_norms, principal_axes};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_model::GeometricStiffness;
+use nalgebra::Matrix3;
+use std::borrow::Cow;
+
+impl FlexBody {
+    /// Returns the body in mean axes: rigid motion is taken out of the modes, which are normalised again (theory 5.2).
+    /// A body in mean axes is returned as it is.
+    ///
+    /// # Errors
+    /// [`CarrierImpossible`](Code::CarrierImpossible) for a body without all groups of the kinetic energy, with
+    /// geometric stiffness of forces or accelerations, or with rows that belong to no node: how these change is not
+    /// known without the FE model.
+    pub fn in_mean_axes(&self) -> Result<Cow<'_, Self>> {
+        if self.conditions().is_mean() {
+            return Ok(Cow::Borrowed(self));
+        }
+        self.refuse_changed_frame("mean axes")?;
+        let change = ModalChange::to_mean_axes(self.invariants(), self.dimension())
+            .map_err(|reason| impossible(format!("the body has no mean axes: {reason}")))?;
+        self.changed(&change, ReferenceConditions::MeanAxes).map(Cow::Owned)
+    }
+
+    /// Returns the body in mean axes with its frame at `at`; `Model` keeps origin and axes.
+    ///
+    /// # Errors
+    /// Every error of [`FlexBody::in_mean_axes`].
+    pub fn in_mean_axes_at(&self, at: BodyFrame) -> Result<Self> {
+        let body = self.in_mean_axes()?.into_owned();
+        let invariants = body.invariants();
+        let centre = invariants.first_moment() / invariants.mass();
+        let placed = match at {
+            BodyFrame::Model => body,
+            BodyFrame::Com => body.in_frame(centre, Matrix3::identity())?,
+            BodyFrame::Principal => {
+                let axes = principal_axes(&invariants.shifted(centre).inertia());
+                body.in_frame(centre, axes)?
+            }
+        };
+        let mut parts = placed.into_parts();
+        parts.source.settings["frame"] = serde_json::json!(at.name());
+        Self::new(parts)
+    }
+
+    /// Returns the body with its frame on the interface `name`: origin at its reference point, axes of the model, the
+    /// modes those of the body that is held there (constrained modes in the span of the frame and the modes).
+    ///
+    /// # Errors
+    /// Every error of [`FlexBody::carried`] and [`FlexBody::in_mean_axes`].
+    pub fn on_interface(&self, name: &str) -> Result<Self> {
+        let conditions = ReferenceConditions::Interface(name.to_owned());
+        if *self.conditions() == conditions {
+            return Ok(self.clone());
+        }
+        self.refuse_changed_frame(&format!("the frame on interface `{name}`"))?;
+        let carried = self.carried(&Carrier::Interface(name.to_owned()))?;
+        let change = ModalChange::in_own_frame(carried.invariants(), carried.dimension())
+            .map_err(|reason| impossible(format!("no frame can stand on interface `{name}`: {reason}")))?;
+        let mut parts = carried.changed(&change, conditions)?.into_parts();
+        parts.source.settings["frame"] = serde_json::json!(format!("interface {name}"));
+        Self::new(parts)
+    }
+
+    /// Refuses a body that is not in mean axes for a `task` (`select`, `trade`) that decides about free modes.
+    ///
+    /// # Errors
+    /// [`SceneBody`](Code::SceneBody).
+    pub fn require_mean_axes(&self, task: &str) -> Result<()> {
+        if self.conditions().is_mean() {
+            return Ok(());
+        }
+        let message = format!("{}: {task} decides about modes of bodies in mean axes", self.conditions());
+        let help = "convert with --frame com";
+        Err(Diagnostic::new(Code::SceneBody, message).with_help(help).into())
+    }
+
+    /// Refuses a change of the reference conditions to `wanted` under which a part of the body would be unknown.
+    fn refuse_changed_frame(&self, wanted: &str) -> Result<()> {
+        let conditions = self.conditions();
+        let refuse = |what: &str, help: &str| {
+            let message = format!("{conditions}: for {wanted} {what}");
+            Err(Diagnostic::new(Code::CarrierImpossible, message).with_help(help.to_owned()).into())
+        };
+        if self.groups() != Groups::ALL {
+            let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
+            return refuse(
+                &format!("{} would be needed, which the body does not have", dropped.join(", ")),
+                "take a body with all terms",
+            );
+        }
+        let convert = "convert the FE model with the frame that is needed (--frame)";
+        if self.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_))) {
+            return refuse("the geometric stiffness of the rigid motion in the modes is not known", convert);
+        }
+        if self.modes().internal.is_some() {
+            return refuse("the rigid motion of rows that belong to no node is not known", convert);
+        }
+        Ok(())
+    }
+
+    /// Returns the body after a change of its modes.
+    fn changed(&self, change: &ModalChange, conditions: ReferenceConditions) -> Result<Self> {
+        let mut parts = self.parts().clone();
+        let invariants = change.invariants(&parts.invariants);
+        parts.modes = self.changed_modes(change, &invariants);
+        parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
+            (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
+            _ => None,
+        };
+        let stiffness = |one: &GeometricStiffness<Mat<f64>>| GeometricStiffness {
+            load: one.load.clone(),
+            matrix: change.congruent(&one.matrix),
+        };
+        parts.geometric_stiffness = parts.geometric_stiffness.iter().map(stiffness).collect();
+        parts.lumped = parts.lumped.iter().map(|own| changed_lumped(own, change, &invariants)).collect();
+        parts.certificate = unproved(&parts);
+        (parts.invariants, parts.conditions, parts.coordinates) = (invariants, conditions, None);
+        Self::new(parts)
+    }
+
+    fn changed_modes(&self, change: &ModalChange, invariants: &Invariants) -> Modes {
+        let (old, positions) = (self.modes(), &self.nodes().positions);
+        let eigenvalue = diagonal_eigenvalues(invariants);
+        let damping = self.damping();
+        let modal_damping = (damping.norm_max() > 0.0).then(|| change.congruent(&damping));
+        let ratio = |j: usize, lambda: f64| {
+            modal_damping.as_ref().map_or(0.0, |d| (0.5 * d[(j, j)] / lambda.sqrt()).max(0.0))
+        };
+        Modes {
+            residual: reduced_residuals(invariants, &eigenvalue),
+            provenance: vec!["combination of modes".to_owned(); eigenvalue.len()],
+            truncation: old.truncation.clone(),
+            damping_ratio: eigenvalue.iter().enumerate().map(|(j, &lambda)| ratio(j, lambda)).collect(),
+            modal_damping,
+            shape: change.shapes(&old.shape, positions),
+            rotation: old.rotation.as_ref().map(|rotation| change.rotations(rotation)),
+            internal: None,
+            eigenvalue,
+        }
+    }
+}
+
+fn impossible(message: String) -> Error {
+    Diagnostic::new(Code::CarrierImpossible, message).into()
+}
+
+/// Lumped invariants with the same change of the modes, compared again.
+fn changed_lumped(own: &LumpedBody, change: &ModalChange, exact: &Invariants) -> LumpedBody {
+    let invariants = change.invariants(&own.invariants);
+    LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..own.clone() }
+}
+
+/// The certificate of a body whose modes are combinations of those that were proved.
+fn unproved(parts: &Parts) -> Certificate {
+    let own = &parts.certificate;
+    let about = "combinations of the modes of a body with other reference conditions";
+    let remark = if own.remark.is_empty() { about.to_owned() } else { format!("{about}; {}", own.remark) };
+    Certificate {
+        proved_modes: None,
+        negative_pivots: None,
+        guarantee: None,
+        fixed_interface: None,
+        remark,
+        ..own.clone()
+    }
+}

@@ -1,0 +1,181 @@
+//! A body with its numbers in other units.
+
+use super::{
+    Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes,
+    Parts,
+};
+use crate::invariants::{InertiaStiffness, Invariants, UnitFactors};
+use faer::Mat;
+use flexbody_base::error::Result;
+use flexbody_base::units::UnitSystem;
+use flexbody_model::{GeometricStiffness, LoadKind, NodeMoments};
+
+/// What a number is multiplied by when its unit changes, from its powers of mass, length and time.
+#[derive(Clone, Copy)]
+struct Change {
+    mass: f64,
+    length: f64,
+    time: f64,
+}
+
+impl Change {
+    /// mass^(halves/2) length^l time^t.
+    fn of(self, mass_halves: i32, length: i32, time: i32) -> f64 {
+        self.mass.sqrt().powi(mass_halves) * self.length.powi(length) * self.time.powi(time)
+    }
+
+    /// One over time squared.
+    fn eigenvalue(self) -> f64 {
+        self.of(0, 0, -2)
+    }
+
+    /// A modal coordinate of a mass-normalised mode: sqrt(mass) length.
+    fn modal(self) -> f64 {
+        self.of(1, 1, 0)
+    }
+
+    fn invariants(self, given: &Invariants) -> Invariants {
+        given.scaled(&UnitFactors {
+            mass: self.of(2, 0, 0),
+            first_moment: self.of(2, 1, 0),
+            second_moment: self.of(2, 2, 0),
+            c1: self.of(1, 0, 0),
+            ibar: self.modal(),
+            modal_stiffness: self.eigenvalue(),
+        })
+    }
+
+    fn modes(self, given: &Modes) -> Modes {
+        let (displacement, rotation) = (self.of(-1, 0, 0), self.of(-1, -1, 0));
+        Modes {
+            eigenvalue: given.eigenvalue.iter().map(|v| v * self.eigenvalue()).collect(),
+            modal_damping: given.modal_damping.as_ref().map(|d| times(d, self.of(0, 0, -1))),
+            shape: times(&given.shape, displacement),
+            rotation: given.rotation.as_ref().map(|r| times(r, rotation)),
+            internal: given.internal.as_ref().map(|internal| InternalRows {
+                shape: times(&internal.shape, displacement),
+                ..internal.clone()
+            }),
+            ..given.clone()
+        }
+    }
+
+    /// K_geo of a unit load: 1/time^2 over the unit of the load.
+    fn geometric(self, given: &GeometricStiffness<Mat<f64>>) -> GeometricStiffness<Mat<f64>> {
+        let load = match given.load.kind {
+            LoadKind::Acceleration => self.of(0, 1, -2),
+            LoadKind::AngularAcceleration | LoadKind::Spin => self.of(0, 0, -2),
+            LoadKind::Force(_) => self.of(2, 1, -2),
+            LoadKind::Moment(_) => self.of(2, 2, -2),
+            // Of a load that is known by its name only, the unit is the user's.
+            LoadKind::Named(_) => 1.0,
+        };
+        GeometricStiffness {
+            load: given.load.clone(),
+            matrix: times(&given.matrix, self.eigenvalue() / load),
+        }
+    }
+
+    fn inertia_stiffness(self, given: &InertiaStiffness) -> InertiaStiffness {
+        let moments = |own: &NodeMoments| NodeMoments {
+            first: own.first * self.of(2, 1, 0),
+            second: own.second * self.of(2, 2, 0),
+        };
+        InertiaStiffness {
+            moments: given.moments.iter().map(moments).collect(),
+            stiffness: given.stiffness.iter().map(|one| self.geometric(one)).collect(),
+        }
+    }
+
+    fn certificate(self, given: &Certificate) -> Certificate {
+        let eigenvalues = |values: &[f64]| values.iter().map(|v| v * self.eigenvalue()).collect();
+        Certificate {
+            shift: given.shift * self.eigenvalue(),
+            guarantee: given.guarantee.as_ref().map(|guarantee| Guarantee {
+                shift_below: guarantee.shift_below * self.eigenvalue(),
+                eigenvalue_lower: eigenvalues(&guarantee.eigenvalue_lower),
+                eigenvalue_upper: eigenvalues(&guarantee.eigenvalue_upper),
+                ..guarantee.clone()
+            }),
+            fixed_interface: given.fixed_interface.as_ref().map(|fixed| FixedInterface {
+                shift: fixed.shift * self.eigenvalue(),
+                next: fixed.next.map(|next| next * self.eigenvalue()),
+                free_estimate: eigenvalues(&fixed.free_estimate),
+                free_lower: eigenvalues(&fixed.free_lower),
+                ..*fixed
+            }),
+            ..given.clone()
+        }
+    }
+}
+
+fn times(a: &Mat<f64>, factor: f64) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * factor)
+}
+
+impl Change {
+    /// Unit of a coordinate by its name: a modal amplitude, the rotation `... rx`, or a displacement.
+    fn coordinate(self, name: &str) -> f64 {
+        let last = name.rsplit(' ').next().unwrap_or(name);
+        if name.starts_with("fixed-interface mode ") {
+            self.modal()
+        } else if last.starts_with('r') {
+            1.0
+        } else {
+            self.of(0, 1, 0)
+        }
+    }
+
+    fn coordinates(self, given: &InterfaceCoordinates) -> InterfaceCoordinates {
+        let unit: Vec<f64> = given.names.iter().map(|name| self.coordinate(name)).collect();
+        let pairs = |a: &Mat<f64>, factor: f64| {
+            Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * factor / (unit[i] * unit[j]))
+        };
+        let of_modes = &given.of_modes;
+        InterfaceCoordinates {
+            names: given.names.clone(),
+            stiffness: pairs(&given.stiffness, self.of(2, 2, -2)),
+            mass: pairs(&given.mass, self.of(2, 2, 0)),
+            of_modes: Mat::from_fn(of_modes.nrows(), of_modes.ncols(), |i, j| {
+                of_modes[(i, j)] * unit[i] / self.modal()
+            }),
+        }
+    }
+}
+
+impl FlexBody {
+    /// The same body with every number in `units`, which count as stated. Modes stay mass-normalised: their
+    /// shapes change with the unit of mass. Geometric stiffness of a load that is known by its name only
+    /// keeps the unit of its load.
+    ///
+    /// # Errors
+    /// Those of [`FlexBody::new`], where numbers leave the range of double precision.
+    pub fn in_units(&self, units: &UnitSystem) -> Result<Self> {
+        let old = self.units();
+        let ratio = |old: f64, new: f64| old / new;
+        let change = Change {
+            mass: ratio(old.mass.to_si(), units.mass.to_si()),
+            length: ratio(old.length.to_si(), units.length.to_si()),
+            time: ratio(old.time.to_si(), units.time.to_si()),
+        };
+        let point = |x: &[f64; 3]| x.map(|v| v * change.length);
+        let mut parts: Parts = self.parts().clone();
+        parts.units = units.clone();
+        parts.frame.origin *= change.length;
+        parts.nodes.positions = parts.nodes.positions.iter().map(point).collect();
+        parts.modes = change.modes(&parts.modes);
+        parts.invariants = change.invariants(&parts.invariants);
+        parts.geometric_stiffness =
+            parts.geometric_stiffness.iter().map(|one| change.geometric(one)).collect();
+        parts.inertia_stiffness = parts.inertia_stiffness.as_ref().map(|own| change.inertia_stiffness(own));
+        let lumped =
+            |one: &LumpedBody| LumpedBody { invariants: change.invariants(&one.invariants), ..one.clone() };
+        parts.lumped = parts.lumped.iter().map(lumped).collect();
+        parts.certificate = change.certificate(&parts.certificate);
+        for interface in &mut parts.interfaces {
+            interface.reference = interface.reference.as_ref().map(point);
+        }
+        parts.coordinates = parts.coordinates.as_ref().map(|coordinates| change.coordinates(coordinates));
+        Self::new(parts)
+    }
+}

@@ -1,0 +1,114 @@
+//! Interfaces of a body: what a joint needs of them.
+
+use super::rigid_motion::{has_rotations, stacked};
+use faer::{Mat, MatRef};
+use flexbody_linalg::combine;
+use flexbody_model::{Coupling, InterfaceMotion, Nodes};
+
+/// A named interface of the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interface {
+    /// Name.
+    pub name: String,
+    /// Indices into the body's nodes.
+    pub nodes: Vec<usize>,
+    /// How the nodes are coupled to the reference point, where that was stated.
+    pub coupling: Option<Coupling>,
+    /// Reference point in the body frame; none of a free interface.
+    pub reference: Option<[f64; 3]>,
+}
+
+/// Displacement relative to the largest of the modes below which an interface is at rest, as one that the frame of the
+/// body stands on: rounding is not its deformation.
+const AT_REST: f64 = 1e-6;
+
+/// What the modes do at the reference point of an interface, in body axes: the rigid motion that fits that of
+/// the nodes best.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterfaceRows {
+    /// 3 x nf.
+    pub translation: Mat<f64>,
+    /// 3 x nf; none where the nodes lie on one line and determine no rotation.
+    pub rotation: Option<Mat<f64>>,
+    /// Root mean square over the nodes of what the fit leaves of the displacement (nf): zero where they move
+    /// as a rigid body.
+    pub misfit: Vec<f64>,
+    /// Root mean square over the nodes of their largest displacement in any mode, at least that of an interface at rest.
+    largest: f64,
+}
+
+impl InterfaceRows {
+    /// Translation and rotation of the reference point in every mode (6 x nf); `None` where no rotation is determined.
+    pub fn rigid_motion(&self) -> Option<Mat<f64>> {
+        self.rotation.as_ref().map(|rotation| stacked(&self.translation, rotation))
+    }
+
+    /// The mode in which the interface deforms most, and how much, relative to its largest motion in any
+    /// mode.
+    pub fn deformation(&self) -> (usize, f64) {
+        let worst = |most: (usize, f64), (j, &e): (usize, &f64)| if e > most.1 { (j, e) } else { most };
+        let (mode, misfit) = self.misfit.iter().enumerate().fold((0, 0.0), worst);
+        (mode, if self.largest > 0.0 { misfit / self.largest } else { 0.0 })
+    }
+}
+
+impl Interface {
+    /// The rows of the modes (`shape` and, where nodes have rotations, `rotation`: 3n x nf) at the reference
+    /// point; `None` without one, or where they are no finite numbers.
+    pub fn rows(
+        &self,
+        nodes: &Nodes,
+        shape: MatRef<'_, f64>,
+        rotation: Option<MatRef<'_, f64>>,
+        dimension: usize,
+    ) -> Option<InterfaceRows> {
+        let (d, k, nf) = (dimension, self.nodes.len(), shape.ncols());
+        let positions: Vec<[f64; 3]> = self.nodes.iter().map(|&i| nodes.positions[i]).collect();
+        let rotation =
+            rotation.filter(|rotation| self.nodes.iter().all(|&node| has_rotations(*rotation, node)));
+        let motion = InterfaceMotion::new(&positions, rotation.is_some(), d, Some(self.reference?));
+        let all =
+            Mat::from_fn(motion.rigid().nrows(), nf, |row, j| match (row.checked_sub(d * k), rotation) {
+                (Some(row), Some(rotation)) if d == 2 => rotation[(3 * self.nodes[row] + 2, j)],
+                (Some(row), Some(rotation)) => rotation[(3 * self.nodes[row / 3] + row % 3, j)],
+                _ => shape[(3 * self.nodes[row / d] + row % d, j)],
+            });
+        let q = motion.fit(all.as_ref());
+        let u = all.as_ref().subrows(0, d * k).to_owned();
+        let left = &u - combine(motion.rigid().subrows(0, d * k), q.as_ref());
+        let root_mean_square = |a: &Mat<f64>, j: usize| a.col(j).norm_l2() / (k as f64).sqrt();
+        let misfit: Vec<f64> = (0..nf).map(|j| root_mean_square(&left, j)).collect();
+        let at_rest = AT_REST * shape.norm_max();
+        let largest = (0..nf).map(|j| root_mean_square(&u, j)).fold(at_rest, f64::max);
+        let translation = Mat::from_fn(3, nf, |i, j| if i < d { q[(i, j)] } else { 0.0 });
+        let rotation = Mat::from_fn(3, nf, |i, j| match (d, i) {
+            (2, 0 | 1) => 0.0,
+            (2, _) => q[(2, j)],
+            _ => q[(3 + i, j)],
+        });
+        let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
+        let rotation = motion.is_determined().then_some(rotation);
+        let rows = InterfaceRows { translation, rotation, misfit, largest };
+        (finite(&rows.translation)
+            && rows.rotation.as_ref().is_none_or(finite)
+            && rows.misfit.iter().all(|v| v.is_finite()))
+        .then_some(rows)
+    }
+}
+
+/// K and M of a body in the motions of its interfaces and the amplitudes of its fixed-interface modes, and
+/// the transformation from its modes. In body axes: the coordinates of an interface are those of its
+/// reference point (three translations, three rotations; in the plane two and one) or, of a free one, the
+/// displacements of its nodes in the order of the nodes of the body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterfaceCoordinates {
+    /// What each of the nc coordinates is: those of the interfaces in their order, then the fixed-interface
+    /// modes.
+    pub names: Vec<String>,
+    /// K (nc x nc), with as many zero-energy motions as the body has rigid ones.
+    pub stiffness: Mat<f64>,
+    /// M (nc x nc).
+    pub mass: Mat<f64>,
+    /// B (nc x nf): coordinates B p for the amplitudes p of the modes, B'K B = diag(lambda), B'M B = I.
+    pub of_modes: Mat<f64>,
+}

@@ -1,0 +1,165 @@
+//! What must hold for a body in the coordinates of its interfaces.
+
+use super::{InterfaceCoordinates, Parts, ReferenceConditions};
+use crate::invariants::IdentityCheck;
+use faer::Mat;
+use flexbody_linalg::{combine, gram, largest};
+use flexbody_model::{rigid_count, rigid_fields, span};
+use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeSet;
+
+/// What the numbers of two ways to the same energy may differ by.
+const ENERGY: f64 = 1e-9;
+
+/// Rounding of B'M B, relative to the sum of the magnitudes of its summands, which cancel in slender bodies with many
+/// modes. Measured: 1e-16 to 2.8e-16 of these sums, which reach 2.5e9 for a bar of five thousand times its width with 240
+/// fixed-interface modes.
+const SUMMANDS: f64 = 4.0 * f64::EPSILON;
+
+/// Motion that rounding leaves an interface on which the frame stands, relative to the largest displacement of the mode.
+const AT_REST: f64 = 1e-9;
+
+impl Parts {
+    /// The identity of a frame that stands on an interface: its reference point is the origin and moves in no mode.
+    pub(super) fn frame_at_rest(&self) -> Option<IdentityCheck> {
+        let ReferenceConditions::Interface(name) = &self.conditions else { return None };
+        let interface = self.interfaces.iter().find(|interface| interface.name == *name)?;
+        let reference = interface.reference?;
+        let rotation = self.modes.rotation.as_ref().map(Mat::as_ref);
+        let rows = interface.rows(&self.nodes, self.modes.shape.as_ref(), rotation, self.dimension)?;
+        // A rotation displaces the nodes of the interface by their distances; a single node has none.
+        let places: Vec<[f64; 3]> = interface.nodes.iter().map(|&i| self.nodes.positions[i]).collect();
+        let (extent, own) = (span(&self.nodes.positions), span(&places));
+        let arm = if own > 0.0 { own } else { extent };
+        // Rotations of a single node that rests are zeros, as those of nodes without rotations.
+        let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
+        let moved = |j: usize| {
+            let turned = rows.rotation.as_ref().map_or(unknown, |rotation| arm * rotation.col(j).norm_max());
+            rows.translation.col(j).norm_max().max(turned) / self.modes.shape.col(j).norm_max()
+        };
+        let modes = (0..self.modes.shape.ncols()).map(moved);
+        let displaced = reference.iter().map(|x| x.abs() / extent);
+        Some(IdentityCheck::new(
+            "frame_on_interface",
+            "the reference point is the origin and rests in every mode",
+            largest(modes.chain(displaced)),
+            AT_REST + 4.0 * self.storage.rounding(),
+        ))
+    }
+
+    /// What must hold for the interface coordinates: they carry the energies of the modes and the mass of the
+    /// rigid body.
+    pub fn interface_identities(&self) -> Vec<IdentityCheck> {
+        let Some(coordinates) = &self.coordinates else { return Vec::new() };
+        let InterfaceCoordinates { stiffness, mass, of_modes, .. } = coordinates;
+        let twice = |a: &Mat<f64>, b: &Mat<f64>| gram(b.as_ref(), combine(a.as_ref(), b.as_ref()).as_ref());
+        let (energy, inertia) = (twice(stiffness, of_modes), twice(mass, of_modes));
+        let root: Vec<f64> = self.modes.eigenvalue.iter().map(|l| l.sqrt()).collect();
+        let nf = root.len();
+        let worst = |f: &dyn Fn(usize, usize) -> f64, rows: usize, columns: usize| {
+            let places = (0..rows).flat_map(|i| (0..columns).map(move |j| (i, j)));
+            largest(places.map(|(i, j)| f(i, j).abs()))
+        };
+        let identity = |i: usize, j: usize| f64::from(i == j);
+        let mut checks = vec![
+            IdentityCheck::new(
+                "interface_stiffness",
+                "B' K B = diag(lambda)",
+                worst(&|i, j| energy[(i, j)] / (root[i] * root[j]) - identity(i, j), nf, nf),
+                // What K makes of rigid motion is in the shapes, but not in the modes.
+                ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
+            ),
+            interface_mass(&inertia, &twice(&magnitudes(mass), &magnitudes(of_modes))),
+        ];
+        if let Some(rigid) = self.rigid_coordinates() {
+            let (expected, own) = (self.rigid_mass(), twice(mass, &rigid));
+            let r = rigid.ncols();
+            checks.push(IdentityCheck::new(
+                "interface_rigid_mass",
+                "R' M R = [m, -c~; c~, I0]",
+                worst(
+                    &|i, j| (own[(i, j)] - expected[(i, j)]) / (expected[(i, i)] * expected[(j, j)]).sqrt(),
+                    r,
+                    r,
+                ),
+                ENERGY,
+            ));
+            let (energy, first) = (twice(stiffness, &rigid), root.first().map_or(1.0, |root| root * root));
+            checks.push(IdentityCheck::new(
+                "interface_rigid_motion",
+                "R' K R = 0 beside lambda_1 R' M R",
+                worst(&|i, j| energy[(i, j)] / (first * (expected[(i, i)] * expected[(j, j)]).sqrt()), r, r),
+                ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
+            ));
+        }
+        checks
+    }
+
+    /// R (nc x 6, in the plane nc x 3): rigid motion about the origin of the body frame in interface
+    /// coordinates. `None` when the coordinates are not those of the interfaces.
+    pub fn rigid_coordinates(&self) -> Option<Mat<f64>> {
+        let (coordinates, d) = (self.coordinates.as_ref()?, self.dimension);
+        let fields = |positions: &[[f64; 3]]| rigid_fields(positions, d, [0.0; 3], 1.0);
+        let mut rows: Vec<Vec<f64>> = Vec::new();
+        for interface in &self.interfaces {
+            let positions = match interface.reference {
+                Some(reference) => vec![reference],
+                None => {
+                    let nodes: BTreeSet<usize> = interface.nodes.iter().copied().collect();
+                    nodes.into_iter().map(|i| self.nodes.positions[i]).collect()
+                }
+            };
+            let moved = fields(&positions);
+            rows.extend((0..moved.nrows()).map(|i| moved.row(i).iter().copied().collect()));
+            if interface.reference.is_some() {
+                rows.extend(
+                    (d..rigid_count(d))
+                        .map(|turn| (0..rigid_count(d)).map(|column| f64::from(column == turn)).collect()),
+                );
+            }
+        }
+        let size = coordinates.names.len();
+        let modal = coordinates.names.iter().filter(|name| name.starts_with("fixed-interface mode ")).count();
+        // Rotations of the nodes of a free interface are not told from the interface alone.
+        (rows.len() + modal == size).then(|| {
+            Mat::from_fn(size, rigid_count(d), |i, j| rows.get(i).map_or(0.0, |row: &Vec<f64>| row[j]))
+        })
+    }
+
+    /// The mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the origin of
+    /// the body frame, body axes: translations, then rotations.
+    pub fn rigid_mass(&self) -> Mat<f64> {
+        let (m, c, inertia) =
+            (self.invariants.mass(), self.invariants.first_moment(), self.invariants.inertia());
+        let lever: Matrix3<f64> = Vector3::cross_matrix(&c);
+        // Translations and rotations that are there: in the plane two and the third.
+        let axes: Vec<usize> = if self.dimension == 2 { vec![0, 1, 5] } else { (0..6).collect() };
+        Mat::from_fn(axes.len(), axes.len(), |i, j| match (axes[i], axes[j]) {
+            (i, j) if i < 3 && j < 3 => m * f64::from(i == j),
+            (i, j) if i < 3 => -lever[(i, j - 3)],
+            (i, j) if j < 3 => lever[(i - 3, j)],
+            (i, j) => inertia[(i - 3, j - 3)],
+        })
+    }
+}
+
+fn magnitudes(a: &Mat<f64>) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)].abs())
+}
+
+/// Checks B'M B = I against the rounding of its summands, whose magnitudes add up to `sums`: the entry that misses its
+/// limit by most.
+fn interface_mass(product: &Mat<f64>, sums: &Mat<f64>) -> IdentityCheck {
+    let n = product.nrows();
+    let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+    let check = |(i, j): (usize, usize)| {
+        let value = (product[(i, j)] - f64::from(i == j)).abs();
+        IdentityCheck::new("interface_mass", "B' M B = I", value, ENERGY + SUMMANDS * sums[(i, j)])
+    };
+    let worse = |a: IdentityCheck, b: IdentityCheck| {
+        let is_worse = b.value.is_nan() || b.value / b.limit > a.value / a.limit;
+        if is_worse { b } else { a }
+    };
+    let none = IdentityCheck::new("interface_mass", "B' M B = I", 0.0, ENERGY);
+    entries.map(check).fold(none, worse)
+}

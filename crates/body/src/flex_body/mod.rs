@@ -1,0 +1,39 @@
+//! The product: a validated flexible body, independent of the files it came from and goes to.
+
+mod body;
+mod carried;
+mod cross_checks;
+mod fixed_interface;
+mod frames;
+mod in_units;
+mod interface;
+mod interface_identities;
+mod modal_change;
+mod model_axes;
+mod model_rows;
+mod parts;
+mod reduced;
+mod reference_conditions;
+mod rigid_motion;
+mod rounded;
+mod softening;
+mod storage;
+mod terms;
+mod validate;
+
+pub use crate::invariants::{Frame, Group, Groups};
+pub use body::FlexBody;
+pub use carried::Carrier;
+pub use fixed_interface::FixedInterface;
+pub use flexbody_model::{GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
+pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
+pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
+pub use model_axes::stiffness_about;
+pub use parts::{
+    Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
+    is_static,
+};
+pub use reference_conditions::ReferenceConditions;
+pub use softening::{SOFTENING, axis_in_words};
+pub use storage::Storage;
+pub use terms::TermDecision;

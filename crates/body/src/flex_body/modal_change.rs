@@ -1,0 +1,226 @@
+//! Changes of the modal coordinates of a body: to mean axes, or to normalised modes in the frame that it has
+//! (theory 5.2).
+
+use super::rigid_motion::{rotations_without, shapes_without};
+use crate::invariants::{GeneralTerms, Invariants, symmetric_part};
+use faer::Mat;
+use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
+
+/// Part of the squared M-norm that rigid motion leaves of a motion of the modes, below which the motion is rigid.
+const RIGID: f64 = 1e-10;
+
+/// Modes psi' = (Psi - R(x) A) X with the rigid motions R about the origin of the frame. Nodal motions that the
+/// frame and the modes span together stay the same.
+#[derive(Debug, Clone)]
+pub struct ModalChange {
+    /// X (nf x nf').
+    modes: Mat<f64>,
+    /// A (6 x nf): translation and rotation that is taken from each old mode; `None` if the frame stays tied to the
+    /// body as it is.
+    taken: Option<Mat<f64>>,
+    /// Rigid motions among the modes, which are left out.
+    left_out: RigidMotions,
+}
+
+/// Rigid motions that a set of modes spans.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RigidMotions {
+    /// Dimension of the span.
+    pub count: usize,
+    /// Modes (from 0) that are rigid motions by themselves.
+    pub modes: Vec<usize>,
+}
+
+impl RigidMotions {
+    /// `modes 1, 4 are rigid motions`, `3 combinations of the modes are rigid motions`; `None` without any.
+    pub fn in_words(&self) -> Option<String> {
+        let named =
+            |modes: &[usize]| modes.iter().map(|j| (j + 1).to_string()).collect::<Vec<_>>().join(", ");
+        match (self.count, self.modes.len()) {
+            (0, _) => None,
+            (1, 1) => Some(format!("mode {} is a rigid motion", named(&self.modes))),
+            (count, own) if count == own => Some(format!("modes {} are rigid motions", named(&self.modes))),
+            (1, _) => Some("a combination of the modes is a rigid motion".to_owned()),
+            (count, 0) => Some(format!("{count} combinations of the modes are rigid motions")),
+            (count, _) => Some(format!(
+                "{count} combinations of the modes are rigid motions, among them modes {}",
+                named(&self.modes)
+            )),
+        }
+    }
+}
+
+/// Rigid motions of a dimension, among three translations and three rotations.
+fn rigid_axes(dimension: usize) -> &'static [usize] {
+    if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
+}
+
+/// The modes split by what rigid motion leaves of them.
+struct Split {
+    /// A (6 x nf): the rigid motion that is nearest to each mode in the norm of M.
+    rigid: Mat<f64>,
+    /// Z (nf x nf'): combinations of the modes that deform the body, orthonormal in m_ff and in what is left of it.
+    deforming: Mat<f64>,
+    /// Part of the squared M-norm that rigid motion leaves of each of them.
+    left: Vec<f64>,
+    rigid_motions: RigidMotions,
+}
+
+impl Split {
+    fn new(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
+        let nf = invariants.n_modes();
+        let mass = invariants.mass_matrix();
+        let axes = rigid_axes(dimension);
+        let (rigid, coupling) = (
+            Mat::from_fn(axes.len(), axes.len(), |i, j| mass[(axes[i], axes[j])]),
+            Mat::from_fn(axes.len(), nf, |i, j| mass[(axes[i], 6 + j)]),
+        );
+        let Some(lower) = dense_cholesky(rigid) else {
+            return Err("the mass matrix of rigid motion is not positive definite".to_owned());
+        };
+        let whitened = solve_lower(&lower, &coupling);
+        let modal = Mat::from_fn(nf, nf, |i, j| mass[(6 + i, 6 + j)]);
+        let beside = |i: usize, j: usize| {
+            modal[(i, j)] - (0..axes.len()).map(|k| whitened[(k, i)] * whitened[(k, j)]).sum::<f64>()
+        };
+        let own = |j: usize| beside(j, j) / modal[(j, j)];
+        if let Some(j) = (0..nf).find(|&j| own(j) < -RIGID) {
+            return Err(format!(
+                "mode {} and rigid motion together have negative kinetic energy: mass, coupling and modal mass do not belong together",
+                j + 1
+            ));
+        }
+        // What is left of m_ff, relative to it: squared sines of the angles to rigid motion.
+        let Some(modal_lower) = dense_cholesky(modal.clone()) else {
+            return Err("modes depend on each other: their mass matrix is not positive definite".to_owned());
+        };
+        let half = solve_lower(&modal_lower, &Mat::from_fn(nf, nf, beside));
+        let relative = symmetric_part(&solve_lower(&modal_lower, &half.transpose().to_owned()));
+        let Some(eigen) = symmetric_eigen(relative.as_ref()) else {
+            return Err("the modal mass holds numbers that are not finite".to_owned());
+        };
+        let count = eigen.values.iter().filter(|left| **left <= RIGID).count();
+        if count == nf {
+            return Err("all modes are rigid motions: nothing deforms the body".to_owned());
+        }
+        let vectors = eigen.vectors.as_ref().subcols(count, nf - count).to_owned();
+        let nearest = solve_upper(&lower, &whitened);
+        let row = |k: usize| axes.iter().position(|axis| *axis == k);
+        Ok(Self {
+            rigid: Mat::from_fn(6, nf, |k, j| row(k).map_or(0.0, |row| nearest[(row, j)])),
+            deforming: solve_upper(&modal_lower, &vectors),
+            left: eigen.values[count..].to_vec(),
+            rigid_motions: RigidMotions { count, modes: (0..nf).filter(|&j| own(j) <= RIGID).collect() },
+        })
+    }
+}
+
+/// Rigid motions among the modes of a body in space.
+///
+/// # Errors
+/// The reason in words if the mass is that of no body.
+pub fn rigid_motions(invariants: &Invariants) -> Result<RigidMotions, String> {
+    Split::new(invariants, 3).map(|split| split.rigid_motions)
+}
+
+impl ModalChange {
+    /// The change to mean axes: the rigid part is taken out of the modes, and these are normalised.
+    ///
+    /// # Errors
+    /// The reason in words: modes that depend on each other or deform nothing, a stiffness that is not positive.
+    pub(crate) fn to_mean_axes(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
+        let split = Split::new(invariants, dimension)?;
+        // Z scaled by what is left: orthonormal in the mass beside rigid motion.
+        let scaled = Mat::from_fn(split.deforming.nrows(), split.left.len(), |i, j| {
+            split.deforming[(i, j)] / split.left[j].sqrt()
+        });
+        let modes = eigenmodes(invariants, &scaled)?;
+        Ok(Self { modes, taken: Some(split.rigid), left_out: split.rigid_motions })
+    }
+
+    /// The change to normalised modes in the frame that the body has: rigid motions among the modes are left out,
+    /// m_ff becomes the unit matrix and K_ff diagonal.
+    ///
+    /// # Errors
+    /// Every error of `ModalChange::to_mean_axes`.
+    pub fn in_own_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
+        let split = Split::new(invariants, dimension)?;
+        let modes = eigenmodes(invariants, &split.deforming)?;
+        Ok(Self { modes, taken: None, left_out: split.rigid_motions })
+    }
+
+    /// Rigid motions among the modes, which are left out.
+    pub fn left_out(&self) -> &RigidMotions {
+        &self.left_out
+    }
+
+    /// X'A X.
+    pub fn congruent(&self, a: &Mat<f64>) -> Mat<f64> {
+        symmetric_part(&(self.modes.transpose() * a * &self.modes))
+    }
+
+    /// Displacements of nodes (3n x nf) at `positions` in the new modes.
+    pub fn shapes(&self, shape: &Mat<f64>, positions: &[[f64; 3]]) -> Mat<f64> {
+        match &self.taken {
+            Some(taken) => shapes_without(taken, shape, positions) * &self.modes,
+            None => shape * &self.modes,
+        }
+    }
+
+    /// Rotations of nodes (3n x nf) in the new modes; nodes without rotations, whose rows are zeros, keep them.
+    pub fn rotations(&self, rotation: &Mat<f64>) -> Mat<f64> {
+        match &self.taken {
+            Some(taken) => rotations_without(taken, rotation) * &self.modes,
+            None => rotation * &self.modes,
+        }
+    }
+
+    /// The invariants in the new modes (see [`Invariants::without_rigid_motion`] for masses that do not commute with
+    /// rotations).
+    pub fn invariants(&self, old: &Invariants) -> Invariants {
+        let tied = self.taken.as_ref().map(|taken| old.without_rigid_motion(taken.as_ref()));
+        normalised(tied.as_ref().unwrap_or(old).with_basis(self.modes.as_ref()))
+    }
+}
+
+/// Invariants whose stored modal mass, if they have one of their own, is the unit matrix.
+fn normalised(new: Invariants) -> Invariants {
+    let Some(general) = new.general().cloned() else { return new };
+    let (groups, count) = (new.groups(), new.n_modes());
+    new.with_general(GeneralTerms { modal_mass: Mat::identity(count, count), ..general }).with_groups(groups)
+}
+
+/// The diagonal of K_ff, ascending: rounding may have exchanged entries that repeat.
+pub fn diagonal_eigenvalues(invariants: &Invariants) -> Vec<f64> {
+    let mut largest = 0.0f64;
+    let mut next = |j: usize| {
+        largest = largest.max(invariants.modal_stiffness()[(j, j)]);
+        largest
+    };
+    (0..invariants.n_modes()).map(&mut next).collect()
+}
+
+/// Residuals |K x - lambda x| / (2 lambda) of the unit vectors x in the reduced stiffness.
+pub fn reduced_residuals(invariants: &Invariants, eigenvalue: &[f64]) -> Vec<f64> {
+    let k = invariants.modal_stiffness();
+    let beside = |j: usize| (0..eigenvalue.len()).filter(|i| *i != j).map(|i| k[(i, j)].powi(2)).sum::<f64>();
+    eigenvalue.iter().enumerate().map(|(j, l)| beside(j).sqrt() / (2.0 * l)).collect()
+}
+
+/// Eigenmodes of K_ff in the span of `basis` (nf x nf'), whose mass is the unit matrix.
+fn eigenmodes(invariants: &Invariants, basis: &Mat<f64>) -> Result<Mat<f64>, String> {
+    let stiffness = symmetric_part(&(basis.transpose() * invariants.modal_stiffness() * basis));
+    let eigen = symmetric_eigen(stiffness.as_ref());
+    let Some(eigen) = eigen.filter(|eigen| eigen.values.first().is_some_and(|first| *first > 0.0)) else {
+        return Err("the stiffness of the modes is not positive definite beside their mass".to_owned());
+    };
+    let mut modes = basis * &eigen.vectors;
+    for j in 0..modes.ncols() {
+        // The largest part of each new mode keeps its sign.
+        let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
+        if modes.col(j).iter().fold(0.0, larger) < 0.0 {
+            (0..modes.nrows()).for_each(|i| modes[(i, j)] = -modes[(i, j)]);
+        }
+    }
+    Ok(modes)
+}

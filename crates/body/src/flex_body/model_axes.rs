@@ -1,0 +1,168 @@
+//! A body in a frame along the axes of its model.
+
+use super::{FlexBody, GeometricStiffness, InternalRows, LumpedBody, ReferenceConditions, UnitLoad};
+use crate::invariants::InertiaStiffness;
+use faer::{Mat, MatRef, Scale};
+use flexbody_base::error::Result;
+use flexbody_model::LoadKind;
+use nalgebra::{Matrix3, Vector3};
+
+/// Direction cosines up to this are rounding.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
+
+impl FlexBody {
+    /// The same body in a frame whose axes are those of the model and whose origin is at `origin` (body
+    /// frame). Nothing but the description changes: modal coordinates, mode shapes in space and energies stay
+    /// what they are. Interface coordinates are left out.
+    ///
+    /// Positions x' = A (x - d), shapes A psi with A = `frame().axes`; the invariants by (5.1) of the theory.
+    /// Geometric stiffness for spin and angular acceleration about the new origin follows from that for
+    /// acceleration, a = a' - alpha x d - omega x (omega x d).
+    ///
+    /// # Errors
+    /// Every error of [`FlexBody::new`], when numbers overflow.
+    pub fn in_model_axes(&self, origin: Vector3<f64>) -> Result<Self> {
+        let mut body = self.in_frame(origin, self.frame().axes.transpose())?;
+        // Without the rounding of a product of axes with their transpose.
+        body.parts_mut().frame.axes = Matrix3::identity();
+        Ok(body)
+    }
+
+    /// Returns the body in a frame at `origin` with the columns of `axes` as axes, both in the body frame: as
+    /// [`FlexBody::in_model_axes`].
+    ///
+    /// # Errors
+    /// Every error of [`FlexBody::new`], when numbers overflow.
+    pub fn in_frame(&self, origin: Vector3<f64>, axes: Matrix3<f64>) -> Result<Self> {
+        let (to_new, to_body) = (axes.transpose(), axes);
+        let mut parts = self.parts().clone();
+        if !parts.conditions.is_mean() && origin != Vector3::zeros() {
+            // The frame is tied to the interface as before, but its origin is elsewhere.
+            parts.conditions = ReferenceConditions::Unstated;
+        }
+        parts.frame.origin += parts.frame.axes * origin;
+        parts.frame.axes *= axes;
+        let moved = |x: &[f64; 3]| (to_new * (Vector3::from(*x) - origin)).into();
+        parts.nodes.positions = parts.nodes.positions.iter().map(moved).collect();
+        for interface in &mut parts.interfaces {
+            interface.reference = interface.reference.as_ref().map(moved);
+        }
+        parts.modes.shape = turned(parts.modes.shape.as_ref(), &to_new, usize::MAX);
+        parts.modes.rotation =
+            parts.modes.rotation.map(|rotation| turned(rotation.as_ref(), &to_new, usize::MAX));
+        parts.modes.internal = parts.modes.internal.map(|internal| internal.in_axes(&to_body));
+        parts.invariants = parts.invariants.shifted(origin).rotated(&to_body);
+        parts.lumped = parts
+            .lumped
+            .into_iter()
+            .map(|lumped| LumpedBody {
+                invariants: lumped.invariants.shifted(origin).rotated(&to_body),
+                ..lumped
+            })
+            .collect();
+        parts.geometric_stiffness = self.geometric_stiffness_in(&origin, &to_body);
+        parts.inertia_stiffness = self.inertia_stiffness_in(&origin, &to_body);
+        parts.coordinates = None;
+        Self::new(parts)
+    }
+
+    /// The geometric stiffness of unit loads about the point `d` and along the columns of `axes`, both in the body
+    /// frame.
+    pub fn geometric_stiffness_in(
+        &self,
+        d: &Vector3<f64>,
+        axes: &Matrix3<f64>,
+    ) -> Vec<GeometricStiffness<Mat<f64>>> {
+        along(&stiffness_about(self.geometric_stiffness(), d, self.dimension()), axes)
+    }
+
+    /// The stiffness of inertia about the point `d` and along the columns of `axes`, both in the body frame; `None`
+    /// where the body has none.
+    pub fn inertia_stiffness_in(&self, d: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<InertiaStiffness> {
+        let (own, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
+        if *d == Vector3::zeros() && *axes == Matrix3::identity() {
+            return Some(own.clone());
+        }
+        let rotation = turned(rotation.as_ref(), &axes.transpose(), usize::MAX);
+        Some(own.in_frame(d, axes, rotation.as_ref(), self.dimension()))
+    }
+}
+
+impl InternalRows {
+    /// Returns the rows with their vectors along the columns of `axes`; rows that are no vectors, which come last,
+    /// stay.
+    pub fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
+        let shape = turned(self.shape.as_ref(), &axes.transpose(), vectors(self));
+        Self { dofs: self.dofs.clone(), shape }
+    }
+}
+
+/// Rows of vectors, three per vector: they stand first, and are labelled with the directions 1, 2, 3.
+fn vectors(internal: &InternalRows) -> usize {
+    let complete =
+        |dofs: &[[i64; 2]]| dofs.len() == 3 && (0..3).all(|k| dofs[k] == [dofs[0][0], (k + 1) as i64]);
+    3 * internal.dofs.chunks(3).take_while(|dofs| complete(dofs)).count()
+}
+
+/// Vectors in groups of three rows, in other axes; rows from `end` on stay.
+fn turned(shape: MatRef<'_, f64>, axes: &Matrix3<f64>, end: usize) -> Mat<f64> {
+    Mat::from_fn(shape.nrows(), shape.ncols(), |row, j| {
+        if row >= end {
+            return shape[(row, j)];
+        }
+        let (first, k) = (row / 3 * 3, row % 3);
+        (0..3).map(|l| axes[(k, l)] * shape[(first + l, j)]).sum()
+    })
+}
+
+/// Geometric stiffness for motion of the point `d` instead of the origin.
+pub fn stiffness_about(
+    given: &[GeometricStiffness<Mat<f64>>],
+    d: &Vector3<f64>,
+    dimension: usize,
+) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let mut all = given.to_vec();
+    if *d == Vector3::zeros() {
+        return all;
+    }
+    let unit = |axis: usize| Vector3::ith(axis, 1.0);
+    for one in given.iter().filter(|one| one.load.kind == LoadKind::Acceleration) {
+        let along = one.load.component;
+        for kind in [LoadKind::AngularAcceleration, LoadKind::Spin] {
+            for &component in kind.of_dimension(dimension) {
+                let acceleration = match kind {
+                    LoadKind::Spin => {
+                        let (a, b) = LoadKind::SPIN[component];
+                        let part = |a: usize, b: usize| unit(a).cross(&unit(b).cross(d));
+                        if a == b { part(a, b) } else { part(a, b) + part(b, a) }
+                    }
+                    _ => unit(component).cross(d),
+                };
+                let part = &one.matrix * Scale(-acceleration[along]);
+                if acceleration[along] != 0.0 {
+                    add(&mut all, UnitLoad { kind: kind.clone(), component }, part);
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Geometric stiffness for loads along the columns of `axes` (present axes).
+fn along(given: &[GeometricStiffness<Mat<f64>>], axes: &Matrix3<f64>) -> Vec<GeometricStiffness<Mat<f64>>> {
+    let mut all = Vec::new();
+    for GeometricStiffness { load, matrix } in given {
+        let factors = load.along(axes).into_iter().enumerate().filter(|(_, factor)| factor.abs() > ROUNDING);
+        for (component, factor) in factors {
+            add(&mut all, UnitLoad { kind: load.kind.clone(), component }, matrix * Scale(factor));
+        }
+    }
+    all
+}
+
+fn add(all: &mut Vec<GeometricStiffness<Mat<f64>>>, load: UnitLoad, part: Mat<f64>) {
+    match all.iter_mut().find(|known| known.load == load) {
+        Some(sum) => sum.matrix += part,
+        None => all.push(GeometricStiffness { load, matrix: part }),
+    }
+}

@@ -1,0 +1,116 @@
+//! The stiffness that the centrifugal terms of a body take where geometric stiffness does not make up for them (theory
+//! section 7).
+
+use super::FlexBody;
+use faer::{Mat, Scale};
+use flexbody_model::LoadKind;
+use nalgebra::{Matrix3, Vector3};
+
+/// Part of the stiffness of a motion at which the centrifugal term counts.
+pub const SOFTENING: f64 = 0.01;
+
+/// Steps of the search for the worst axis at the most, and the growth below which it ends.
+const STEPS: usize = 40;
+const GROWTH: f64 = 1e-9;
+
+impl FlexBody {
+    /// The largest part of its stiffness that any motion loses by the centrifugal terms at the angular velocity
+    /// `omega`, axes of the body, with the stiffness of inertia. `None` when K_ff is not positive definite, or when the
+    /// body does not hold W2.
+    pub fn softening(&self, omega: &Vector3<f64>) -> Option<f64> {
+        Some(self.softest_motion(omega)?.0)
+    }
+
+    /// Spin rate about axis `axis` of the model at which the centrifugal terms take 1 % of the stiffness of the motion
+    /// that they soften most: the root of 0.01 over the [part](FlexBody::softening) at unit spin. `None` where nothing
+    /// moves across the axis. Unit: 1/time.
+    ///
+    /// # Panics
+    /// When `axis` is not below 3.
+    pub fn softening_rate(&self, axis: usize) -> Option<f64> {
+        let omega_body = self.frame().axes.transpose() * Vector3::ith(axis, 1.0);
+        let part = self.softening(&omega_body)?;
+        (part > 0.0).then(|| (SOFTENING / part).sqrt())
+    }
+
+    /// The axis about which a spin softens most, in axes of the model, of unit length with its largest component
+    /// positive, and the part that a unit of spin takes: the motion that a spin softens most tells the axis that softens
+    /// it most, and so on, from each of the three axes. Of a plane body the normal.
+    pub fn worst_spin(&self) -> Option<(Vector3<f64>, f64)> {
+        if self.dimension() == 2 {
+            return Some((Vector3::z(), self.softening(&Vector3::z())?));
+        }
+        let from_axis = |axis: usize| -> Option<(Vector3<f64>, f64)> {
+            let mut omega = Vector3::ith(axis, 1.0);
+            let (mut part, mut motion) = self.softest_motion(&omega)?;
+            for _ in 0..STEPS {
+                let next = largest_direction(&self.softening_of(&motion)?);
+                let (greater, other) = self.softest_motion(&next)?;
+                let is_done = greater <= part * (1.0 + GROWTH);
+                if greater > part {
+                    (omega, part, motion) = (next, greater, other);
+                }
+                if is_done {
+                    break;
+                }
+            }
+            Some((omega, part))
+        };
+        let all = (0..3).map(from_axis).collect::<Option<Vec<_>>>()?;
+        let (omega, part) = all.into_iter().reduce(|a, b| if b.1 > a.1 * (1.0 + GROWTH) { b } else { a })?;
+        let omega = self.frame().axes * omega;
+        Some((if omega[omega.iamax()] < 0.0 { -omega } else { omega }, part))
+    }
+
+    /// The part at `omega`, and the motion that is softened most, of unit stiffness.
+    fn softest_motion(&self, omega: &Vector3<f64>) -> Option<(f64, Vec<f64>)> {
+        let own = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
+        let spins = own.filter(|one| one.load.kind == LoadKind::Spin);
+        let of_inertia = spins.fold(None, |sum: Option<Mat<f64>>, one| {
+            let (k, l) = LoadKind::SPIN[one.load.component];
+            let own = &one.matrix * Scale(omega[k] * omega[l]);
+            Some(match sum {
+                Some(sum) => sum + own,
+                None => own,
+            })
+        });
+        self.invariants().softening(omega, of_inertia.as_ref())
+    }
+
+    /// S with the part w'S w that a spin w takes of the stiffness of `motion`, of unit stiffness.
+    fn softening_of(&self, motion: &[f64]) -> Option<Matrix3<f64>> {
+        let (nf, w2) = (self.n_modes(), self.invariants().w2()?);
+        let quadratic = |entry: &dyn Fn(usize, usize) -> f64| -> f64 {
+            (0..nf).map(|i| motion[i] * (0..nf).map(|j| entry(i, j) * motion[j]).sum::<f64>()).sum()
+        };
+        let mut parts = Matrix3::from_fn(|a, b| quadratic(&|i, j| w2[(a * nf + i, b * nf + j)]));
+        for one in self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness) {
+            if one.load.kind == LoadKind::Spin {
+                let (k, l) = LoadKind::SPIN[one.load.component];
+                parts[(k, l)] -= quadratic(&|i, j| one.matrix[(i, j)]);
+            }
+        }
+        Some((parts + parts.transpose()) * 0.5)
+    }
+}
+
+/// Cosine of the angle to a coordinate axis up to which a direction is called by its name.
+const ALONG: f64 = 1.0 - 1e-9;
+
+/// `z`, or `(0.707, 0.707, 0)` of an axis that is none of the coordinate axes.
+pub fn axis_in_words(axis: &Vector3<f64>) -> String {
+    let unit = axis.normalize();
+    match (0..3).find(|&k| unit[k].abs() >= ALONG) {
+        Some(k) => ["x", "y", "z"][k].to_owned(),
+        None => {
+            let [x, y, z] = [0, 1, 2].map(|k| format!("{:.3}", unit[k] + 0.0));
+            format!("({x}, {y}, {z})")
+        }
+    }
+}
+
+/// The eigenvector of the largest eigenvalue.
+fn largest_direction(s: &Matrix3<f64>) -> Vector3<f64> {
+    let eigen = s.symmetric_eigen();
+    eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned()
+}

@@ -1,0 +1,348 @@
+//! The exact condensation: one pass over the mass matrix turns nodes and shapes into the primary data.
+//!
+//! All of theory section 2 is one weighted Gram matrix X' Ms X of the columns X =
+//! [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]. Columns are taken in panels of a fixed width (20 modes:
+//! one panel, so that the mass matrix is read once), rows in chunks of a fixed length; chunks belong to
+//! groups that depend on the number of nodes only, and groups are summed in order. The result is therefore
+//! the same to the last bit at any number of threads, and no sum is longer than a chunk, the chunks of a
+//! group or the groups: rounding does not grow with the model.
+
+use super::{Groups, Invariants, PrimaryData};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use flexbody_linalg::SymmetricMatrix;
+use nalgebra::{Matrix3, Vector3};
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows per dense product: the longest plain sum. Shorter chunks cost time, longer ones digits.
+pub(super) const CHUNK: usize = 128;
+/// Upper bound of the number of partial sums kept until they are added in order.
+pub(super) const MAX_GROUPS: usize = 64;
+/// Columns per pass over the mass matrix.
+const PANEL: usize = 64;
+/// The same of more than twice as many: a pass gathers the columns before its own once more.
+const WIDE_PANEL: usize = 192;
+/// Columns of a panel that are summed at a time, in registers.
+pub(super) const LANE: usize = 16;
+
+/// A part of a row of a panel.
+pub(super) type Lane = [f64; LANE];
+
+/// A symmetric mass on the nodes, the same for every direction.
+pub(super) trait NodalMass: Sync {
+    /// Number of rows.
+    fn count(&self) -> usize;
+
+    /// Lane `lane` of row `i` of Ms X, for `x` with `lanes` lanes per node.
+    fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane;
+}
+
+/// The consistent mass Ms.
+impl NodalMass for SymmetricMatrix {
+    fn count(&self) -> usize {
+        self.n()
+    }
+
+    #[inline(always)] // compiled once per instruction set
+    fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
+        let mut sum = [0.0; LANE];
+        let (columns, values) = self.row(i);
+        for (&j, &value) in columns.iter().zip(values) {
+            for (s, x) in sum.iter_mut().zip(&x[j as usize * lanes + lane]) {
+                *s += value * x;
+            }
+        }
+        sum
+    }
+}
+
+/// A diagonal (lumped) mass: one number per node.
+impl NodalMass for [f64] {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    #[inline(always)] // compiled once per instruction set
+    fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane {
+        x[i * lanes + lane].map(|x| self[i] * x)
+    }
+}
+
+/// Condenses the nodal equations of motion exactly into the primary data (theory section 2).
+///
+/// m = 1' Ms 1, c_k = 1' Ms x_k, J_kl = x_k' Ms x_l, C1_k = 1' Ms Psi_k, Ibar_kl = x_k' Ms Psi_l,
+/// S_kl = Psi_k' Ms Psi_l, for M = Ms kron I3.
+///
+/// * `mass`: Ms (n x n). Unit: mass.
+/// * `positions`: node positions in the frame that the result refers to. Unit: length. Any origin is right;
+///   digits are kept best with the origin at the centre of mass ([`super::choose_frame`]). Rows of Ms beyond
+///   them are vectors that rigid motion does not move (bubbles): their 1 and x are zero.
+/// * `shapes`: 3n x nf, row 3 i + k is component k of row i of Ms along the axes of the same frame; any
+///   basis.
+/// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
+///
+/// J and the diagonal blocks S_kk are exactly symmetric and S_lk = S_kl' exactly. The result does not depend
+/// on the number of threads.
+///
+/// ```
+/// use faer::{Mat, mat};
+/// use flexbody_body::invariants::condense;
+/// use flexbody_linalg::{CscMatrix, SymmetricMatrix};
+///
+/// // A bar of mass 6 along x from -1 to 1, one linear element, and its stretch as the only mode.
+/// let entries = [(0, 0, 2.0), (0, 1, 1.0), (1, 0, 1.0), (1, 1, 2.0)];
+/// let mass = SymmetricMatrix::new(CscMatrix::from_triplets(2, 2, &entries)).expect("symmetric");
+/// let shapes = mat![[-1.0], [0.0], [0.0], [1.0], [0.0], [0.0f64]];
+/// let body = condense(&mass, &[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]], shapes.as_ref(), Mat::zeros(1, 1));
+/// assert_eq!((body.mass(), body.inertia()[(2, 2)]), (6.0, 2.0)); // m l^2 / 12
+/// assert_eq!(body.w1().map(|w1| w1[(2, 2)]), Some(4.0)); // I_zz(q) = 2 (1 + q)^2 = 2 + 4 q + 2 q^2
+/// ```
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn condense(
+    mass: &SymmetricMatrix,
+    positions: &[[f64; 3]],
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+) -> Invariants {
+    condense_with(mass, positions, shapes, modal_stiffness)
+}
+
+/// [`condense`] for any nodal mass.
+pub(super) fn condense_with<M: NodalMass + ?Sized>(
+    mass: &M,
+    positions: &[[f64; 3]],
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+) -> Invariants {
+    let columns = SolidColumns { positions, shapes };
+    columns.assert_sizes(mass, modal_stiffness.as_ref());
+    let gram = weighted_gram(mass, columns);
+    from_gram(gram.as_ref(), modal_stiffness)
+}
+
+/// The primary data from the Gram matrix of [`SolidColumns`].
+pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Invariants {
+    let nf = modal_stiffness.ncols();
+    let psi = |k: usize, p: usize| 4 + 3 * p + k;
+    let (mass, first_moment, second_moment) = rigid_part(gram);
+    Invariants(PrimaryData {
+        mass,
+        first_moment,
+        second_moment,
+        c1: Mat::from_fn(3, nf, |k, p| gram[(0, psi(k, p))]),
+        ibar: array(|k| array(|l| (0..nf).map(|p| gram[(1 + k, psi(l, p))]).collect())),
+        s: array(|k| array(|l| Mat::from_fn(nf, nf, |p, q| gram[(psi(k, p), psi(l, q))]))),
+        modal_stiffness,
+        general: None,
+        groups: Groups::ALL,
+    })
+}
+
+/// m, c and J of rigid motion alone.
+pub(super) fn condense_rigid<M: NodalMass + ?Sized>(
+    mass: &M,
+    positions: &[[f64; 3]],
+) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    let no_modes = Mat::<f64>::zeros(3 * mass.count(), 0);
+    rigid_part(weighted_gram(mass, SolidColumns { positions, shapes: no_modes.as_ref() }).as_ref())
+}
+
+pub(super) fn rigid_part(gram: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
+    let first_moment = Vector3::from_fn(|k, _| gram[(0, 1 + k)]);
+    (gram[(0, 0)], first_moment, Matrix3::from_fn(|k, l| gram[(1 + k, 1 + l)]))
+}
+
+/// An array of three from its index.
+fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
+    std::array::from_fn(f)
+}
+
+/// The columns X = [1, x, y, z, psi_1x, psi_1y, psi_1z, psi_2x, ...]; 1, x, y, z are zero beyond the
+/// positions.
+#[derive(Clone, Copy)]
+pub(super) struct SolidColumns<'a> {
+    pub positions: &'a [[f64; 3]],
+    pub shapes: MatRef<'a, f64>,
+}
+
+impl SolidColumns<'_> {
+    /// # Panics
+    /// When the sizes of mass, positions, shapes and modal stiffness disagree.
+    pub(super) fn assert_sizes<M: NodalMass + ?Sized>(&self, mass: &M, modal_stiffness: MatRef<'_, f64>) {
+        let nf = self.shapes.ncols();
+        assert!(mass.count() >= self.positions.len(), "a row of Ms for every position");
+        assert_eq!(self.shapes.nrows(), 3 * mass.count(), "rows of the shapes: three per row of Ms");
+        assert_eq!(modal_stiffness.shape(), (nf, nf), "modal stiffness: one row per mode");
+    }
+
+    pub(super) fn count(&self) -> usize {
+        4 + 3 * self.shapes.ncols()
+    }
+
+    /// Rows of X.
+    pub(super) fn rows(&self) -> usize {
+        self.shapes.nrows() / 3
+    }
+
+    #[inline]
+    pub(super) fn get(&self, i: usize, column: usize) -> f64 {
+        match column {
+            0..4 if i >= self.positions.len() => 0.0,
+            0 => 1.0,
+            1..4 => self.positions[i][column - 1],
+            _ => self.shapes[(3 * i + (column - 4) % 3, (column - 4) / 3)],
+        }
+    }
+
+    /// Copies some columns of the nodes `first`, `first + 1`, ... into rows of `width` values, as many as
+    /// there is room for.
+    pub(super) fn by_node(&self, first: usize, columns: Range<usize>, width: usize, rows: &mut [f64]) {
+        for (slot, column) in columns.enumerate() {
+            for (k, row) in rows.chunks_exact_mut(width).enumerate() {
+                row[slot] = self.get(first + k, column);
+            }
+        }
+    }
+}
+
+/// Zeros that begin at a cache line: the dense kernels meet the same alignment in every run.
+pub(super) struct Aligned {
+    values: Vec<f64>,
+    start: usize,
+}
+
+impl Aligned {
+    const LINE: usize = 8;
+
+    pub(super) fn zeros(len: usize) -> Self {
+        let values = vec![0.0; len + Self::LINE];
+        let start = values.as_ptr().align_offset(64).min(Self::LINE);
+        Self { values, start }
+    }
+
+    fn get(&self) -> &[f64] {
+        &self.values[self.start..self.values.len() + self.start - Self::LINE]
+    }
+
+    pub(super) fn get_mut(&mut self) -> &mut [f64] {
+        let end = self.values.len() + self.start - Self::LINE;
+        &mut self.values[self.start..end]
+    }
+}
+
+/// X' Ms X, exactly symmetric.
+fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
+    let n_columns = columns.count();
+    let mut gram = Mat::<f64>::zeros(n_columns, n_columns);
+    let width = if n_columns > 2 * WIDE_PANEL { WIDE_PANEL } else { PANEL };
+    for start in (0..n_columns).step_by(width) {
+        // Rows of X' beyond the panel are the transpose of a later panel.
+        let end = (start + width).min(n_columns);
+        let panel = gram_panel(mass, columns, start..end);
+        fill_symmetric(&mut gram, start..end, |row, column| panel[(row, column - start)]);
+    }
+    gram
+}
+
+/// Some columns of a symmetric matrix down to the diagonal, and their mirror image.
+pub(super) fn fill_symmetric(
+    matrix: &mut Mat<f64>,
+    columns: Range<usize>,
+    value: impl Fn(usize, usize) -> f64,
+) {
+    for column in columns {
+        for row in 0..=column {
+            matrix[(row, column)] = value(row, column);
+            matrix[(column, row)] = matrix[(row, column)];
+        }
+    }
+}
+
+/// Nodes of a group: the partition depends on the number of nodes `n` only.
+pub(super) fn group_length(n: usize) -> usize {
+    CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
+}
+
+/// The sum of what each group of the `n` nodes contributes to a matrix of this size, in the order of the
+/// groups.
+pub(super) fn sum_of_groups(
+    n: usize,
+    (rows, columns): (usize, usize),
+    contribution: impl Fn(Range<usize>) -> Mat<f64> + Sync,
+) -> Mat<f64> {
+    let group = group_length(n);
+    let partial: Vec<Mat<f64>> = (0..n.div_ceil(group))
+        .into_par_iter()
+        .map(|g| contribution(g * group..((g + 1) * group).min(n)))
+        .collect();
+    let mut total = Mat::<f64>::zeros(rows, columns);
+    for part in &partial {
+        total += part;
+    }
+    total
+}
+
+/// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the
+/// panel.
+fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel: Range<usize>) -> Mat<f64> {
+    let n = columns.rows();
+    let lanes = panel.len().div_ceil(LANE);
+    let (before, width) = (panel.start, lanes * LANE);
+    let mut x = Aligned::zeros(n * width);
+    x.get_mut().par_chunks_mut(CHUNK * width).enumerate().for_each(|(chunk, rows)| {
+        columns.by_node(chunk * CHUNK, panel.clone(), width, rows);
+    });
+    let x = x.get();
+    let x_lanes = x.as_chunks::<LANE>().0;
+    let arch = Arch::new();
+    sum_of_groups(n, (before + width, width), |nodes| {
+        let mut product = Aligned::zeros(CHUNK * width);
+        let mut earlier = Aligned::zeros(CHUNK * before);
+        let mut sum = Mat::<f64>::zeros(before + width, width);
+        for first in nodes.clone().step_by(CHUNK) {
+            let rows = CHUNK.min(nodes.end - first);
+            let product = &mut product.get_mut()[..rows * width];
+            let targets = product.as_chunks_mut::<LANE>().0;
+            arch.dispatch(MassTimes { mass, first, x: x_lanes, lanes, targets });
+            // Rows of nodes are columns of the transpose.
+            let transposed = |values, width| MatRef::from_column_major_slice(values, width, rows);
+            let product = transposed(product, width).transpose();
+            let (top, bottom) = sum.as_mut().split_at_row_mut(before);
+            if before > 0 {
+                let earlier = &mut earlier.get_mut()[..rows * before];
+                columns.by_node(first, 0..before, before, earlier);
+                matmul(top, Accum::Add, transposed(earlier, before), product, 1.0, Par::Seq);
+            }
+            let own = transposed(&x[first * width..][..rows * width], width);
+            matmul(bottom, Accum::Add, own, product, 1.0, Par::Seq);
+        }
+        sum
+    })
+}
+
+/// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for. (Not a closure, which may be
+/// compiled apart from the function that has the instruction set, without it.)
+pub(super) struct MassTimes<'a, M: ?Sized> {
+    pub mass: &'a M,
+    pub first: usize,
+    pub x: &'a [Lane],
+    pub lanes: usize,
+    pub targets: &'a mut [Lane],
+}
+
+impl<M: NodalMass + ?Sized> WithSimd for MassTimes<'_, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        for (k, row) in self.targets.chunks_exact_mut(self.lanes).enumerate() {
+            for (lane, target) in row.iter_mut().enumerate() {
+                *target = self.mass.row_times(self.first + k, self.x, self.lanes, lane);
+            }
+        }
+    }
+}

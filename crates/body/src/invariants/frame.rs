@@ -1,0 +1,232 @@
+//! The body frame: its choice from the mass and the undeformed nodes, and the change of nodes and shapes to
+//! it.
+
+use super::condense::condense_rigid;
+use super::derived::inertia_of;
+use super::general::rigid_inertia;
+use super::principal_axes::principal_axes;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_linalg::{SymmetricMatrix, contiguous_mut};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// The body frame in model coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// Origin in model axes. Unit: length.
+    pub origin: Vector3<f64>,
+    /// Columns are the body axes in model axes, right-handed: x_model = origin + axes x_body.
+    pub axes: Matrix3<f64>,
+}
+
+impl Frame {
+    /// The model's own frame.
+    pub fn model() -> Self {
+        Self { origin: Vector3::zeros(), axes: Matrix3::identity() }
+    }
+
+    /// Body coordinates of points given in model coordinates: x_body = axes' (x_model - origin).
+    pub fn to_body(self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let to_body = self.axes.transpose();
+        positions.iter().map(|x| (to_body * (Vector3::from(*x) - self.origin)).into()).collect()
+    }
+
+    /// A position in body coordinates, in model coordinates: x_model = r0 + A0 x.
+    pub fn to_model(self, x: [f64; 3]) -> [f64; 3] {
+        (self.origin + self.axes * Vector3::from(x)).into()
+    }
+
+    /// Turns the components of shapes (3n x nf, row 3 i + k) from model axes to body axes, in place.
+    ///
+    /// # Panics
+    /// When the number of rows is not a multiple of three.
+    pub fn rotate_shapes(&self, shapes: &mut Mat<f64>) {
+        assert_eq!(shapes.nrows() % 3, 0, "three rows per node");
+        let to_body = self.axes.transpose();
+        let shapes: Vec<&mut [f64]> = shapes.col_iter_mut().map(contiguous_mut).collect();
+        shapes.into_par_iter().for_each(|shape| {
+            for node in shape.as_chunks_mut::<3>().0 {
+                *node = (to_body * Vector3::from(*node)).into();
+            }
+        });
+    }
+
+    /// Turns rigid fields (six columns: unit translations along the model axes, unit rotations about them; in
+    /// the plane two and one) to those of the body axes, in place.
+    ///
+    /// # Panics
+    /// When there are neither six columns nor three.
+    pub fn rotate_rigid(&self, fields: &mut Mat<f64>) {
+        // About z in the plane: the one rotation stays what it is.
+        let (d, groups) = match fields.ncols() {
+            3 => (2, 1),
+            6 => (3, 2),
+            other => panic!("{other} rigid fields, not 3 or 6"),
+        };
+        for row in 0..fields.nrows() {
+            for first in (0..groups).map(|group| group * d) {
+                let old = Vector3::from_fn(|l, _| if l < d { fields[(row, first + l)] } else { 0.0 });
+                (0..d).for_each(|k| fields[(row, first + k)] = self.axes.column(k).dot(&old));
+            }
+        }
+    }
+}
+
+/// Which body frame to use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum BodyFrame {
+    /// Origin at the centre of mass, axes of the model.
+    #[default]
+    Com,
+    /// Origin at the centre of mass, principal axes with ascending moments: I0 is diagonal.
+    Principal,
+    /// The frame of the model.
+    Model,
+}
+
+impl BodyFrame {
+    /// Every choice, in the order of the documentation.
+    pub const ALL: [BodyFrame; 3] = [Self::Com, Self::Principal, Self::Model];
+
+    /// Name in settings and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Principal => "principal",
+            Self::Com => "com",
+            Self::Model => "model",
+        }
+    }
+}
+
+/// Mass, centre of mass and inertia of the undeformed body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MassProperties {
+    /// m. Unit: mass.
+    pub mass: f64,
+    /// Centre of mass in model coordinates. Unit: length.
+    pub centre_of_mass: Vector3<f64>,
+    /// Inertia about the centre of mass, model axes. Unit: mass length^2.
+    pub inertia: Matrix3<f64>,
+    /// Principal moments about the centre of mass, ascending. Unit: mass length^2.
+    pub principal_moments: Vector3<f64>,
+}
+
+/// Finds the body frame and the mass properties from Ms (n x n) and the node positions (model coordinates).
+///
+/// Coordinates are centred at the middle of their bounding box before any product and at the centre of mass
+/// before the second moments are formed, so that a body far from the model's origin keeps the digits that its
+/// coordinates have. The origin is rounded to the spacing of numbers at its place: about a distant origin the
+/// first moment of the body frame is that rounding times m, not zero.
+///
+/// Axes are canonical: an axis of a distinct moment is positive along its largest component; axes of equal
+/// moments (to 1e-9 of the largest) are the projections of the model axes, so that a cube keeps the model
+/// axes.
+///
+/// # Errors
+/// `MassNotPositive` when 1' Ms 1 is not a positive finite number, `CoordinateNotFinite` when the moments are
+/// not finite.
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn choose_frame(
+    mass: &SymmetricMatrix,
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+) -> Result<(Frame, MassProperties)> {
+    scalar_frame(mass, positions, choice, false)
+}
+
+/// The same for a body that stays in the plane z = 0: the third axis is z whatever the moments are, the first
+/// the axis of the smaller moment in the plane.
+///
+/// # Errors
+/// As [`choose_frame`].
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn choose_plane_frame(
+    mass: &SymmetricMatrix,
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+) -> Result<(Frame, MassProperties)> {
+    scalar_frame(mass, positions, choice, true)
+}
+
+/// The same for any mass, given the matrix R'MR of its unit translations and unit rotations of a frame:
+/// 6x6, of a body in the plane (`dimension` 2) 3x3.
+///
+/// # Errors
+/// As [`choose_frame`].
+pub fn choose_general_frame(
+    rigid_mass: impl Fn(Frame) -> Mat<f64>,
+    positions: &[[f64; 3]],
+    dimension: usize,
+    choice: BodyFrame,
+) -> Result<(Frame, MassProperties)> {
+    frame_of(positions, choice, dimension == 2, |middle, offset| {
+        rigid_inertia(rigid_mass(Frame { origin: middle + offset, ..Frame::model() }).as_ref())
+    })
+}
+
+fn scalar_frame(
+    mass: &SymmetricMatrix,
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+    plane: bool,
+) -> Result<(Frame, MassProperties)> {
+    assert!(mass.n() >= positions.len(), "a row of Ms for every position");
+    let about =
+        |origin: Vector3<f64>, positions: &[[f64; 3]]| Frame { origin, ..Frame::model() }.to_body(positions);
+    // Twice: what is left of far coordinates is small, and so is its rounding.
+    frame_of(positions, choice, plane, |middle, offset| {
+        condense_rigid(mass, &about(offset, &about(middle, positions)))
+    })
+}
+
+/// Finds the frame from mass, first and second moment about a point, which is the sum of the two given.
+fn frame_of(
+    positions: &[[f64; 3]],
+    choice: BodyFrame,
+    plane: bool,
+    rigid: impl Fn(Vector3<f64>, Vector3<f64>) -> (f64, Vector3<f64>, Matrix3<f64>),
+) -> Result<(Frame, MassProperties)> {
+    let middle = bounding_box_middle(positions);
+    let (m, c, _) = rigid(middle, Vector3::zeros());
+    if !(m > 0.0 && m.is_finite()) {
+        let message = format!("the sum of the mass matrix over one direction is {m:e}");
+        return Err(Diagnostic::new(Code::MassNotPositive, message).into());
+    }
+    let offset = c / m;
+    let (_, c, j) = rigid(middle, offset);
+    let inertia = inertia_of(&j);
+    if !(inertia.iter().all(|v| v.is_finite()) && offset.iter().all(|v| v.is_finite())) {
+        let message = "moments of the mass overflow: coordinates are not finite or beyond 1e150";
+        return Err(Diagnostic::new(Code::CoordinateNotFinite, message).into());
+    }
+    let centre_of_mass = middle + (offset + c / m);
+    let mut axes = principal_axes(&inertia);
+    if plane {
+        let first = axes.column(0).into_owned();
+        axes = Matrix3::from_columns(&[first, Vector3::z().cross(&first), Vector3::z()]);
+    }
+    let principal_moments = (axes.transpose() * inertia * axes).diagonal();
+    let frame = match choice {
+        BodyFrame::Principal => Frame { origin: centre_of_mass, axes },
+        BodyFrame::Com => Frame { origin: centre_of_mass, axes: Matrix3::identity() },
+        BodyFrame::Model => Frame::model(),
+    };
+    Ok((frame, MassProperties { mass: m, centre_of_mass, inertia, principal_moments }))
+}
+
+fn bounding_box_middle(positions: &[[f64; 3]]) -> Vector3<f64> {
+    let mut low = Vector3::repeat(f64::INFINITY);
+    let mut high = Vector3::repeat(f64::NEG_INFINITY);
+    for x in positions {
+        low = low.inf(&Vector3::from(*x));
+        high = high.sup(&Vector3::from(*x));
+    }
+    // Halves first: the sum of two large coordinates could overflow.
+    if positions.is_empty() { Vector3::zeros() } else { low * 0.5 + high * 0.5 }
+}

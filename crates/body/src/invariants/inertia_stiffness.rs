@@ -1,0 +1,237 @@
+//! Stiffness of inertia: the terms of the kinetic energy that nodes with rotational mass add in second order of
+//! their rotations (theory section 6).
+//!
+//! A director e_a of a node that turns by theta in mode j and by phi in mode k moves, in second order, by
+//! u_jk = 1/2 [theta x (phi x e_a) + phi x (theta x e_a)]. With g_a the row of a director in E times a rigid motion
+//! of the whole body, the stiffness of that motion is
+//!
+//! ```text
+//! K_jk = sum over the directors g_a . u_jk = sum over the nodes theta' H phi,   H = sym(G) - tr(G) I,   G = sum_a e_a g_a'
+//! ```
+//!
+//! with g_a = h_a e_k for the acceleration along e_k, e_k x z_a for the angular acceleration about e_k and
+//! e_k x (e_l x z_a) (k = l, else both orders added) for the spin w_k w_l, of the moments h_a and z_a of the node.
+
+use super::softening::largest_relative_norm;
+use faer::{Mat, MatRef};
+use flexbody_linalg::{gram, zeros};
+use flexbody_model::{GeometricStiffness, LoadKind, NodeMoments, RigidAcceleration, UnitLoad};
+use nalgebra::{Matrix3, Vector3};
+
+/// The stiffnesses of inertia of a body, and what they follow from. They belong to the kinetic energy: to
+/// sections 6 and (7.4) of the theory, not to a stress.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InertiaStiffness {
+    /// Moments of every node of the body about the origin of its frame, body axes; zero for nodes whose
+    /// rotations carry no mass.
+    pub moments: Vec<NodeMoments>,
+    /// K^a, K^alpha and K^omega (nf x nf, symmetric) for the loads of [`InertiaStiffness::loads`], in that order.
+    pub stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+}
+
+impl InertiaStiffness {
+    /// The stiffnesses that follow from the moments of the nodes.
+    ///
+    /// * `rotation`: 3n x nf, rotations of the nodes in the modes, along the axes of the moments.
+    /// * `dimension`: 3, or 2 for a body in the plane.
+    ///
+    /// # Panics
+    /// When there are not three rows for each of the moments.
+    pub fn new(moments: Vec<NodeMoments>, rotation: MatRef<'_, f64>, dimension: usize) -> Self {
+        assert_eq!(rotation.nrows(), 3 * moments.len(), "three rotations for every node");
+        let turning = TurningNodes::new(&moments, rotation);
+        let of_load = |load: UnitLoad| {
+            let matrix = turning.sum(|moments| moments.of(&motion_of(&load)));
+            GeometricStiffness { load, matrix }
+        };
+        let stiffness = Self::loads(dimension).map(of_load).collect();
+        Self { moments, stiffness }
+    }
+
+    /// The loads that there is a stiffness for: acceleration of the origin less gravity, angular acceleration
+    /// and products of spin, along the axes of the frame.
+    pub fn loads(dimension: usize) -> impl Iterator<Item = UnitLoad> {
+        [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin].into_iter().flat_map(
+            move |kind| {
+                let components = kind.of_dimension(dimension).iter();
+                components.map(move |&component| UnitLoad { kind: kind.clone(), component })
+            },
+        )
+    }
+
+    /// The stiffnesses about the origin `d` and along the columns of `axes`, both in the present frame.
+    ///
+    /// z_a' = z_a - h_a d, then every index that stands for a direction is turned; `rotation` (3n x nf) is along
+    /// the new axes.
+    ///
+    /// # Panics
+    /// When there are not three rows for each of the moments.
+    pub fn in_frame(
+        &self,
+        d: &Vector3<f64>,
+        axes: &Matrix3<f64>,
+        rotation: MatRef<'_, f64>,
+        dimension: usize,
+    ) -> Self {
+        let moved = |own: &NodeMoments| NodeMoments {
+            first: axes.tr_mul(&own.first),
+            second: axes.transpose() * (own.second - own.first * d.transpose()) * axes,
+        };
+        Self::new(self.moments.iter().map(moved).collect(), rotation, dimension)
+    }
+
+    /// The stiffnesses with other rotations of the nodes (3n x nf): of other modes, or relative to another frame whose
+    /// origin and axes are the same before deformation.
+    ///
+    /// # Panics
+    /// When there are not three rows for each of the moments.
+    pub fn with_rotations(&self, rotation: MatRef<'_, f64>, dimension: usize) -> Self {
+        Self::new(self.moments.clone(), rotation, dimension)
+    }
+
+    /// Largest difference of the stiffnesses from those that the moments and the rotations of the nodes give,
+    /// relative to the largest sum of magnitudes for their kind of load: what nodes that turn against each other
+    /// leave of it may be small.
+    ///
+    /// # Panics
+    /// When there are not three rows for each of the moments.
+    pub fn deviation(&self, rotation: MatRef<'_, f64>, dimension: usize) -> f64 {
+        let own = self.with_rotations(rotation, dimension);
+        let magnitudes = Mat::from_fn(rotation.nrows(), rotation.ncols(), |i, j| rotation[(i, j)].abs());
+        let turning = TurningNodes::new(&self.moments, magnitudes.as_ref());
+        let size = |load: &UnitLoad| turning.sum(|moments| moments.of(&motion_of(load)).abs()).norm_max();
+        let largest = |kind: &LoadKind| {
+            let loads = Self::loads(dimension).filter(|load| load.kind == *kind);
+            loads.map(|load| size(&load)).fold(0.0, f64::max)
+        };
+        self.difference_of_stiffness(&own, &largest)
+    }
+
+    /// Largest difference of moments and stiffnesses from those of `other`, relative to the largest of their kind;
+    /// infinite when they have other sizes.
+    pub fn largest_difference(&self, other: &Self) -> f64 {
+        if self.moments.len() != other.moments.len() || self.stiffness.len() != other.stiffness.len() {
+            return f64::INFINITY;
+        }
+        let relative = |entries: &dyn Fn(&NodeMoments) -> Vec<f64>| {
+            let pairs = self.moments.iter().zip(&other.moments);
+            let pairs = pairs.flat_map(|(a, b)| entries(a).into_iter().zip(entries(b)));
+            let (mut difference, mut size) = (0.0f64, 0.0f64);
+            pairs.for_each(|(a, b)| (difference, size) = (difference.max((a - b).abs()), size.max(a.abs())));
+            if difference == 0.0 { 0.0 } else { difference / size }
+        };
+        let first = relative(&|own| own.first.iter().copied().collect());
+        let second = relative(&|own| own.second.iter().copied().collect());
+        let size = |kind: &LoadKind| {
+            let of_kind = self.stiffness.iter().filter(|one| one.load.kind == *kind);
+            of_kind.map(|one| one.matrix.norm_max()).fold(0.0, f64::max)
+        };
+        first.max(second).max(self.difference_of_stiffness(other, &size))
+    }
+
+    /// Largest difference of the stiffnesses, relative to the `size` of their kind.
+    fn difference_of_stiffness(&self, other: &Self, size: &dyn Fn(&LoadKind) -> f64) -> f64 {
+        let differences = self.stiffness.iter().zip(&other.stiffness).map(|(own, other)| {
+            if own.matrix.nrows() != other.matrix.nrows() {
+                return f64::INFINITY;
+            }
+            let difference = (&own.matrix - &other.matrix).norm_max();
+            if difference == 0.0 { 0.0 } else { difference / size(&own.load.kind) }
+        });
+        differences.fold(0.0, f64::max)
+    }
+}
+
+/// Largest parts of the stiffness of a motion that the stiffness of inertia has, over all directions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InertiaShares {
+    /// For a unit acceleration of the origin. Unit: time^2/length.
+    pub acceleration: f64,
+    /// For a unit angular acceleration. Unit: time^2.
+    pub angular_acceleration: f64,
+    /// For the square of a unit spin. Unit: time^2.
+    pub spin_squared: f64,
+}
+
+impl InertiaStiffness {
+    /// Upper bounds, over all directions of the load, of the part that a unit of it changes of the stiffness K_ff
+    /// of any motion; `None` where K_ff is not positive definite.
+    pub fn shares(&self, modal_stiffness: MatRef<'_, f64>) -> Option<InertiaShares> {
+        let of_kind = |kind: LoadKind| {
+            let own = self.stiffness.iter().filter(|one| one.load.kind == kind);
+            // w'K w has both orders of a pair of axes: half of its matrix each.
+            let matrices: Vec<Mat<f64>> = own
+                .map(|one| match (&kind, one.load.component) {
+                    (LoadKind::Spin, 3..) => &one.matrix * faer::Scale(0.5f64.sqrt()),
+                    _ => one.matrix.clone(),
+                })
+                .collect();
+            let matrices: Vec<_> = matrices.iter().map(Mat::as_ref).collect();
+            largest_relative_norm(&matrices, modal_stiffness)
+        };
+        Some(InertiaShares {
+            acceleration: of_kind(LoadKind::Acceleration)?,
+            angular_acceleration: of_kind(LoadKind::AngularAcceleration)?,
+            spin_squared: of_kind(LoadKind::Spin)?,
+        })
+    }
+}
+
+/// The nodes that have moments, and their rotations in the modes.
+struct TurningNodes<'m> {
+    moments: Vec<&'m NodeMoments>,
+    /// Three rows for each of them.
+    theta: Mat<f64>,
+}
+
+impl<'m> TurningNodes<'m> {
+    fn new(moments: &'m [NodeMoments], rotation: MatRef<'_, f64>) -> Self {
+        let turning: Vec<usize> = (0..moments.len()).filter(|&node| !is_zero(&moments[node])).collect();
+        let theta = Mat::from_fn(3 * turning.len(), rotation.ncols(), |row, j| {
+            rotation[(3 * turning[row / 3] + row % 3, j)]
+        });
+        Self { moments: turning.iter().map(|&node| &moments[node]).collect(), theta }
+    }
+
+    /// The sum over the nodes of theta' H theta, symmetric.
+    fn sum(&self, h: impl Fn(&NodeMoments) -> Matrix3<f64>) -> Mat<f64> {
+        let theta = &self.theta;
+        let mut turned = zeros(theta.nrows(), theta.ncols());
+        for (at, moments) in self.moments.iter().enumerate() {
+            let h = h(moments);
+            for j in 0..theta.ncols() {
+                let product = h * Vector3::from_fn(|k, _| theta[(3 * at + k, j)]);
+                (0..3).for_each(|k| turned[(3 * at + k, j)] = product[k]);
+            }
+        }
+        let k = gram(theta.as_ref(), turned.as_ref());
+        Mat::from_fn(k.nrows(), k.ncols(), |i, j| 0.5 * (k[(i, j)] + k[(j, i)]))
+    }
+}
+
+fn is_zero(moments: &NodeMoments) -> bool {
+    moments.first == Vector3::zeros() && moments.second == Matrix3::zeros()
+}
+
+/// The rigid motion that a unit load stands for.
+fn motion_of(load: &UnitLoad) -> RigidAcceleration {
+    let unit = |axis: usize| Vector3::ith(axis, 1.0);
+    let (zero, none) = (Vector3::zeros(), Matrix3::zeros());
+    match load.kind {
+        LoadKind::Acceleration => {
+            RigidAcceleration { linear: unit(load.component), angular: zero, spin: none }
+        }
+        LoadKind::AngularAcceleration => {
+            RigidAcceleration { linear: zero, angular: unit(load.component), spin: none }
+        }
+        LoadKind::Spin => {
+            let (k, l) = LoadKind::SPIN[load.component];
+            let product = unit(k) * unit(l).transpose();
+            let spin = if k == l { product } else { product + product.transpose() };
+            RigidAcceleration { linear: zero, angular: zero, spin }
+        }
+        LoadKind::Force(_) | LoadKind::Moment(_) | LoadKind::Named(_) => {
+            RigidAcceleration { linear: zero, angular: zero, spin: none }
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Lumped comparators: what nodal masses, as multibody programs import them, make of the same modes.
+
+use super::Invariants;
+use super::condense::condense_with;
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_linalg::SymmetricMatrix;
+
+/// Masses below this part of the largest count as zero: row sums that cancel leave rounding of either sign.
+const ZERO_MASS: f64 = 1e-14;
+
+/// How nodal masses come from the consistent mass matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum LumpedScheme {
+    /// Row sums of Ms: keeps mass and centre of mass; negative at the corners of quadratic elements.
+    RowSum,
+    /// The diagonal of Ms scaled to the mass: the form of HRZ lumping that the matrix alone allows.
+    DiagonalScaling,
+    /// Nodal masses given by the user.
+    User,
+}
+
+impl LumpedScheme {
+    /// Every scheme, in the order of the documentation.
+    pub const ALL: [LumpedScheme; 3] = [Self::RowSum, Self::DiagonalScaling, Self::User];
+
+    /// Name in files, reports and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RowSum => "row-sum",
+            Self::DiagonalScaling => "diagonal-scaling",
+            Self::User => "user",
+        }
+    }
+}
+
+/// Nodal masses of one scheme, in node order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LumpedMasses {
+    scheme: LumpedScheme,
+    masses: Vec<f64>,
+}
+
+impl LumpedMasses {
+    /// m_i = sum_j Ms_ij.
+    pub fn row_sum(mass: &SymmetricMatrix) -> Self {
+        let masses = (0..mass.n()).map(|i| mass.row(i).1.iter().sum()).collect();
+        Self { scheme: LumpedScheme::RowSum, masses }
+    }
+
+    /// m_i = Ms_ii m / sum_j Ms_jj, with m the sum of all entries.
+    ///
+    /// # Errors
+    /// `MassNotPositive` when the diagonal has no positive finite sum.
+    pub fn diagonal_scaling(mass: &SymmetricMatrix) -> Result<Self> {
+        let diagonal = mass.diagonal();
+        let total: f64 = Self::row_sum(mass).masses.iter().sum();
+        let sum: f64 = diagonal.iter().sum();
+        if !(sum > 0.0 && sum.is_finite()) {
+            let message =
+                format!("the diagonal of the mass matrix sums to {sum:e}: it cannot be scaled to the mass");
+            return Err(Diagnostic::new(Code::MassNotPositive, message).into());
+        }
+        let masses = diagonal.iter().map(|d| d * (total / sum)).collect();
+        Ok(Self { scheme: LumpedScheme::DiagonalScaling, masses })
+    }
+
+    /// Masses given by the user, one per node in node order. Unit: mass.
+    ///
+    /// # Errors
+    /// `LumpedMassTable` when their number is not `n_nodes`, one is not finite, or their sum is not positive.
+    pub fn user(masses: Vec<f64>, n_nodes: usize) -> Result<Self> {
+        let refuse = |message: String| Err(Diagnostic::new(Code::LumpedMassTable, message).into());
+        if masses.len() != n_nodes {
+            return refuse(format!("{} nodal masses for {n_nodes} nodes", masses.len()));
+        }
+        if let Some(i) = masses.iter().position(|m| !m.is_finite()) {
+            return refuse(format!("nodal mass {} (from 1) is {}", i + 1, masses[i]));
+        }
+        let total: f64 = masses.iter().sum();
+        if !(total > 0.0 && total.is_finite()) {
+            return refuse(format!("nodal masses sum to {total:e}"));
+        }
+        Ok(Self { scheme: LumpedScheme::User, masses })
+    }
+
+    /// The scheme.
+    pub fn scheme(&self) -> LumpedScheme {
+        self.scheme
+    }
+
+    /// The masses by node. Unit: mass.
+    pub fn masses(&self) -> &[f64] {
+        &self.masses
+    }
+
+    /// Number of nodes with a negative mass.
+    pub fn negative(&self) -> usize {
+        let zero = self.zero_bound();
+        self.masses.iter().filter(|&&m| m < -zero).count()
+    }
+
+    /// Number of nodes without mass: magnitude below 1e-14 of the largest, the rounding of a sum that
+    /// cancels.
+    pub fn zero(&self) -> usize {
+        let zero = self.zero_bound();
+        self.masses.iter().filter(|m| m.abs() <= zero).count()
+    }
+
+    fn zero_bound(&self) -> f64 {
+        ZERO_MASS * self.masses.iter().fold(0.0, |largest: f64, m| largest.max(m.abs()))
+    }
+}
+
+/// The primary data that lumped masses give with the same modes, about the SAME frame: [`super::condense`]
+/// with Ms = diag(masses). A centre of mass that moved shows as first moment.
+///
+/// # Panics
+/// When the sizes disagree.
+pub fn condense_lumped(
+    masses: &LumpedMasses,
+    positions: &[[f64; 3]],
+    shapes: MatRef<'_, f64>,
+    modal_stiffness: Mat<f64>,
+) -> Invariants {
+    assert_eq!(masses.masses.len(), positions.len(), "nodal masses and positions");
+    condense_with(masses.masses.as_slice(), positions, shapes, modal_stiffness)
+}

@@ -1,0 +1,80 @@
+//! What is wrong with a set of arrays, collected: shapes, numbers and texts that no body may have.
+
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use std::collections::HashSet;
+
+/// Invariants are sums of products: numbers beyond this overflow in them.
+pub(crate) const LARGEST: f64 = 1e300;
+
+/// Longest name of an interface or lumping scheme in bytes: it names a group in the file.
+const LONGEST_NAME: usize = 1000;
+
+/// The problems found so far.
+#[derive(Default)]
+pub(crate) struct Problems(Vec<Diagnostic>);
+
+impl Problems {
+    pub(crate) fn found(self) -> Vec<Diagnostic> {
+        self.0
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub(crate) fn extend(&mut self, more: Vec<Diagnostic>) {
+        self.0.extend(more);
+    }
+
+    pub(crate) fn add(&mut self, message: String) {
+        self.0.push(Diagnostic::new(Code::BodySchema, message));
+    }
+
+    /// Reports the first value that is not finite, or so large that what follows from it would not be.
+    pub(crate) fn finite(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
+        if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > LARGEST) {
+            self.add(format!(
+                "`{name}` has the value {v:e} at index {i}, expected finite numbers up to {LARGEST:e}"
+            ));
+        }
+    }
+
+    pub(crate) fn length(&mut self, name: &str, found: usize, expected: usize, per: &str) {
+        if found != expected {
+            self.add(format!("`{name}` has {found} values, expected {expected}, one per {per}"));
+        }
+    }
+
+    pub(crate) fn matrix(&mut self, name: &str, m: &Mat<f64>, rows: usize, columns: usize) {
+        if (m.nrows(), m.ncols()) != (rows, columns) {
+            let (r, c) = (m.nrows(), m.ncols());
+            self.add(format!("`{name}` is {r} x {c}, expected {rows} x {columns}"));
+        }
+        self.finite(name, values(m.as_ref()));
+    }
+
+    /// A text that the file can hold.
+    pub(crate) fn text(&mut self, name: &str, text: &str) {
+        if text.contains('\0') {
+            self.add(format!("`{name}` contains a NUL character, expected text"));
+        }
+    }
+
+    pub(crate) fn names<'a>(&mut self, what: &str, names: impl Iterator<Item = &'a String>) {
+        let mut seen = HashSet::new();
+        for name in names {
+            if name.is_empty() {
+                self.add(format!("empty name of {what}"));
+            } else if name.len() > LONGEST_NAME {
+                self.add(format!("name of {what} has {} bytes, expected at most {LONGEST_NAME}", name.len()));
+            } else if !seen.insert(name) {
+                self.add(format!("{what} `{name}` is given twice"));
+            }
+        }
+    }
+}
+
+fn values(m: MatRef<'_, f64>) -> impl Iterator<Item = f64> + '_ {
+    (0..m.ncols()).flat_map(move |j| (0..m.nrows()).map(move |i| m[(i, j)]))
+}

@@ -1,0 +1,431 @@
+//! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
+
+use crate::convert::{BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, rigid_mass};
+use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage};
+use crate::invariants::{
+    BodyFrame, DIGITS, IdentityCheck, Invariants, condense_certified, primary_differences,
+};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_eigen::{relative_residual, residual_scale, rounding_residual};
+use flexbody_linalg::{SymmetricMatrix, gram, larger, largest, largest_entry};
+use flexbody_model::{Damping, FeModel, GeometricStiffness, UnitLoad};
+use interfaces::interface_checks;
+use nalgebra::Vector3;
+use recounts::recounts;
+
+mod interfaces;
+mod recounts;
+
+/// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
+const RECOMPUTED: f64 = 1e-12;
+
+/// Name of K_ff among the [`primary_differences`].
+const STIFFNESS: &str = "modal_stiffness";
+
+/// What another evaluation of K psi may leave, in units of the rounding estimate eps | |K| |psi| |: the
+/// shapes were also turned into body axes and back.
+const ROUNDING: f64 = 30.0;
+
+/// Everything that must hold for `body` without its model: the identities of theory section 10, and the statements
+/// of the file that its own numbers can be held to.
+pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
+    let mut checks = body.identities(frame_of(body));
+    checks.extend(recounts(body));
+    checks
+}
+
+/// What the frame of `body` was meant to be.
+fn frame_of(body: &FlexBody) -> BodyFrame {
+    let name = body.source().settings["frame"].as_str();
+    BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model)
+}
+
+/// Refuses a body that [`own_identities`] would not pass: what is written is what `flexbody check` accepts.
+///
+/// # Errors
+/// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one for every identity that does not hold.
+pub fn accept(body: &FlexBody) -> Result<()> {
+    let failed = own_identities(body).into_iter().filter(|check| !check.passed);
+    let told: Vec<Diagnostic> = failed
+        .map(|check| {
+            let IdentityCheck { name, formula, value, limit, .. } = check;
+            let message = format!(
+                "the body breaks `{name}` ({formula}): {value:.1e}, where at most {limit:.1e} is rounding"
+            );
+            Diagnostic::new(Code::BodyUntrustworthy, message)
+        })
+        .collect();
+    if told.is_empty() { Ok(()) } else { Err(Error::new(told)) }
+}
+
+/// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) when the nodes differ.
+pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
+    let against = Recomputed::new(body, model)?;
+    let mut checks = vec![against.positions()];
+    checks.extend(against.invariants());
+    checks.extend(against.modes());
+    checks.extend(against.damping()?);
+    checks.extend(against.geometric_stiffness()?);
+    checks.extend(against.inertia_stiffness());
+    checks.extend(against.guarantee());
+    checks.extend(interface_checks(body, model));
+    Ok(checks)
+}
+
+/// Refuses a model with another dimension or other nodes.
+fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
+    if body.dimension() != model.dimension() {
+        let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    }
+    if body.nodes().ids != model.nodes().ids {
+        let message = format!(
+            "the body has {} nodes, the model {} with other numbers or in another order",
+            body.nodes().ids.len(),
+            model.nodes().ids.len()
+        );
+        return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+    }
+    Ok(())
+}
+
+/// A body beside what the matrices of its model say of the same modes.
+struct Recomputed<'a> {
+    body: &'a FlexBody,
+    model: &'a FeModel,
+    place: NodesInFrame,
+    modes: BodyModes,
+    /// K and M times the modes.
+    kx: Mat<f64>,
+    mx: Mat<f64>,
+    /// The invariants, condensed anew.
+    own: Invariants,
+    /// How far the stored ones are from these, by name.
+    differences: Vec<(String, f64)>,
+}
+
+impl<'a> Recomputed<'a> {
+    fn new(body: &'a FlexBody, model: &'a FeModel) -> Result<Self> {
+        check_comparable(body, model)?;
+        let place = NodesInFrame::new(model, *body.frame());
+        let Some(modes) = BodyModes::of_body(model, body) else {
+            let message = "the rows of the body's modes are not those of the model";
+            return Err(Diagnostic::new(Code::BodyIncomparable, message).into());
+        };
+        let pencil = model.pencil();
+        let kx = pencil.apply_stiffness(modes.vectors.as_ref());
+        let mx = pencil.apply_mass(modes.vectors.as_ref());
+        let modal_stiffness = gram(modes.vectors.as_ref(), kx.as_ref());
+        let own = modes.condensed(model, &place, modal_stiffness);
+        let differences = primary_differences(body.invariants(), &own);
+        Ok(Self { body, model, place, modes, kx, mx, own, differences })
+    }
+
+    /// The positions of the nodes in the body frame.
+    fn positions(&self) -> IdentityCheck {
+        let own = self.place.positions.iter().flatten();
+        let size = own.clone().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
+        let stored = self.body.nodes().positions.iter().flatten();
+        let moved = largest(own.zip(stored).map(|(a, b)| (a - b).abs()));
+        IdentityCheck::new("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12)
+    }
+
+    /// The largest difference of those invariants whose names are `kept`.
+    fn difference_of(&self, kept: impl Fn(&str) -> bool) -> f64 {
+        let kept = self.differences.iter().filter(|(name, _)| kept(name));
+        largest(kept.map(|(_, difference)| *difference))
+    }
+
+    /// What the body has of its mass, by two paths.
+    fn invariants(&self) -> [IdentityCheck; 2] {
+        let body = self.body;
+        // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that
+        // is more.
+        let inertia = body.invariants().inertia().diagonal();
+        let recomputed = RECOMPUTED
+            + body.storage().rounding()
+            + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
+        // Where m_ff = I was taken for granted, `orthonormal_recomputed` is about it.
+        let is_of_mass = |name: &str| name != STIFFNESS && (body.groups().w2 || name != "modal_mass");
+        [
+            IdentityCheck::new(
+                "invariants_recomputed",
+                "m, c, J, C1, Ibar, S from the matrices",
+                self.difference_of(is_of_mass),
+                recomputed,
+            ),
+            IdentityCheck::new(
+                "rigid_inertia_recomputed",
+                "R' M R = [m, -c~; c~, I0]",
+                rigid_inertia_error(body, &rigid_mass(self.model, body.frame())),
+                recomputed,
+            ),
+        ]
+    }
+
+    /// K_ff, the residuals and the orthonormality of the modes.
+    fn modes(&self) -> [IdentityCheck; 3] {
+        let (storage, modes) = (self.body.storage(), &self.modes.vectors);
+        let ModeErrors { residual, allowed_residual, stiffness } = self.mode_errors();
+        let orthonormality =
+            gram(modes.as_ref(), self.mx.as_ref()) - Mat::<f64>::identity(modes.ncols(), modes.ncols());
+        [
+            IdentityCheck::new(
+                "stiffness_recomputed",
+                "K_ff = Psi' K Psi",
+                self.difference_of(|name| name == STIFFNESS),
+                RECOMPUTED + storage.rounding() + stiffness,
+            ),
+            IdentityCheck::new(
+                "residual_recomputed",
+                "|K psi - lambda M psi| / (|K psi| + |lambda M psi|)",
+                residual,
+                2.0 * allowed_residual,
+            ),
+            IdentityCheck::new(
+                "orthonormal_recomputed",
+                "Psi' M Psi = I",
+                largest_entry(orthonormality.as_ref()),
+                1e-9 + storage.rounding(),
+            ),
+        ]
+    }
+
+    /// Residuals, and what rounding of products with K explains: K is huge beside its lowest eigenvalues, and
+    /// what its products round away is no error of the body.
+    fn mode_errors(&self) -> ModeErrors {
+        let (modes, storage) = (self.body.modes(), self.body.storage());
+        let rounding: Vec<f64> = rounding_residual(self.model.stiffness(), self.modes.vectors.as_ref())
+            .into_iter()
+            .map(|rounding| storage.roundings() * rounding)
+            .collect();
+        let (mut residual, mut stored, mut long, mut loose) = (0.0f64, 0.0f64, 0.0f64, 0.0f64);
+        for (j, &lambda) in modes.eigenvalue.iter().enumerate() {
+            let (k_psi, m_psi) = (self.kx.col(j), self.mx.col(j));
+            let size = residual_scale(k_psi, m_psi, lambda);
+            residual = larger(residual, relative_residual(k_psi, m_psi, lambda));
+            stored = stored.max(modes.residual[j]).max(ROUNDING * rounding[j] / size);
+            // |psi_p' d(K psi_q)| <= |psi_p| |d(K psi_q)|, relative to sqrt(lambda_p lambda_q).
+            long = long.max(self.modes.vectors.col(j).norm_l2() / lambda.sqrt());
+            loose = loose.max(rounding[j] / lambda.sqrt());
+        }
+        ModeErrors { residual, allowed_residual: stored, stiffness: long * loose }
+    }
+
+    fn damping(&self) -> Result<Option<IdentityCheck>> {
+        let found = damping_check(self.body, self.model, &self.modes.vectors, &self.own)?;
+        Ok(found.map(|found| {
+            let formula = "D_ff = Psi' D Psi, zeta = D_jj / (2 omega_j)";
+            IdentityCheck::new("damping_recomputed", formula, found.largest, found.allowed)
+        }))
+    }
+
+    fn geometric_stiffness(&self) -> Result<Option<IdentityCheck>> {
+        let found = geometric_check(self.body, self.model, &self.modes.vectors)?;
+        Ok(found.map(|found| {
+            let formula = "Psi' K_geo Psi for every unit load";
+            IdentityCheck::new("geometric_stiffness_recomputed", formula, found.largest, found.allowed)
+        }))
+    }
+
+    /// The stiffness of inertia, by the moments of the nodes and by the matrices.
+    fn inertia_stiffness(&self) -> Option<IdentityCheck> {
+        let own = self.modes.inertia_stiffness(self.model, &self.place.frame);
+        let formula = "moments of the nodes and stiffness of inertia from M";
+        let check = |value| {
+            let limit = RECOMPUTED + 4.0 * self.body.storage().rounding();
+            Some(IdentityCheck::new("inertia_stiffness_recomputed", formula, value, limit))
+        };
+        match (self.body.inertia_stiffness(), own) {
+            (None, None) => None,
+            (Some(stored), Some(own)) => check(own.largest_difference(stored)),
+            // Of a body that was made before there was any, or of another model.
+            (None, Some(_)) | (Some(_), None) => check(f64::INFINITY),
+        }
+    }
+
+    /// What accuracy `certified` guarantees, where it does.
+    fn guarantee(&self) -> Vec<IdentityCheck> {
+        let body = self.body;
+        if body.certificate().guarantee.is_some() && !self.model.has_exact_scalar_mass() {
+            let formula = "M as stored is what the bounds are about: the same along x, y and z";
+            let deviation = self.model.mass_deviation().max(f64::MIN_POSITIVE);
+            return vec![IdentityCheck::new("certified_mass", formula, deviation, 0.0)];
+        }
+        let (Some(guarantee), Some(mass)) = (&body.certificate().guarantee, self.model.scalar_mass()) else {
+            return Vec::new();
+        };
+        let (stored, shapes) = (&body.nodes().positions, self.modes.displacements.as_ref());
+        let own = condense_certified(mass, stored, shapes, self.model.stiffness(), &body.frame().axes);
+        vec![
+            IdentityCheck::new(
+                "digits_recomputed",
+                "invariants to their guaranteed digits",
+                excess_of_digits(body, guarantee, &own.invariants),
+                1.0,
+            ),
+            IdentityCheck::new(
+                "bounds_recomputed",
+                "psi' K psi / psi' M psi between the bounds of lambda",
+                outside_of_bounds(guarantee, &own.invariants),
+                1e-9 + body.certificate().rigid_noise,
+            ),
+        ]
+    }
+}
+
+/// Errors of modes that were computed anew, and what is allowed.
+struct ModeErrors {
+    /// Largest K-residual.
+    residual: f64,
+    /// The largest that was stored, or that rounding explains.
+    allowed_residual: f64,
+    /// What rounding explains in K_ff, relative to sqrt(lambda_p lambda_q).
+    stiffness: f64,
+}
+
+/// Largest difference of the invariants in units of what their guaranteed digits allow.
+fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) -> f64 {
+    let excess = |(name, difference): (String, f64)| {
+        let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| **known == name);
+        let scale = digits.map_or(1.0, |(_, digits)| 10f64.powf(*digits));
+        0.5 * difference * scale
+    };
+    largest(primary_differences(body.invariants(), own).into_iter().map(excess))
+}
+
+/// How far the Rayleigh quotient of a mode lies outside of the bounds of its eigenvalue at the most,
+/// relative. Stored modes are rounded: their quotients follow the eigenvalues to what any other check of
+/// modes allows.
+fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
+    let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
+    let modal_mass = own.modal_mass();
+    largest(bounds.enumerate().map(|(j, (lower, upper))| {
+        let quotient = own.modal_stiffness()[(j, j)] / modal_mass[(j, j)];
+        larger((lower - quotient) / lower, (quotient - upper) / upper)
+    }))
+}
+
+/// How far stored and recomputed matrices are from each other, relative to the largest entry, and what
+/// rounding allows.
+#[derive(Clone, Copy)]
+struct Difference {
+    largest: f64,
+    allowed: f64,
+}
+
+impl Difference {
+    /// Of entries up to `size`, recomputed with a rounding of `rounding`.
+    fn new(largest: f64, size: f64, rounding: f64) -> Self {
+        let relative = |value: f64| if value == 0.0 { 0.0 } else { value / size };
+        let rounding = if rounding > 0.0 { rounding } else { 0.0 };
+        // Twice the size is what two matrices of nothing but rounding differ by at the most.
+        Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
+    }
+
+    /// The one that comes closer to what is allowed, or goes further beyond it; one that is no number is
+    /// worst.
+    fn worse(self, other: Self) -> Self {
+        let is_worse = other.largest.is_nan() || other.largest * self.allowed > self.largest * other.allowed;
+        if is_worse { other } else { self }
+    }
+}
+
+/// What rounding leaves in |psi_p' A psi_q|, at the most.
+fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 {
+    let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
+    ROUNDING
+        * storage.roundings()
+        * longest
+        * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)
+}
+
+/// Stored damping against that of the model; `None` when neither has any.
+fn damping_check(
+    body: &FlexBody,
+    model: &FeModel,
+    shapes: &Mat<f64>,
+    own: &Invariants,
+) -> Result<Option<Difference>> {
+    let modes = body.modes();
+    let nf = modes.eigenvalue.len();
+    let found = modal_damping(model, shapes.as_ref(), &modes.eigenvalue, own)?;
+    if found.is_none()
+        && modes.modal_damping.is_none()
+        && modes.damping_ratio.iter().all(|ratio| *ratio == 0.0)
+    {
+        return Ok(None);
+    }
+    let none = || Mat::zeros(nf, nf);
+    let (matrix, ratio) =
+        found.map_or_else(|| (none(), vec![0.0; nf]), |damping| (damping.matrix, damping.ratio));
+    let stored = modes.modal_damping.clone().unwrap_or_else(none);
+    let by_ratio =
+        |(j, lambda): (usize, &f64)| 2.0 * lambda.sqrt() * (ratio[j] - modes.damping_ratio[j]).abs();
+    let by_matrix = largest_entry((&stored - &matrix).as_ref());
+    let largest = modes.eigenvalue.iter().enumerate().map(by_ratio).fold(by_matrix, larger);
+    let rounding = match model.damping() {
+        Some(Damping::Matrix(d)) => rounding_of(d, shapes, body.storage()),
+        Some(Damping::Rayleigh { beta, .. }) => beta * rounding_of(model.stiffness(), shapes, body.storage()),
+        _ => 0.0,
+    };
+    Ok(Some(Difference::new(largest, matrix.norm_max().max(stored.norm_max()), rounding)))
+}
+
+/// Stored geometric stiffness against that of the model; `None` when neither has any.
+fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
+    let nf = shapes.ncols();
+    let shift = match body.conditions() {
+        // Given about the centre of mass.
+        ReferenceConditions::Interface(_) => -body.invariants().first_moment() / body.invariants().mass(),
+        _ => Vector3::zeros(),
+    };
+    let found = modal_geometric_stiffness(model, shapes.as_ref(), &body.frame().axes, &shift)?;
+    let stored = body.geometric_stiffness();
+    let matrix_of = |list: &[GeometricStiffness<Mat<f64>>], load: &UnitLoad| {
+        let one = list.iter().find(|one| one.load == *load);
+        one.map_or_else(|| Mat::zeros(nf, nf), |one| one.matrix.clone())
+    };
+    let loads = stored.iter().chain(&found).map(|one| &one.load);
+    let difference = |load: &UnitLoad| {
+        let (stored, own) = (matrix_of(stored, load), matrix_of(&found, load));
+        // Every component of the kind may contribute.
+        let given = model.geometric_stiffness().iter().filter(|one| one.load.kind == load.kind);
+        let rounding = given.map(|one| rounding_of(&one.matrix, shapes, body.storage())).sum();
+        let size = stored.norm_max().max(own.norm_max());
+        Difference::new(largest_entry((&stored - &own).as_ref()), size, rounding)
+    };
+    Ok(loads.map(difference).reduce(Difference::worse))
+}
+
+/// How far R'MR of the unit translations and rotations of the body frame (in the plane 3 x 3) is from m, c
+/// and I0 of the body, relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
+fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
+    let own = body.parts().rigid_mass();
+    let error = |i: usize, j: usize| (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
+    largest((0..own.nrows()).flat_map(|i| (0..own.ncols()).map(move |j| error(i, j))))
+}
+
+/// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.
+pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
+    let files = &body.source().files;
+    files
+        .iter()
+        .enumerate()
+        .filter_map(|(i, file)| {
+            // Several files may have one role: they are compared in their order.
+            let before = files[..i].iter().filter(|other| other.role == file.role).count();
+            let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
+            (now.sha256 != file.sha256).then(|| {
+                let message =
+                    format!("{} file {} has other bytes than {} had", file.role, now.name, file.name);
+                Diagnostic::new(Code::BodySourceChanged, message)
+            })
+        })
+        .collect()
+}

@@ -1,0 +1,63 @@
+//! Interfaces of a body against those of its model.
+
+use crate::convert::interfaces_in_frame;
+use crate::flex_body::{FlexBody, Interface};
+use crate::invariants::IdentityCheck;
+use flexbody_model::{FeModel, centre_and_length};
+use std::collections::BTreeSet;
+
+/// Reference points agree to rounding of the change of frame, relative to the coordinates of the nodes.
+const PLACE: f64 = 1e-12;
+
+/// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies of files before
+/// reference points were stored have none. A body of an earlier version has the mean of the nodes where the model
+/// states no point, which is accepted.
+pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<IdentityCheck> {
+    let (stored, own) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
+    if stored.is_empty() && own.is_empty() {
+        return Vec::new();
+    }
+    let of = |name: &str| stored.iter().find(|interface| interface.name == name);
+    let unknown =
+        stored.iter().filter(|interface| own.iter().all(|other| other.name != interface.name)).count();
+    let differing =
+        own.iter().filter(|own| of(&own.name).is_none_or(|stored| !is_same(stored, own, model))).count();
+    let positions = body.nodes().positions.iter().flatten();
+    let size = positions.fold(body.frame().origin.amax().max(f64::MIN_POSITIVE), |m, x| m.max(x.abs()));
+    let apart = |x: [f64; 3], y: [f64; 3]| (0..3).map(|k| (x[k] - y[k]).abs()).fold(0.0, f64::max) / size;
+    let moved = own.iter().filter_map(|own| {
+        let (x, y) = (own.reference?, of(&own.name)?.reference?);
+        let away = apart(x, y);
+        let set = model.interfaces().iter().find(|set| set.name == own.name)?;
+        let mean = || {
+            let positions: Vec<[f64; 3]> = own.nodes.iter().map(|&i| body.nodes().positions[i]).collect();
+            centre_and_length(&positions).0
+        };
+        Some(if set.reference.is_stated() { away } else { away.min(apart(mean(), y)) })
+    });
+    vec![
+        IdentityCheck::new(
+            "interfaces",
+            "number of interfaces with other names, nodes or coupling than in the model",
+            (unknown + differing) as f64,
+            0.0,
+        ),
+        IdentityCheck::new(
+            "reference_points",
+            "x_ref = A' (x_model - origin)",
+            moved.fold(0.0, f64::max),
+            PLACE,
+        ),
+    ]
+}
+
+/// True if `stored` has the nodes, the coupling and the kind of reference point of `own`. A basis that needs a coupling
+/// takes `averaging` where the model states none.
+fn is_same(stored: &Interface, own: &Interface, model: &FeModel) -> bool {
+    let set = model.interfaces().iter().find(|set| set.name == own.name);
+    let taken = set.map(|set| set.coupling());
+    let nodes = |interface: &Interface| interface.nodes.iter().copied().collect::<BTreeSet<_>>();
+    nodes(stored) == nodes(own)
+        && (stored.coupling == own.coupling || stored.coupling == taken)
+        && (stored.reference.is_some() == own.reference.is_some())
+}

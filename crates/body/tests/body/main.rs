@@ -1,0 +1,34 @@
+//! From a model to a flexible body: bases, invariants, certified digits.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod accepted;
+mod beams;
+mod certified_invariants;
+mod convergence;
+mod covariance;
+mod craig_bampton;
+mod craig_bampton_rotations;
+mod deck_names;
+mod empty_rows;
+mod errata;
+mod extremes;
+mod first_shift;
+mod invariants;
+mod lumped_modes;
+mod mesh;
+mod mode_files;
+mod multigrid;
+mod nastran;
+mod nastran_rows;
+mod partial_conversion;
+mod precision;
+mod real_models;
+mod residual_vectors;
+mod second_shift;
+mod single_precision;
+mod small_models;
+mod spinning_shaft;
+mod store_body;
+mod symmetry;
+mod work_counters;

@@ -1,0 +1,177 @@
+//! Modes without a factor: the same modes as with one, to the promise of `fast`, or a factor after all.
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::ModeSettings;
+use flexbody_body::convert::{Conversion, ConvertSettings, convert};
+use flexbody_body::invariants::error_norms;
+use flexbody_eigen::{Accuracy, FactorChoice, Method, Multigrid, Precision, Wanted};
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{FeModel, check};
+use oracle::elements::{Kind, MassRule, Material};
+use oracle::mesh::Mesh;
+use oracle::plane::rectangle;
+
+const DOUBLE: FactorChoice = FactorChoice::Always(Precision::Double);
+
+fn run(model: &FeModel, count: usize, factor: FactorChoice) -> Result<Conversion> {
+    let modes = ModeSettings {
+        wanted: Wanted::Lowest(count),
+        accuracy: Accuracy::Fast,
+        method: if factor == FactorChoice::Auto { Method::Auto } else { Method::Lanczos },
+        factor,
+        multigrid_pays: 0.0,
+        ..ModeSettings::default()
+    };
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT)
+}
+
+fn steel(mesh: &Mesh) -> FeModel {
+    check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound model").model
+}
+
+fn cube(kind: Kind, cells: i32) -> FeModel {
+    steel(&Mesh::block(kind, [cells; 3], [0.1; 3]))
+}
+
+/// The modes of a factor, and those that are found without one.
+fn both(name: &str, model: &FeModel, count: usize) -> [Conversion; 2] {
+    let found = [DOUBLE, FactorChoice::Auto]
+        .map(|factor| run(model, count, factor).unwrap_or_else(|e| panic!("{name}: {e}")));
+    let (a, b) = (found[0].body.modes(), found[1].body.modes());
+    assert_eq!(a.eigenvalue.len(), b.eigenvalue.len(), "{name}");
+    for (j, (x, y)) in a.eigenvalue.iter().zip(&b.eigenvalue).enumerate() {
+        // The square of the residual, in the norm of what the residual is made of.
+        assert!((x / y - 1.0).abs() < 1e-7, "{name}, mode {j}: {x} {y}");
+    }
+    for (j, (x, y)) in a.residual.iter().zip(&b.residual).enumerate() {
+        // On slender bodies rounding of K allows neither way to keep the promise.
+        assert!(*y <= f64::max(1e-6, 2.0 * x), "{name}, mode {j}: K-residual {y:e}, by a factor {x:e}");
+    }
+    for (what, error) in error_norms(found[0].body.invariants(), found[1].body.invariants()) {
+        assert!(error < 1e-5, "{name}: {what} differs by {error:e}");
+    }
+    found
+}
+
+fn way(found: &Conversion) -> Multigrid {
+    found.plan.expect("no dense path").multigrid
+}
+
+/// What was said about the factor.
+fn said(found: &Conversion) -> Vec<&str> {
+    let about = |d: &&Diagnostic| d.code() == Code::FactorPrecision;
+    found.diagnostics.iter().filter(about).map(Diagnostic::message).collect()
+}
+
+#[test]
+#[ignore = "slow"]
+fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
+    for (kind, cells) in [(Kind::Hex8, 12), (Kind::Tet4, 9), (Kind::Tet10, 5), (Kind::Hex20, 6)] {
+        let name = format!("{kind:?}");
+        let [_, found] = both(&name, &cube(kind, cells), 20);
+        assert_eq!(way(&found), Multigrid::Used, "{name}");
+        assert!(said(&found)[0].starts_with("no factor"), "{:?}", said(&found));
+        let work = found.counters;
+        assert_eq!((work.factorizations, work.factor_bytes), (0, 0), "{name}");
+        // Columns of cycles, and of products with K in double precision. Elements of the second order take more.
+        let [most_solved, most_products] = match kind {
+            Kind::Hex20 => [60, 20],
+            Kind::Tet10 => [40, 15],
+            _ => [22, 13],
+        };
+        assert!(work.solved_columns <= 20 * most_solved, "{name}: {work:?}");
+        assert!(work.stiffness_columns <= 20 * most_products, "{name}: {work:?}");
+    }
+}
+
+/// Wherever the modes end: where that is within a repeated eigenvalue, `fast` sees all of it and keeps the same part.
+#[test]
+#[ignore = "slow"]
+fn the_last_modes_of_a_cube_are_those_of_a_factor() {
+    let model = cube(Kind::Hex8, 9);
+    for count in 1..=24 {
+        let [_, found] = both(&format!("{count} modes"), &model, count);
+        assert_eq!(way(&found), Multigrid::Used, "{count} modes");
+    }
+}
+
+#[test]
+#[ignore = "slow"]
+fn plane_bodies_and_bodies_with_arms_have_them_too() {
+    let plane = check(rectangle(60, 40, 0.7, [1.0, 2.0])).expect("a sound model").model;
+    let [_, found] = both("rectangle", &plane, 12);
+    assert_eq!(way(&found), Multigrid::Used);
+    let bracket = steel(&Mesh::bracket(Kind::Hex8, 14, 12, 0.01));
+    let [_, found] = both("bracket", &bracket, 12);
+    assert_eq!(way(&found), Multigrid::Used);
+}
+
+/// Materials whose stiffness differs by 1e4 and by 1e8, and one that hardly changes its volume: the modes of
+/// a factor, by whichever way.
+#[test]
+#[ignore = "slow"]
+fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
+    let mesh = Mesh::block(Kind::Hex8, [10; 3], [0.1; 3]);
+    for contrast in [1e4, 1e8] {
+        let soft = Material { youngs: Material::STEEL.youngs / contrast, ..Material::STEEL };
+        let stiff = mesh.part(|x| x[0] < 0.05).assemble(&Material::STEEL, MassRule::Consistent);
+        let raw = stiff.plus(&mesh.part(|x| x[0] >= 0.05).assemble(&soft, MassRule::Consistent)).raw_model();
+        both(&format!("contrast {contrast:e}"), &check(raw).expect("a sound model").model, 10);
+    }
+    let rubber = Material { poisson: 0.4999, ..Material::STEEL };
+    let raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();
+    both("nearly incompressible", &check(raw).expect("a sound model").model, 10);
+}
+
+#[test]
+#[ignore = "slow"]
+fn a_thin_plate_is_factored_after_all_with_a_note() {
+    let plate = steel(&Mesh::block(Kind::Hex8, [40, 30, 1], [1.0, 0.7, 1e-3]));
+    let [factored, found] = both("plate", &plate, 10);
+    assert_eq!(way(&found), Multigrid::Failed);
+    assert!(said(&found)[0].starts_with("cycles over levels"), "{:?}", said(&found));
+    assert_eq!(factored.body.modes().eigenvalue, found.body.modes().eigenvalue, "the same search");
+}
+
+#[test]
+fn mechanisms_are_refused_as_with_a_factor() {
+    let hinge = steel(&Mesh::hinge(Kind::Hex8, 6));
+    let [by_factor, without] =
+        [DOUBLE, FactorChoice::Auto].map(|factor| run(&hinge, 8, factor).expect_err("a hinge"));
+    assert_eq!(by_factor.diagnostics()[0].code(), without.diagnostics()[0].code());
+}
+
+#[test]
+#[ignore = "slow"]
+fn the_bits_do_not_depend_on_the_number_of_threads() {
+    let model = cube(Kind::Hex8, 14);
+    let bits = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        let found = pool.install(|| run(&model, 10, FactorChoice::Auto)).expect("modes");
+        assert_eq!(way(&found), Multigrid::Used);
+        let shapes = &found.body.modes().shape;
+        let entries =
+            (0..shapes.ncols()).flat_map(|j| (0..shapes.nrows()).map(move |i| shapes[(i, j)].to_bits()));
+        entries.collect::<Vec<u64>>()
+    };
+    let one = bits(1);
+    assert!(one == bits(2) && one == bits(3));
+}
+
+/// Small bodies, guaranteed bounds and a factor that is asked for leave the cycles out.
+#[test]
+#[ignore = "slow"]
+fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
+    let model = cube(Kind::Hex8, 10);
+    let with = |accuracy: Accuracy, multigrid_pays: f64| {
+        let modes =
+            ModeSettings { wanted: Wanted::Lowest(10), accuracy, multigrid_pays, ..ModeSettings::default() };
+        way(&convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT)
+            .expect("modes"))
+    };
+    assert_eq!(with(Accuracy::Fast, ModeSettings::default().multigrid_pays), Multigrid::Unsuited);
+    assert_eq!(with(Accuracy::Certified, 0.0), Multigrid::Unsuited);
+    assert_eq!(with(Accuracy::Standard, 0.0), Multigrid::Used);
+    assert_eq!(with(Accuracy::Fast, 0.0), Multigrid::Used);
+}

@@ -1,0 +1,114 @@
+//! The work of the eigen-solver on the fixture models, counted: a slower algorithm fails here without any
+//! clock. `FLEXBODY_BLESS=1 cargo test -p flexbody-body work_counters` writes the table after a change that is
+//! meant.
+
+use flexbody_body::basis::{ModalBasis, ModeSettings, free_surface};
+use flexbody_eigen::{Accuracy, Method, Wanted};
+use flexbody_input::{read_manifest, read_model};
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{FeModel, RawModel};
+use std::fmt::Write;
+use std::path::PathBuf;
+
+const MODELS: [&str; 4] = ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8"];
+
+fn root() -> PathBuf {
+    oracle::root().to_path_buf()
+}
+
+fn raw(name: &str) -> RawModel {
+    let manifest = root().join("fixtures/models").join(name).join("model.toml");
+    read_model(&read_manifest(&manifest).expect("a manifest")).expect("readable files")
+}
+
+fn model(name: &str) -> FeModel {
+    FeModel::from_raw(raw(name)).expect("a sound model").model
+}
+
+fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> ModalBasis {
+    let settings = ModeSettings {
+        wanted: Wanted::Lowest(count),
+        accuracy,
+        method: Method::Lanczos,
+        ..ModeSettings::default()
+    };
+    free_surface(model, &settings, SILENT).expect("modes")
+}
+
+#[test]
+#[ignore = "slow"]
+fn work_is_what_it_was() {
+    let mut table = format!(
+        "{:<16}{:>6} {:<10}{:>8}{:>7}{:>6}{:>6}{:>10}{:>12}\n",
+        "model", "modes", "accuracy", "factors", "solves", "K", "M", "restarts", "factor_len"
+    );
+    for name in MODELS {
+        let model = model(name);
+        for (count, accuracy) in [
+            (20, Accuracy::Fast),
+            (20, Accuracy::Standard),
+            (20, Accuracy::Certified),
+            (60, Accuracy::Standard),
+        ] {
+            let work = modes(&model, count, accuracy).solution.counters;
+            writeln!(
+                table,
+                "{name:<16}{count:>6} {:<10}{:>8}{:>7}{:>6}{:>6}{:>10}{:>12}",
+                accuracy.name(),
+                work.factorizations,
+                work.solved_columns,
+                work.stiffness_columns,
+                work.mass_columns,
+                work.restarts,
+                work.factor_len
+            )
+            .expect("a string takes all text");
+        }
+    }
+    let file = root().join("tests/golden/work_counters.txt");
+    if std::env::var_os("FLEXBODY_BLESS").is_some_and(|v| v == "1") {
+        std::fs::write(&file, &table).expect("a writable table");
+    }
+    let stored = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(stored == table, "the work has changed; stored:\n{stored}\nnow:\n{table}");
+}
+
+#[test]
+#[ignore = "slow"]
+fn twenty_modes_take_at_most_six_solved_columns_each() {
+    for name in MODELS {
+        let found = modes(&model(name), 20, Accuracy::Standard).solution;
+        assert!(found.counters.solved_columns <= 120, "{name}: {:?}", found.counters);
+        for (residual, floor) in found.residuals.iter().zip(&found.rounding_floors) {
+            assert!(*residual <= floor.max(1e-9), "{name}: K-residual {residual:e}, floor {floor:e}");
+        }
+    }
+}
+
+#[test]
+fn modes_and_work_have_the_same_bits_on_any_number_of_threads() {
+    let model = model("cube_hex8");
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| modes(&model, 20, Accuracy::Standard).solution)
+    };
+    let (one, three) = (on(1), on(3));
+    assert_eq!(one.counters, three.counters);
+    assert_eq!(one.eigenvalues, three.eigenvalues);
+    assert!(one.vectors == three.vectors, "vectors differ");
+}
+
+/// Solids, nodes that rotate, in space and in the plane, and rows that belong to no node: the order of
+/// elimination is the same whether it is looked for beside the checks or when the modes are.
+#[test]
+fn an_order_found_beside_the_checks_gives_the_same_bits() {
+    for name in ["cube_hex8", "shell_folded", "frame_beams", "plane_frame", "hex8_bubbles"] {
+        let beside = FeModel::from_raw_ordered(raw(name)).expect("a sound model").model;
+        let later = model(name);
+        assert!(beside.elimination().is_some() && later.elimination().is_none(), "{name}");
+        let [one, other] = [&beside, &later].map(|model| modes(model, 8, Accuracy::Standard).solution);
+        assert_eq!(one.counters, other.counters, "{name}");
+        assert_eq!(one.eigenvalues, other.eigenvalues, "{name}");
+        assert!(one.vectors == other.vectors, "{name}: vectors differ");
+    }
+}

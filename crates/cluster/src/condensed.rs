@@ -1,0 +1,89 @@
+//! The products of condensation that a cluster makes: G = X' M X of X = [Phi, T_b Psi for each axis b, Psi], with
+//! the rigid modes Phi, the modes Psi and the matrix T_b that turns displacements about the axis b. G holds every
+//! integral of positions and shapes that the invariants are made of. They are computed anew from M here; G is held
+//! to M, so that a cluster that multiplied wrongly does not go unnoticed.
+
+use super::row_order::{RowOrder, TurnedRows};
+use faer::{Mat, MatRef};
+use flexbody_linalg::{combine, gram, larger, uniform};
+use flexbody_model::FeModel;
+
+/// Columns of random numbers by which G is tried.
+const TRIALS: usize = 2;
+const SEED: u64 = 21;
+
+/// Largest difference of G v and X' M X v that rounding explains, as [`Condensed::difference`] has it.
+pub(super) const CONDENSED_ROUNDING: f64 = 1e-11;
+
+/// X, without its columns.
+pub(super) struct Condensed<'a> {
+    model: &'a FeModel,
+    turns: Vec<TurnedRows<'a>>,
+    rigid: MatRef<'a, f64>,
+    modes: MatRef<'a, f64>,
+}
+
+impl<'a> Condensed<'a> {
+    pub(crate) fn new(
+        model: &'a FeModel,
+        order: &'a RowOrder,
+        rigid: MatRef<'a, f64>,
+        modes: MatRef<'a, f64>,
+    ) -> Self {
+        Self { model, turns: TurnedRows::of(model, order), rigid, modes }
+    }
+
+    /// Number of columns of X.
+    pub(crate) fn columns(&self) -> usize {
+        self.block(self.turns.len() + 1)
+    }
+
+    /// Largest difference of G v and X' M X v for random columns v, relative to sqrt(max G_ii) sqrt(v' G v):
+    /// by Cauchy and Schwarz, the largest that an entry of G v can be.
+    pub(crate) fn difference(&self, g: MatRef<'_, f64>) -> f64 {
+        let v = Mat::from_fn(self.columns(), TRIALS, |i, j| uniform(SEED, i as u64, j as u64));
+        let momentum = self.model.pencil().apply_mass(self.combined(v.as_ref()).as_ref());
+        let (own, given) = (self.projected(momentum.as_ref()), g * &v);
+        let largest = (0..g.nrows()).map(|i| g[(i, i)]).fold(0.0, f64::max);
+        let relative = |j: usize| {
+            let size = (largest * (v.col(j).transpose() * own.col(j))).sqrt();
+            (given.col(j) - own.col(j)).norm_max() / size
+        };
+        (0..TRIALS).map(relative).fold(0.0, larger)
+    }
+
+    /// Where a block of columns of X begins, after the rigid modes: turned modes for each axis, then the modes.
+    fn block(&self, of: usize) -> usize {
+        self.rigid.ncols() + of * self.modes.ncols()
+    }
+
+    /// X v.
+    fn combined(&self, v: MatRef<'_, f64>) -> Mat<f64> {
+        let part = |of: usize| combine(self.modes, v.subrows(self.block(of), self.modes.ncols()));
+        let mut sum = combine(self.rigid, v.subrows(0, self.rigid.ncols())) + part(self.turns.len());
+        for (of, turned) in self.turns.iter().enumerate() {
+            let shapes = part(of);
+            for row in 0..sum.nrows() {
+                let Some((from, sign)) = turned.source(row) else { continue };
+                (0..v.ncols()).for_each(|j| sum[(row, j)] += sign * shapes[(from, j)]);
+            }
+        }
+        sum
+    }
+
+    /// X' w.
+    fn projected(&self, w: MatRef<'_, f64>) -> Mat<f64> {
+        let count = self.modes.ncols();
+        let mut all = Mat::zeros(self.columns(), w.ncols());
+        all.subrows_mut(0, self.rigid.ncols()).copy_from(gram(self.rigid, w));
+        for (of, turned) in self.turns.iter().enumerate() {
+            // The transpose of T_b is -T_b.
+            let back = Mat::from_fn(w.nrows(), w.ncols(), |row, j| {
+                turned.source(row).map_or(0.0, |(from, sign)| -sign * w[(from, j)])
+            });
+            all.subrows_mut(self.block(of), count).copy_from(gram(self.modes, back.as_ref()));
+        }
+        all.subrows_mut(self.block(self.turns.len()), count).copy_from(gram(self.modes, w));
+        all
+    }
+}

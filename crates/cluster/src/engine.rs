@@ -1,0 +1,152 @@
+//! The driver, run here: MPI and the Python packages of PETSc and SLEPc, where they are at hand.
+
+use super::prepare::DRIVER_SOURCE;
+use super::prepared::DRIVER;
+use flexbody_base::children;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use std::io::Write;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+/// How the driver solves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Solver {
+    /// Shift-invert Krylov-Schur on a factor of MUMPS.
+    #[default]
+    Mumps,
+    /// Spectrum slicing.
+    Slices,
+    /// Krylov-Schur on conjugate gradients with algebraic multigrid.
+    Gamg,
+    /// LOBPCG with algebraic multigrid.
+    Lobpcg,
+}
+
+impl Solver {
+    /// Name for the driver.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mumps => "mumps",
+            Self::Slices => "slices",
+            Self::Gamg => "gamg",
+            Self::Lobpcg => "lobpcg",
+        }
+    }
+}
+
+/// The programs that run the driver.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Engine {
+    /// Words that start MPI, as `mpiexec --oversubscribe`.
+    pub mpiexec: Vec<String>,
+    /// Python with petsc4py and slepc4py; `None`: the first of the usual ones that has them.
+    pub python: Option<String>,
+    /// Ranks.
+    pub ranks: u32,
+    /// How to solve.
+    pub solver: Solver,
+}
+
+/// Pythons that are tried where none is named.
+const PYTHONS: [&str; 2] = ["python3", "/usr/bin/python3"];
+
+/// Options that keep Python from loading packages of the current folder, of the folder of the driver and of PYTHONPATH:
+/// data lie there. Since Python 3.11 it includes `-P`, which older ones do not know.
+const ISOLATED: [&str; 1] = ["-I"];
+
+impl Engine {
+    /// The Python that has the packages.
+    ///
+    /// # Errors
+    /// [`EngineMissing`](Code::EngineMissing) with what the last one that was tried said.
+    pub fn find_python(&self) -> Result<String> {
+        let candidates: Vec<&str> = match &self.python {
+            Some(own) => vec![own],
+            None => PYTHONS.to_vec(),
+        };
+        let mut why = String::new();
+        for python in candidates {
+            match probe(python) {
+                Ok(output) if output.status.success() => return Ok(python.to_owned()),
+                Ok(output) => why = format!("{python} says: {}", last_line(&output)),
+                Err(e) => why = format!("{python} cannot be started: {e}"),
+            }
+        }
+        Err(Diagnostic::new(Code::EngineMissing, format!("no Python with petsc4py and slepc4py: {why}"))
+            .into())
+    }
+
+    /// Makes sure, before anything is written, that the driver can be run; the Python for it.
+    ///
+    /// # Errors
+    /// [`EngineMissing`](Code::EngineMissing).
+    pub fn check(&self) -> Result<String> {
+        let program = self.mpiexec.first().map_or("", String::as_str);
+        let mut version = Command::new(program);
+        let version = children::output(version.arg("--version").stdin(Stdio::null()));
+        version.map_err(|e| missing(program, &e))?;
+        self.find_python()
+    }
+
+    /// Runs the driver on a prepared folder and waits for it.
+    ///
+    /// # Errors
+    /// [`EngineMissing`](Code::EngineMissing) where MPI cannot be started;
+    /// [`EngineFailed`](Code::EngineFailed) where the driver ends without a result.
+    pub fn run(&self, python: &str, folder: &Path) -> Result<()> {
+        let Some((program, options)) = self.mpiexec.split_first() else {
+            return Err(Diagnostic::new(Code::EngineMissing, "no program is named that starts MPI").into());
+        };
+        let mut command = Command::new(program);
+        command.args(options).arg("-n").arg(self.ranks.to_string());
+        command
+            .arg(python)
+            .args(ISOLATED)
+            .arg(folder.join(DRIVER))
+            .arg(folder)
+            .args(["--solver", self.solver.name()]);
+        // Threads of BLAS beside the ranks would take their processors.
+        command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").stdin(Stdio::null());
+        let output = children::output(&mut command).map_err(|e| missing(program, &e))?;
+        if output.status.success() {
+            return Ok(());
+        }
+        let message = format!("{program} ended with {}: {}", output.status, cause(&output));
+        Err(Diagnostic::new(Code::EngineFailed, message).in_file(folder).into())
+    }
+}
+
+fn missing(program: &str, error: &std::io::Error) -> Diagnostic {
+    Diagnostic::new(Code::EngineMissing, format!("`{program}` cannot be started: {error}"))
+}
+
+/// Hands the driver to a Python, to say which packages it finds.
+fn probe(python: &str) -> std::io::Result<Output> {
+    let mut command = Command::new(python);
+    command
+        .args(ISOLATED)
+        .args(["-", "--probe"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut child = children::start(&mut command)?;
+    if let Some(mut input) = child.stdin.take() {
+        // A program that does not read it says itself what it is.
+        let _ = input.write_all(DRIVER_SOURCE.as_bytes());
+    }
+    children::output_of(child)
+}
+
+/// What a program said about its failure: its own message where it has one, else its last line.
+fn cause(output: &Output) -> String {
+    let text = String::from_utf8_lossy(&output.stderr);
+    let own = text.lines().find(|line| line.starts_with("error") || line.contains("exited on signal"));
+    own.map_or_else(|| last_line(output), |line| line.trim().to_owned())
+}
+
+fn last_line(output: &Output) -> String {
+    let text = String::from_utf8_lossy(&output.stderr);
+    let line = text.lines().rev().find(|line| line.chars().any(char::is_alphanumeric));
+    line.map_or_else(|| "nothing".to_owned(), |line| line.trim().to_owned())
+}

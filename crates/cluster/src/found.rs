@@ -1,0 +1,221 @@
+//! What a cluster found: `result.jsonl`, `modes.petsc` and `condensed.petsc`, held to the model and to what was
+//! prepared.
+
+use super::condensed::{CONDENSED_ROUNDING, Condensed};
+use super::petsc::{IndexBytes, read_vector};
+use super::prepare::{index_bytes, matrices_of};
+use super::prepared::Prepared;
+use super::row_order::RowOrder;
+use super::sealed;
+use faer::{Mat, MatRef};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::{SourceFile, sha256_of_file};
+use flexbody_base::read_files::{note_read, open_regular};
+use flexbody_body::basis::{CountElsewhere, SolvedModes, rigid_modes};
+use flexbody_model::FeModel;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+const RESULT: &str = "result.jsonl";
+const CHECKPOINT: &str = "checkpoint.jsonl";
+const MODES: &str = "modes.petsc";
+const CONDENSED: &str = "condensed.petsc";
+
+/// What the driver writes.
+#[derive(Debug, Clone, Deserialize)]
+struct ResultFile {
+    matrices: String,
+    modes: usize,
+    index_bytes: u64,
+    modes_sha256: String,
+    /// Not in the results of earlier programs.
+    condensed_sha256: Option<String>,
+    eigenvalues: Vec<f64>,
+    next_eigenvalue: Option<f64>,
+    count: Option<CountFile>,
+    solver: String,
+    slepc: String,
+    petsc: String,
+    ranks: u64,
+    #[serde(default)]
+    seconds: BTreeMap<String, f64>,
+    #[serde(default)]
+    factor: BTreeMap<String, f64>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct CountFile {
+    negative: usize,
+    zero: usize,
+    shift: f64,
+    by: String,
+}
+
+/// What it keeps on the way.
+#[derive(Debug, Clone, Deserialize)]
+struct CheckpointFile {
+    matrices: String,
+    parts: Vec<Part>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+struct Part {
+    vectors: usize,
+}
+
+/// Modes that a cluster found, and how.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// The modes, in the rows of the model.
+    pub modes: SolvedModes,
+    /// How they were found, in words.
+    pub told: String,
+    /// Seconds of each phase on the cluster.
+    pub seconds: BTreeMap<String, f64>,
+    /// Size and work of the factor of the count.
+    pub factor: BTreeMap<String, f64>,
+}
+
+/// Reads the result of a cluster for `model`; `prove`: the built-in count is to be made.
+///
+/// # Errors
+/// [`ClusterForeign`](Code::ClusterForeign) where the matrices are others,
+/// [`ClusterUnfinished`](Code::ClusterUnfinished) where there is no result,
+/// [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable),
+/// [`ClusterInaccurate`](Code::ClusterInaccurate) where its products of condensation are not those of M.
+pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bool) -> Result<Found> {
+    let order = RowOrder::of(model);
+    let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
+    if matrices != prepared.matrices {
+        let message = format!(
+            "K and M of `{}` are not those that the folder was prepared with, of `{}`",
+            model.name(),
+            prepared.name
+        );
+        return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(folder).into());
+    }
+    let path = folder.join(RESULT);
+    if !path.exists() {
+        return Err(unfinished(folder, prepared));
+    }
+    let result: ResultFile = sealed::open(&path, "flexbody-result")?;
+    if result.matrices != matrices {
+        let message = "the result belongs to other matrices than those that were prepared";
+        return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(path).into());
+    }
+    let damaged = |why: &str| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(&path));
+    if result.modes == 0 || result.eigenvalues.len() != result.modes {
+        return Err(damaged("the result does not have one eigenvalue for each of its modes"));
+    }
+    let count = result.count.clone().map(|CountFile { negative, zero, shift, by }| {
+        let by = format!("{by} ({} ranks)", result.ranks);
+        CountElsewhere { negative, zero, shift, by }
+    });
+    let n = model.stiffness().n();
+    let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
+    let index = index_bytes(result.index_bytes)?;
+    let vectors = file.read((n, result.modes), index, |row| order.internal(row))?;
+    if let Some(digest) = &result.condensed_sha256 {
+        hold_condensation(&folder.join(CONDENSED), digest, &result, model, &order, vectors.as_ref())?;
+    }
+    let told = format!(
+        "SLEPc {}, PETSc {}, solver `{}` on {} ranks",
+        result.slepc, result.petsc, result.solver, result.ranks
+    );
+    let modes = SolvedModes {
+        vectors,
+        eigenvalues: result.eigenvalues,
+        next_eigenvalue: result.next_eigenvalue,
+        count,
+        engine: "slepc".to_owned(),
+        prove,
+        source: SourceFile::new("modes", Path::new(MODES), result.modes_sha256),
+    };
+    Ok(Found { modes, told, seconds: result.seconds, factor: result.factor })
+}
+
+/// Says how far the cluster came.
+fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
+    let kept = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
+    let kept = kept.filter(|kept| kept.matrices == prepared.matrices);
+    let kept = kept.map_or(0, |kept| kept.parts.iter().map(|part| part.vectors).sum());
+    let message = match kept {
+        0 => "there is no result, and no mode is kept yet".to_owned(),
+        kept => format!("there is no result yet; {kept} modes are kept"),
+    };
+    Diagnostic::new(Code::ClusterUnfinished, message).in_file(folder).into()
+}
+
+/// Refuses products of condensation that are not those of M.
+fn hold_condensation(
+    path: &Path,
+    digest: &str,
+    result: &ResultFile,
+    model: &FeModel,
+    order: &RowOrder,
+    modes: MatRef<'_, f64>,
+) -> Result<()> {
+    let rigid = rigid_modes(model, &model.pencil())?;
+    let condensed = Condensed::new(model, order, rigid.as_ref(), modes);
+    let (columns, file) = (condensed.columns(), Vectors { path, digest, of: "products of condensation" });
+    let products = file.read((columns, columns), index_bytes(result.index_bytes)?, |row| row)?;
+    let difference = condensed.difference(products.as_ref());
+    if difference <= CONDENSED_ROUNDING {
+        return Ok(());
+    }
+    let message = format!(
+        "the products of condensation are not those of the mass matrix: they differ by {difference:.0e}, rounding explains {CONDENSED_ROUNDING:.0e}"
+    );
+    Err(Diagnostic::new(Code::ClusterInaccurate, message).in_file(path).into())
+}
+
+/// A file of vectors whose bytes have to be those that the driver wrote.
+struct Vectors<'a> {
+    path: &'a Path,
+    digest: &'a str,
+    /// What the vectors are, in words.
+    of: &'static str,
+}
+
+impl Vectors<'_> {
+    /// So many columns of so many rows, each row where `place` says.
+    fn read(
+        &self,
+        (n, count): (usize, usize),
+        index: IndexBytes,
+        place: impl Fn(usize) -> usize,
+    ) -> Result<Mat<f64>> {
+        let unreadable =
+            |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(self.path));
+        let failed = |e: std::io::Error| unreadable(format!("file cannot be read: {e}"));
+        if sha256_of_file(self.path).map_err(failed)? != self.digest {
+            let message = format!("the {} are not those that the result was written with", self.of);
+            return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(self.path).into());
+        }
+        note_read(self.path);
+        let file = open_regular(self.path).map_err(failed)?;
+        columns(BufReader::with_capacity(1 << 20, file), (n, count), index, place)
+            .map_err(failed)?
+            .ok_or_else(|| unreadable(format!("file does not hold {count} vectors of {n} finite numbers")))
+    }
+}
+
+fn columns(
+    mut file: impl Read,
+    (n, count): (usize, usize),
+    index: IndexBytes,
+    place: impl Fn(usize) -> usize,
+) -> std::io::Result<Option<Mat<f64>>> {
+    let mut all = Mat::zeros(n, count);
+    for j in 0..count {
+        let Some(column) = read_vector(&mut file, n, index)? else { return Ok(None) };
+        if column.iter().any(|value| !value.is_finite()) {
+            return Ok(None);
+        }
+        column.iter().enumerate().for_each(|(i, value)| all[(place(i), j)] = *value);
+    }
+    Ok(Some(all))
+}

@@ -1,0 +1,88 @@
+//! What a batch has done already, beside its list: a body is made again only where something has changed.
+
+use super::sealed;
+use flexbody_base::error::Result;
+use flexbody_base::output::OutputSlot;
+use flexbody_base::provenance::{Fingerprint, generator, sha256_of_file};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+const FORMAT: &str = "flexbody-batch";
+
+/// A body that was made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DoneBody {
+    /// Fingerprint of the program, the options and the inputs.
+    pub inputs: String,
+    /// SHA-256 of the file that was written.
+    pub output: String,
+    /// What is told of it.
+    pub told: serde_json::Value,
+}
+
+/// The bodies that were made, by the paths of their files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ledger {
+    path: PathBuf,
+    done: BTreeMap<String, DoneBody>,
+}
+
+impl Ledger {
+    /// The ledger of a list; empty where there is none, or none that can be used.
+    pub fn of(list: &Path) -> Self {
+        let mut path = list.as_os_str().to_owned();
+        path.push(".done");
+        let path = PathBuf::from(path);
+        let done = sealed::open_kept(&path, FORMAT).unwrap_or_default();
+        Self { path, done }
+    }
+
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What was made of these inputs and still lies there.
+    pub fn done(&self, output: &Path, inputs: &str) -> Option<&DoneBody> {
+        let body = self.done.get(&output.display().to_string())?;
+        let is_there = || sha256_of_file(output).ok().is_some_and(|sha| sha == body.output);
+        (body.inputs == inputs && is_there()).then_some(body)
+    }
+
+    /// Makes sure before the work that the ledger can be written.
+    ///
+    /// # Errors
+    /// Every error of [`OutputSlot::prepare`].
+    pub fn reserve(&self) -> Result<()> {
+        OutputSlot::prepare(&self.path).map(drop)
+    }
+
+    /// Writes down that a body was made.
+    ///
+    /// # Errors
+    /// Those of [`OutputSlot`].
+    pub fn add(&mut self, output: &Path, inputs: String, told: serde_json::Value) -> Result<()> {
+        let Ok(sha) = sha256_of_file(output) else { return Ok(()) };
+        self.done.insert(output.display().to_string(), DoneBody { inputs, output: sha, told });
+        let slot = OutputSlot::prepare(&self.path)?;
+        slot.fill(sealed::seal(FORMAT, &self.done).as_bytes())?;
+        OutputSlot::keep_all([slot])
+    }
+}
+
+/// The fingerprint of this program, the words of a conversion and the files that it reads; one that is not
+/// there counts as such.
+pub fn inputs_fingerprint(words: &[String], files: &[PathBuf]) -> String {
+    let mut all = Fingerprint::default();
+    let mut add = |text: &str| {
+        all.update(text.as_bytes());
+        all.update(b"\n");
+    };
+    add(&generator());
+    words.iter().for_each(|word| add(word));
+    for file in files {
+        add(&sha256_of_file(file).unwrap_or_default());
+    }
+    all.hex()
+}

@@ -1,0 +1,31 @@
+//! Work that is done elsewhere: what a cluster needs to find the modes of a model (`prepare`), what it found
+//! (`found`, `condensed`), the program that runs there (`driver.py`) and how it is started here (`engine`), and
+//! lists of bodies (`batch`).
+
+#![deny(
+    clippy::exit,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used
+)]
+
+mod batch_list;
+mod condensed;
+mod engine;
+mod found;
+mod ledger;
+mod petsc;
+mod prepare;
+mod prepared;
+mod row_order;
+mod schedule;
+mod sealed;
+
+pub use batch_list::{BatchBody, BatchList, read_batch_list};
+pub use engine::{Engine, Solver};
+pub use found::{Found, read_found};
+pub use ledger::{DoneBody, Ledger, inputs_fingerprint};
+pub use prepare::{Preparation, PrepareSettings, prepare};
+pub use prepared::{ModelReference, Prepared, WantedModes, read_prepared};
+pub use schedule::{Budget, conversion_bytes};

@@ -1,0 +1,67 @@
+//! Small files of two lines of JSON: what the file is, with the digest of the second line, and the content.
+//! A file that was cut off, mixed up or edited is found out; that of another version is told apart.
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::sha256_hex;
+use flexbody_base::read_files::{note_read, read_text};
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Version of the files that this program and its driver write.
+const VERSION: u32 = 1;
+
+/// Most bytes of such a file: ledgers of some hundred thousand bodies.
+const MOST: u64 = 1 << 30;
+
+#[derive(Serialize, Deserialize)]
+struct Head {
+    format: String,
+    version: u32,
+    sha256: String,
+}
+
+/// The text of a file.
+pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
+    let body = serde_json::to_string(content).expect("texts and finite numbers");
+    let head = Head { format: format.to_owned(), version: VERSION, sha256: sha256_hex(body.as_bytes()) };
+    let head = serde_json::to_string(&head).expect("texts and a number");
+    format!("{head}\n{body}\n")
+}
+
+/// Reads the value that a file of an input holds.
+///
+/// # Errors
+/// Every error of [`open_kept`].
+pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
+    note_read(path);
+    open_kept(path, format)
+}
+
+/// Reads the value of a file that the run keeps for itself and replaces.
+///
+/// # Errors
+/// [`ClusterUnreadable`](Code::ClusterUnreadable) where it cannot be read or is no file of `format`;
+/// [`ClusterChanged`](Code::ClusterChanged) where its digest is another.
+pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
+    let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
+    let text = read_text(path, MOST).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;
+    let not_ours = || unreadable(format!("file is no `{format}`"));
+    let (head, body) = text.split_once('\n').ok_or_else(not_ours)?;
+    let head: Head = serde_json::from_str(head).map_err(|_| not_ours())?;
+    if head.format != format {
+        return Err(not_ours());
+    }
+    if head.version != VERSION {
+        let message =
+            format!("file has version {} of its format, this program reads {VERSION}", head.version);
+        return Err(unreadable(message));
+    }
+    let body = body.strip_suffix('\n').unwrap_or(body);
+    if sha256_hex(body.as_bytes()) != head.sha256 {
+        let message = "the content of the file is not the one that it was written with";
+        return Err(Diagnostic::new(Code::ClusterChanged, message).in_file(path).into());
+    }
+    serde_json::from_str(body).map_err(|e| unreadable(format!("content of the file: {e}")))
+}

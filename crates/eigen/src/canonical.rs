@@ -1,0 +1,145 @@
+//! A canonical basis inside repeated eigenvalues and canonical signs, so that the same body gives the same
+//! modes whatever path computed them.
+
+use faer::prelude::{Reborrow, ReborrowMut};
+use faer::{Mat, MatMut, MatRef};
+use flexbody_linalg::{combine, contiguous_mut};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form
+/// together.
+pub const CLUSTER_GAP: f64 = 1e-9;
+
+/// Components whose squares are within this part of the largest count as equally large; the first of them in row order
+/// is taken, so that neither rounding nor what [`Accuracy::Fast`](super::Accuracy::Fast) leaves chooses between
+/// symmetric nodes.
+const EQUAL: f64 = 1e-4;
+
+/// Index ranges of eigenvalues (ascending) whose neighbours differ by at most `gap` relative to their size.
+pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
+    let mut ranges = Vec::new();
+    let mut start = 0;
+    for i in 1..=eigenvalues.len() {
+        let ends = i == eigenvalues.len()
+            || eigenvalues[i] - eigenvalues[i - 1] > gap * eigenvalues[i].abs().max(eigenvalues[i - 1].abs());
+        if ends {
+            ranges.push(start..i);
+            start = i;
+        }
+    }
+    ranges
+}
+
+/// Number of eigenvalues up to the end of the cluster that the last of the first `wanted` belongs to,
+/// clusters as [`clusters`] forms them of the `count` eigenvalues lambda(0), lambda(1), ...
+pub(super) fn cluster_end(wanted: usize, count: usize, gap: f64, lambda: impl Fn(usize) -> f64) -> usize {
+    let near = |i: usize| {
+        let (below, above) = (lambda(i - 1), lambda(i));
+        above - below <= gap * above.abs().max(below.abs())
+    };
+    let wanted = wanted.min(count);
+    if wanted == 0 { 0 } else { (wanted..count).find(|&i| !near(i)).unwrap_or(count) }
+}
+
+/// Rotates the columns of each cluster into echelon form and fixes all signs.
+///
+/// Within a cluster, the row with the largest norm is found and the columns are rotated so that only the
+/// first has a component there; then the same for the rest. Every column's component of largest magnitude is
+/// made positive.
+pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
+    for cluster in clusters {
+        let mut block = shapes.rb_mut().subcols_mut(cluster.start, cluster.len());
+        for first in 0..cluster.len().saturating_sub(1) {
+            let mut rest = block.rb_mut().subcols_mut(first, cluster.len() - first);
+            let row = dominant_row(rest.rb());
+            reflect_onto_first(rest.rb_mut(), row);
+        }
+    }
+    let columns: Vec<&mut [f64]> = shapes.col_iter_mut().map(contiguous_mut).collect();
+    columns.into_par_iter().for_each(|column| {
+        if canonical_sign(column.iter().copied()) < 0.0 {
+            column.iter_mut().for_each(|x| *x = -*x);
+        }
+    });
+}
+
+/// The sign that makes the component of largest magnitude positive, 1 or -1.
+pub fn canonical_sign(mut shape: impl Iterator<Item = f64> + Clone) -> f64 {
+    let dominant = first_largest(shape.clone().map(|x| x * x));
+    if shape.nth(dominant).is_some_and(|x| x < 0.0) { -1.0 } else { 1.0 }
+}
+
+/// First row whose norm is the largest, up to [`EQUAL`].
+fn dominant_row(block: MatRef<'_, f64>) -> usize {
+    let mut squares = vec![0.0f64; block.nrows()];
+    for j in 0..block.ncols() {
+        for (square, value) in squares.iter_mut().zip(block.col(j).iter()) {
+            *square += value * value;
+        }
+    }
+    first_largest(squares.iter().copied())
+}
+
+/// Place of the first square that is the largest, up to [`EQUAL`].
+fn first_largest(mut squares: impl Iterator<Item = f64> + Clone) -> usize {
+    let largest = squares.clone().fold(0.0, f64::max);
+    squares.position(|square| square >= largest * (1.0 - EQUAL)).unwrap_or(0)
+}
+
+/// Applies the Householder reflection of the columns that leaves only the first one with a component in
+/// `row`.
+fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
+    let k = block.ncols();
+    let target: Vec<f64> = (0..k).map(|j| block[(row, j)]).collect();
+    let norm = target.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if norm == 0.0 {
+        return;
+    }
+    // u = target + sign * norm * e1: H = I - 2 u u' / u'u maps target onto the first axis without
+    // cancellation.
+    let mut u = target;
+    u[0] += if u[0] < 0.0 { -norm } else { norm };
+    let square = u.iter().map(|v| v * v).sum::<f64>();
+    let coefficients = Mat::from_fn(k, 1, |j, _| u[j]);
+    let along = combine(block.rb(), coefficients.as_ref());
+    for j in 0..k {
+        let factor = 2.0 * u[j] / square;
+        for i in 0..block.nrows() {
+            block[(i, j)] -= factor * along[(i, 0)];
+        }
+    }
+    for j in 1..k {
+        block[(row, j)] = 0.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotations_inside_a_cluster_lead_to_the_same_basis() {
+        let basis =
+            Mat::from_fn(7, 3, |i, j| ((i * 3 + j * 5) as f64).sin() + if i == 2 * j { 2.0 } else { 0.0 });
+        let (c, s) = (0.6f64, 0.8f64);
+        let rotation = Mat::from_fn(3, 3, |i, j| match (i, j) {
+            (0, 0) | (1, 1) => c,
+            (0, 1) => -s,
+            (1, 0) => s,
+            (2, 2) => -1.0,
+            _ => 0.0,
+        });
+        let mut a = basis.clone();
+        let mut b = &basis * &rotation;
+        canonical_basis(a.as_mut(), std::slice::from_ref(&(0..3)));
+        canonical_basis(b.as_mut(), std::slice::from_ref(&(0..3)));
+        assert!((&a - &b).norm_max() < 1e-14, "{a:?} {b:?}");
+    }
+
+    #[test]
+    fn clusters_are_chains_of_close_eigenvalues() {
+        assert_eq!(clusters(&[1.0, 1.0 + 1e-10, 2.0, 3.0, 3.0], 1e-9), vec![0..2, 2..3, 3..5]);
+        assert!(clusters(&[], 1e-9).is_empty());
+    }
+}

@@ -1,0 +1,82 @@
+//! The eigenproblem that is to be solved.
+
+use super::failure::EigenFailure;
+use super::resume::Resume;
+use faer::{Mat, MatRef};
+use flexbody_linalg::{Analysis, Cholesky, Pencil, Solve, gram, subtract_combination, uniform};
+use std::sync::Arc;
+
+/// Part of tr K / tr M by which a pencil of which nothing is known is shifted: far above the rounding of a factor in double
+/// precision, and far below the first eigenvalue of most pencils.
+const UNKNOWN_SHIFT: f64 = 1e-8;
+
+/// Seed of the fixed numbers that the first eigenvalue is estimated from.
+const SEED: u64 = 7;
+
+/// K psi = lambda M psi on the M-orthogonal complement of the known rigid modes.
+#[derive(Debug, Clone, Copy)]
+pub struct EigenProblem<'a> {
+    /// K and M.
+    pub pencil: Pencil<'a>,
+    /// Rigid modes (N x r), M-orthonormal: exact null vectors of K, projected out at every step.
+    pub rigid: MatRef<'a, f64>,
+    /// A Rayleigh quotient of some flexible field: an upper bound of the first flexible eigenvalue.
+    pub first_estimate: f64,
+    /// Relative error of the entries of K: half a unit of the last digit that the input carries.
+    pub input_error: f64,
+    /// The order of elimination, where it is known already.
+    pub order: Option<&'a Arc<Analysis>>,
+    /// Where an iterative search starts, and who keeps how far it came.
+    pub resume: Resume<'a>,
+}
+
+impl<'a> EigenProblem<'a> {
+    /// A pencil of which only the null space of K is known: the columns of `rigid` (N x r) span it and are M-orthonormal; there
+    /// are none where K is definite.
+    ///
+    /// The first eigenvalue is estimated by one factor of K + tau M with tau = 1e-8 tr K / tr M: fixed numbers, multiplied twice
+    /// by (K + tau M)^-1 M and freed of `rigid`, have a Rayleigh quotient that is no lower than it. K and M are taken as exact.
+    ///
+    /// # Errors
+    /// [`TooLarge`](EigenFailure::TooLarge), or [`NotPositiveDefinite`](EigenFailure::NotPositiveDefinite) when K + tau M has no
+    /// Cholesky factor.
+    ///
+    /// # Panics
+    /// When `rigid` has another number of rows than the pencil.
+    pub fn new(pencil: Pencil<'a>, rigid: MatRef<'a, f64>) -> Result<Self, EigenFailure> {
+        assert_eq!(rigid.nrows(), pencil.n(), "rows of the rigid modes");
+        let first_estimate = rayleigh_estimate(&pencil, rigid)?;
+        Ok(Self { pencil, rigid, first_estimate, input_error: 0.0, order: None, resume: Resume::default() })
+    }
+}
+
+/// An upper bound of the first eigenvalue beside those of `rigid`, by inverse iteration from fixed numbers.
+fn rayleigh_estimate(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> Result<f64, EigenFailure> {
+    let trace = |diagonal: Vec<f64>| diagonal.into_iter().sum::<f64>();
+    let shift = UNKNOWN_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
+    let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
+    let factor = Cholesky::<f64>::new(&analysis, pencil, shift);
+    let factor = factor.ok_or(EigenFailure::NotPositiveDefinite { shift })?;
+    let mut field = Mat::from_fn(pencil.n(), 1, |row, _| uniform(SEED, row as u64, 0));
+    for _ in 0..2 {
+        let mut solved = pencil.apply_mass(field.as_ref());
+        factor.solve_in_place(solved.as_mut());
+        // Without the null space, which the factor amplifies most.
+        let in_null_space = gram(rigid, pencil.apply_mass(solved.as_ref()).as_ref());
+        subtract_combination(solved.as_mut(), rigid, in_null_space.as_ref());
+        field = solved;
+    }
+    let energy = gram(field.as_ref(), pencil.apply_stiffness(field.as_ref()).as_ref())[(0, 0)];
+    let mass = gram(field.as_ref(), pencil.apply_mass(field.as_ref()).as_ref())[(0, 0)];
+    Ok(energy / mass)
+}
+
+impl EigenProblem<'_> {
+    /// The order of elimination and the structure of the factor; `None` when memory runs out.
+    pub(super) fn analysis(&self) -> Option<Arc<Analysis>> {
+        match self.order {
+            Some(order) => Some(Arc::clone(order)),
+            None => Analysis::new(&self.pencil).map(Arc::new),
+        }
+    }
+}

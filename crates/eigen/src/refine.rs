@@ -1,0 +1,327 @@
+//! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes,
+//! residuals.
+
+use super::counters::Counters;
+use super::failure::EigenFailure;
+use super::noise::{is_noisy, rounding_residual};
+use super::problem::EigenProblem;
+use faer::{ColRef, Mat, MatRef};
+use flexbody_linalg::{
+    DoubleDouble, Solve, Tall, column_norms, combine, combine_in_place, combine_into, gram, largest,
+    projection_compensated, small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
+};
+use std::ops::Range;
+
+/// Refined modes with their products.
+pub(super) struct Refined {
+    pub eigenvalues: Vec<f64>,
+    pub vectors: Mat<f64>,
+    pub residuals: Vec<f64>,
+    pub floors: Vec<f64>,
+}
+
+/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the
+/// basis. With `correct`, one step of iterative refinement follows, which brings the residual of the solve to
+/// its rounding floor.
+fn inverse_iteration(
+    problem: &EigenProblem<'_>,
+    factor: &dyn Solve,
+    x: MatRef<'_, f64>,
+    correct: bool,
+    counters: &mut Counters,
+) -> Mat<f64> {
+    let pencil = &problem.pencil;
+    let k = x.ncols() as u64;
+    counters.mass_columns += k;
+    counters.solved_columns += k;
+    let b = pencil.apply_mass(x);
+    let mut y = b.clone();
+    factor.solve_in_place(y.as_mut());
+    if correct {
+        counters.mass_columns += k;
+        counters.stiffness_columns += k;
+        counters.solved_columns += k;
+        let shifted =
+            pencil.apply_stiffness(y.as_ref()) + pencil.apply_mass(y.as_ref()) * faer::Scale(factor.shift());
+        let mut correction = b - shifted;
+        factor.solve_in_place(correction.as_mut());
+        y += correction;
+    }
+    y
+}
+
+/// Squared M-norm, relative to that of the columns, below which a direction of their span is only rounding.
+const DEPENDENT: f64 = 1e-8;
+
+/// Modes of a span whose projections are taken in twice the precision: the time of small eigenproblems in that
+/// grows with the third power, and is a second with 200.
+const SHARPENED_AT_MOST: usize = 200;
+
+/// Columns whose products with K and M are held at a time: those of 200 modes would take twice the memory of
+/// the modes, and memory that is taken anew is cleared first, which takes longer than the products.
+pub(super) const TOGETHER: usize = 32;
+
+/// `count` columns, [`TOGETHER`] at a time.
+fn columns_together(count: usize) -> impl Iterator<Item = Range<usize>> {
+    (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
+}
+
+/// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz
+/// vectors in ascending order of lambda. Directions in which X is dependent are left out.
+pub(super) fn rayleigh_ritz(
+    problem: &EigenProblem<'_>,
+    mut x: Mat<f64>,
+    counters: &mut Counters,
+) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+    let (pencil, n, k) = (&problem.pencil, x.nrows(), x.ncols());
+    counters.mass_columns += (problem.rigid.ncols() + k) as u64;
+    counters.stiffness_columns += k as u64;
+    let along = gram(pencil.apply_mass(problem.rigid).as_ref(), x.as_ref());
+    subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
+    let [mut gm, mut gk] = [(); 2].map(|()| Mat::zeros(k, k));
+    for columns in columns_together(k) {
+        let own = x.as_ref().subcols(columns.start, columns.len());
+        let above = x.as_ref().subcols(0, columns.end);
+        let mut product = Tall::zeros(n, columns.len());
+        pencil.mass_times(own, product.as_mut());
+        mirror(&mut gm, columns.start, &gram(above, product.as_ref()));
+        pencil.stiffness_times(own, product.as_mut());
+        mirror(&mut gk, columns.start, &gram(above, product.as_ref()));
+    }
+    let (values, coefficients) = small_ritz(&gm, &gk)?;
+    combine_in_place(x.as_mut(), coefficients.as_ref());
+    x.truncate(n, values.len());
+    Ok((values, x))
+}
+
+/// Columns of a symmetric matrix from number `first` on, down to the square on its diagonal, and their mirror
+/// image.
+fn mirror(matrix: &mut Mat<f64>, first: usize, columns: &Mat<f64>) {
+    for j in 0..columns.ncols() {
+        for i in 0..columns.nrows() {
+            matrix[(i, first + j)] = columns[(i, j)];
+            if i < first {
+                matrix[(first + j, i)] = columns[(i, j)];
+            }
+        }
+    }
+}
+
+/// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
+/// matrices with M and with K. Directions in which the basis is dependent are left out.
+pub(super) fn small_ritz(gm: &Mat<f64>, gk: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
+    let scale = scales(gm)?;
+    let orthonormal = independent_directions(&scaled(gm, &scale))?;
+    let projected =
+        gram(orthonormal.as_ref(), combine(scaled(gk, &scale).as_ref(), orthonormal.as_ref()).as_ref());
+    let ritz = symmetric_eigen(projected.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let coefficients = combine(orthonormal.as_ref(), ritz.vectors.as_ref());
+    Ok((ritz.values, scaled_rows(&coefficients, &scale)))
+}
+
+/// Coefficients of M-orthonormal vectors that span what a basis with this Gram matrix spans, less the
+/// directions in which it is dependent.
+pub(super) fn independent(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
+    let scale = scales(gm)?;
+    Ok(scaled_rows(&independent_directions(&scaled(gm, &scale))?, &scale))
+}
+
+/// One over the M-norm of each vector of a basis; zero where nothing is left of it, which spans nothing.
+fn scales(gm: &Mat<f64>) -> Result<Vec<f64>, EigenFailure> {
+    let scale: Vec<f64> =
+        (0..gm.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
+    let all_finite = scale.iter().all(|s| s.is_finite());
+    if all_finite { Ok(scale) } else { Err(EigenFailure::MassIndefinite) }
+}
+
+/// The Gram matrix of scaled vectors, made symmetric.
+fn scaled(g: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
+    Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
+}
+
+fn scaled_rows(a: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
+    Mat::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)])
+}
+
+/// V / sqrt(Lambda) of a Gram matrix with a diagonal of one, for the eigenvalues that are no rounding.
+fn independent_directions(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
+    let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
+    let first = eigen.values.partition_point(|&v| v < DEPENDENT);
+    Ok(Mat::from_fn(gm.nrows(), gm.ncols() - first, |i, j| {
+        eigen.vectors[(i, first + j)] / eigen.values[first + j].sqrt()
+    }))
+}
+
+/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be
+/// helped: rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as well as the
+/// node positions are known.
+pub(super) fn residuals(
+    problem: &EigenProblem<'_>,
+    eigenvalues: &[f64],
+    x: MatRef<'_, f64>,
+    counters: &mut Counters,
+) -> (Vec<f64>, Vec<f64>) {
+    counters.mass_columns += x.ncols() as u64;
+    counters.stiffness_columns += x.ncols() as u64;
+    let m_rigid = problem.pencil.apply_mass(problem.rigid);
+    columns_together(x.ncols())
+        .flat_map(|columns| {
+            let own = x.subcols(columns.start, columns.len());
+            residuals_together(problem, m_rigid.as_ref(), &eigenvalues[columns], own)
+        })
+        .unzip()
+}
+
+/// Residual and floor of each of a few pairs.
+fn residuals_together(
+    problem: &EigenProblem<'_>,
+    m_rigid: MatRef<'_, f64>,
+    eigenvalues: &[f64],
+    x: MatRef<'_, f64>,
+) -> Vec<(f64, f64)> {
+    let pencil = &problem.pencil;
+    let [mut kx, mut mx, mut rigid] = [(); 3].map(|()| Tall::zeros(x.nrows(), x.ncols()));
+    pencil.stiffness_times(x, kx.as_mut());
+    pencil.mass_times(x, mx.as_mut());
+    combine_into(rigid.as_mut(), m_rigid, gram(problem.rigid, kx.as_ref()).as_ref());
+    let (sizes, residuals) = leave_unbalanced(&mut kx, mx.as_ref(), eigenvalues);
+    let rounding = rounding_residual(pencil.stiffness(), x).into_iter().zip(column_norms(rigid.as_ref()));
+    let floors = rounding.zip(sizes).map(|((rounding, rigid), size)| beside(rounding + rigid, size));
+    residuals.into_iter().zip(floors).collect()
+}
+
+/// Turns K X into what the pairs leave unbalanced, K x - lambda M x. The sizes |K x| + |lambda M x|, and the
+/// norm of what is left beside them.
+pub(super) fn leave_unbalanced(
+    kx: &mut Tall,
+    mx: MatRef<'_, f64>,
+    eigenvalues: &[f64],
+) -> (Vec<f64>, Vec<f64>) {
+    let norms = column_norms(kx.as_ref()).into_iter().zip(column_norms(mx)).zip(eigenvalues);
+    let sizes: Vec<f64> = norms.map(|((stiff, heavy), lambda)| stiff + lambda.abs() * heavy).collect();
+    subtract_columns(kx.as_mut(), eigenvalues, mx);
+    let left = column_norms(kx.as_ref()).into_iter().zip(&sizes);
+    let residuals = left.map(|(left, size)| beside(left, *size)).collect();
+    (sizes, residuals)
+}
+
+/// A part of a size; none of zero.
+fn beside(part: f64, size: f64) -> f64 {
+    if size == 0.0 { 0.0 } else { part / size }
+}
+
+/// |K psi| + |lambda| |M psi|.
+pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+    k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
+}
+
+/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros, NaN for
+/// one that is no number.
+pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
+    beside((k_psi - m_psi * faer::Scale(lambda)).norm_l2(), residual_scale(k_psi, m_psi, lambda))
+}
+
+impl Refined {
+    /// Rayleigh-Ritz on the span of `x`, and the true K-residuals of the outcome.
+    pub(super) fn new(
+        problem: &EigenProblem<'_>,
+        x: Mat<f64>,
+        counters: &mut Counters,
+    ) -> Result<Self, EigenFailure> {
+        let given = x.ncols();
+        let (eigenvalues, vectors) = rayleigh_ritz(problem, x, counters)?;
+        if vectors.ncols() < given {
+            return Err(EigenFailure::Inaccurate { residual: DEPENDENT });
+        }
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        Ok(Self { eigenvalues, vectors, residuals, floors })
+    }
+
+    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](is_noisy) and has
+    /// [few modes enough](SHARPENED_AT_MOST): the Ritz vectors are then those of the span to the rounding of
+    /// vectors themselves. Their residuals stay what they are in double precision.
+    pub(super) fn sharpened(
+        self,
+        problem: &EigenProblem<'_>,
+        tolerance: f64,
+        counters: &mut Counters,
+    ) -> Self {
+        if !is_noisy(&self.floors, tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
+            return self;
+        }
+        let (pencil, x) = (&problem.pencil, self.vectors.as_ref());
+        counters.mass_columns += x.ncols() as u64;
+        counters.stiffness_columns += x.ncols() as u64;
+        let stiffness = projection_compensated(pencil.stiffness(), x);
+        // Nothing cancels in products with M.
+        let mass = gram(x, pencil.apply_mass(x).as_ref());
+        let entry = |i: usize, j: usize| DoubleDouble::from(0.5 * (mass[(i, j)] + mass[(j, i)]));
+        let mass = (0..x.ncols()).map(|i| (0..x.ncols()).map(|j| entry(i, j)).collect()).collect();
+        // Modes without strain energy, which are refused later, have no such projection.
+        let Some(ritz) = small_pencil(stiffness, &mass) else { return self };
+        let eigenvalues: Vec<f64> = ritz.values.iter().map(|lambda| lambda.hi).collect();
+        let vectors = combine(x, ritz.vectors.as_ref());
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        Self { eigenvalues, vectors, residuals, floors }
+    }
+
+    /// Residuals and floors anew of some modes, whose vectors or eigenvalues have changed.
+    pub(super) fn renew(&mut self, problem: &EigenProblem<'_>, changed: &[usize], counters: &mut Counters) {
+        if changed.is_empty() {
+            return;
+        }
+        let x = Mat::from_fn(self.vectors.nrows(), changed.len(), |i, j| self.vectors[(i, changed[j])]);
+        let lambda: Vec<f64> = changed.iter().map(|&i| self.eigenvalues[i]).collect();
+        let (found, rounding) = residuals(problem, &lambda, x.as_ref(), counters);
+        for ((&i, residual), floor) in changed.iter().zip(found).zip(rounding) {
+            (self.residuals[i], self.floors[i]) = (residual, floor);
+        }
+    }
+
+    /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is
+    /// higher.
+    fn excess_of(&self, i: usize, tolerance: f64) -> f64 {
+        self.residuals[i] / tolerance.max(self.floors[i])
+    }
+
+    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors; NaN when
+    /// one is no number.
+    pub(super) fn excess(&self, tolerance: f64) -> f64 {
+        largest((0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)))
+    }
+}
+
+/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor, by at
+/// most three inverse iterations of those that do not.
+pub(super) fn refine(
+    problem: &EigenProblem<'_>,
+    factor: &dyn Solve,
+    mut best: Refined,
+    tolerance: f64,
+    counters: &mut Counters,
+) -> Result<Refined, EigenFailure> {
+    for round in 0..3 {
+        let least = best.excess(tolerance);
+        // No inverse iteration makes a number of what is none.
+        if least.is_nan() || least <= 1.0 {
+            break;
+        }
+        let poor: Vec<usize> =
+            (0..best.residuals.len()).filter(|&i| best.excess_of(i, tolerance) > 1.0).collect();
+        let mut x = best.vectors.clone();
+        let chosen = Mat::from_fn(x.nrows(), poor.len(), |i, j| x[(i, poor[j])]);
+        let improved = inverse_iteration(problem, factor, chosen.as_ref(), round > 0, counters);
+        for (from, &to) in poor.iter().enumerate() {
+            x.as_mut().col_mut(to).copy_from(improved.col(from));
+        }
+        let refined = Refined::new(problem, x, counters)?;
+        let excess = refined.excess(tolerance);
+        if excess < least {
+            best = refined;
+        }
+        if excess.is_nan() || excess > 0.5 * least {
+            break;
+        }
+    }
+    Ok(best)
+}

@@ -1,0 +1,190 @@
+//! Modes of a given subspace: Rayleigh-Ritz, canonical form, residuals as they are, and the count for those
+//! that turn out to be eigenvectors. Nothing is factored unless that count is made.
+
+use super::bounds::enclose;
+use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
+use super::completeness::{Completeness, Proof, count_below};
+use super::counters::Counters;
+use super::failure::EigenFailure;
+use super::plan::{Plan, gigabytes};
+use super::problem::EigenProblem;
+use super::refine::Refined;
+use super::settings::{Accuracy, EigenSettings, Wanted, keeps};
+use super::solution::EigenSolution;
+use super::zero_energy::check_zero_energy;
+use faer::Mat;
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::{Analysis, is_positive_semidefinite};
+
+/// Distance of the count's shift from the last eigenvector, relative to its eigenvalue: the second is tried
+/// where the first counts too many, which may lie beyond the modes that were given.
+const ABOVE: [f64; 2] = [1e-3, 1e-5];
+
+/// The modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors,
+/// M-orthogonal to the rigid modes, ascending.
+///
+/// They are eigenvectors only as far as their residuals say. Where the lowest of them keep the K-residual of
+/// the accuracy, an inertia count says whether modes are missing below the last such; accuracy `fast` leaves
+/// it out.
+///
+/// # Errors
+/// [`EigenFailure`]: dependent columns, an indefinite matrix, a mechanism; at [`Accuracy::Certified`] also
+/// where a mode is no eigenvector or one is missing.
+pub fn modes_of_span(
+    problem: &EigenProblem<'_>,
+    basis: Mat<f64>,
+    settings: &EigenSettings,
+    watch: Watch<'_>,
+) -> Result<EigenSolution, EigenFailure> {
+    let mut counters = Counters::default();
+    let refined = Refined::new(problem, basis, &mut counters)?;
+    // Whatever is asked of the modes: nothing is searched, and they are no better than this makes them.
+    let refined = refined.sharpened(problem, Accuracy::Standard.residual(), &mut counters);
+    check_zero_energy(problem, &refined)?;
+    let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, &mut counters);
+    let exact = modes.exact(settings.accuracy);
+    let analysis = (exact > 0 && settings.accuracy != Accuracy::Fast).then(|| {
+        watch(Event::Phase("completeness"));
+        problem.analysis().ok_or(EigenFailure::TooLarge)
+    });
+    let analysis = analysis.transpose()?;
+    let completeness = match &analysis {
+        Some(analysis) => count(problem, analysis, &modes.eigenvalues[..exact], settings, &mut counters)?,
+        None => uncounted(&modes, exact, settings.accuracy),
+    };
+    let mut bounds = None;
+    if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
+        let analysis = certifiable(&modes, exact, &completeness, analysis.as_deref())
+            .map_err(|why| EigenFailure::NotCertified { why })?;
+        watch(Event::Phase("bounds"));
+        // Refuses what does not fit the memory.
+        Plan::new(problem, settings, analysis, modes.eigenvalues.len(), false)?;
+        let (vectors, high) = (modes.vectors.as_ref(), completeness.shift);
+        let found =
+            enclose(problem, analysis, vectors, &modes.eigenvalues, high, CLUSTER_GAP, &mut counters)?;
+        found.clamp(&mut modes.eigenvalues);
+        bounds = Some(found);
+    }
+    Ok(EigenSolution {
+        eigenvalues: modes.eigenvalues,
+        vectors: modes.vectors,
+        residuals: modes.residuals,
+        rounding_floors: modes.floors,
+        completeness,
+        plan: None,
+        bounds,
+        next_eigenvalue,
+        finite_modes: None,
+        shift: 0.0,
+        counters,
+    })
+}
+
+/// The modes that are wanted, in canonical form, with their residuals, and the eigenvalue after them.
+fn canonical_modes(
+    problem: &EigenProblem<'_>,
+    refined: Refined,
+    settings: &EigenSettings,
+    counters: &mut Counters,
+) -> (Refined, Option<f64>) {
+    let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = refined;
+    let given = match settings.wanted {
+        Wanted::Lowest(count) => count.min(eigenvalues.len()),
+        Wanted::Below(lambda) => eigenvalues.partition_point(|&l| l < lambda),
+    };
+    let next_eigenvalue = eigenvalues.get(given).copied();
+    eigenvalues.truncate(given);
+    residuals.truncate(given);
+    floors.truncate(given);
+    vectors.truncate(vectors.nrows(), given);
+    let mut modes = Refined { eigenvalues, vectors, residuals, floors };
+    let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
+    canonical_basis(modes.vectors.as_mut(), &groups);
+    let mixed: Vec<usize> = groups.into_iter().filter(|group| group.len() > 1).flatten().collect();
+    modes.renew(problem, &mixed, counters);
+    (modes, next_eigenvalue)
+}
+
+impl Refined {
+    /// How many of the lowest are eigenvectors to the K-residual of `accuracy`.
+    fn exact(&self, accuracy: Accuracy) -> usize {
+        let pairs = self.residuals.iter().zip(&self.floors);
+        pairs.take_while(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()
+    }
+}
+
+/// What is known without a count.
+fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
+    let given = modes.eigenvalues.len();
+    let remark = if exact < given {
+        let pairs = modes.residuals.iter().zip(&modes.floors);
+        let others = pairs.filter(|(r, f)| !keeps(**r, **f, accuracy.residual())).count();
+        format!("{others} of {given} modes of the given subspace are no eigenvectors")
+    } else {
+        "accuracy `fast` leaves the count out".to_owned()
+    };
+    let shift = modes.eigenvalues.last().copied().unwrap_or(0.0);
+    Completeness { proof: Proof::NotProved, shift, negative_pivots: None, modes_below: given, remark }
+}
+
+/// The analysis that bounds are computed with, or the reason why there are none.
+fn certifiable<'a>(
+    modes: &Refined,
+    exact: usize,
+    completeness: &Completeness,
+    analysis: Option<&'a Analysis>,
+) -> Result<&'a Analysis, &'static str> {
+    if exact < modes.eigenvalues.len() {
+        return Err("not every mode of the subspace is an eigenvector to a K-residual of 1e-12");
+    }
+    if completeness.proof == Proof::NotProved {
+        return Err("modes are missing in the subspace");
+    }
+    Ok(analysis.expect("a count needs the analysis"))
+}
+
+/// Counts the modes below a shift just above the last of `eigenvalues`, all of which belong to eigenvectors.
+fn count(
+    problem: &EigenProblem<'_>,
+    analysis: &Analysis,
+    eigenvalues: &[f64],
+    settings: &EigenSettings,
+    counters: &mut Counters,
+) -> Result<Completeness, EigenFailure> {
+    let (rigid, found) = (problem.rigid.ncols(), eigenvalues.len());
+    let last = *eigenvalues.last().expect("counted only where there is one");
+    let outcome = |shift: f64, negative_pivots: Option<usize>, remark: String| Completeness {
+        proof: if remark.is_empty() { Proof::InertiaCount } else { Proof::NotProved },
+        shift,
+        negative_pivots,
+        modes_below: found,
+        remark,
+    };
+    let needed = Plan::count_bytes(problem, analysis, found);
+    if let Some(available) = settings.memory.filter(|&available| needed > available) {
+        let (needed, available) = (gigabytes(needed), gigabytes(available));
+        let remark = format!("the count needs {needed} of memory, {available} are available");
+        return Ok(outcome(last, None, remark));
+    }
+    if !is_positive_semidefinite(&problem.pencil, analysis) {
+        return Err(EigenFailure::MassIndefinite);
+    }
+    let mut counted = (last, 0);
+    for above in ABOVE {
+        let shift = (1.0 + above) * last;
+        let negative = count_below(problem, analysis, shift, counters)?;
+        if negative == rigid + found {
+            return Ok(outcome(shift, Some(negative), String::new()));
+        }
+        if negative < rigid + found {
+            let counted = negative.saturating_sub(rigid);
+            return Err(EigenFailure::CountDiffers { found, counted, shift });
+        }
+        counted = (shift, negative);
+    }
+    let (shift, negative) = counted;
+    let there = negative - rigid;
+    let remark =
+        format!("the body has {there} flexible modes below lambda = {shift:.6e}, the given subspace {found}");
+    Ok(outcome(shift, Some(negative), remark))
+}

@@ -1,0 +1,188 @@
+//! The digest of all content of a flex-body file, as `docs/format.md` describes it: a SHA-256 of every group
+//! and dataset, listed by path, and one of this list.
+
+use super::schema::{LIST, WHOLE};
+use flexbody_base::hdf5_file::{Record, Stored, attribute_names, attribute_record, dataset_record};
+use flexbody_base::provenance::{Fingerprint, sha256_hex};
+use hdf5::{IndexType, IterationOrder, LinkType, LocationType};
+use hdf5_metno as hdf5;
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
+
+/// Deeper groups are not part of any format version.
+const DEEPEST: usize = 8;
+/// Groups may contain themselves, so that even a small file can unfold without end.
+const MOST_ENTRIES: usize = 100_000;
+/// Names of entries in a message.
+const MOST_NAMED: usize = 6;
+/// Numbers that are turned into bytes at a time.
+const BLOCK: usize = 1 << 13;
+
+/// SHA-256 by path.
+pub(super) type Digests = BTreeMap<String, String>;
+/// Datasets whose numbers have gone into a fingerprint already, by path.
+pub(super) type Numbers = HashMap<String, Fingerprint>;
+
+/// Numbers that a dataset holds.
+pub(super) trait Number: Copy + Sync {
+    /// Name of the type in a digest.
+    const KIND: &'static str;
+    /// Appends its bytes, little-endian.
+    fn put(self, bytes: &mut Vec<u8>);
+}
+
+macro_rules! number {
+    ($type:ty, $kind:literal) => {
+        impl Number for $type {
+            const KIND: &'static str = $kind;
+            fn put(self, bytes: &mut Vec<u8>) {
+                bytes.extend(self.to_le_bytes());
+            }
+        }
+    };
+}
+number!(f64, "float64");
+number!(f32, "float32");
+number!(i64, "int64");
+number!(i32, "int32");
+
+/// The digest of a dataset as far as its numbers go: `values` row-major in the extents `shape`.
+pub(super) fn of_numbers<T: Number>(shape: &[usize], values: &[T]) -> Fingerprint {
+    let mut fingerprint = Fingerprint::default();
+    fingerprint.update(header("", T::KIND, shape, size_of_val(values)).as_bytes());
+    let mut bytes = Vec::with_capacity(size_of::<T>() * BLOCK.min(values.len()));
+    for block in values.chunks(BLOCK) {
+        bytes.clear();
+        block.iter().for_each(|value| value.put(&mut bytes));
+        fingerprint.update(&bytes);
+    }
+    fingerprint
+}
+
+/// What stands before the bytes of a dataset (without a name) or of an attribute. The lengths make it
+/// unambiguous.
+fn header(name: &str, kind: &str, shape: &[usize], bytes: usize) -> String {
+    let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
+    format!("{} {name} {kind} {} {bytes}\n", name.len(), shape.join("x"))
+}
+
+fn add(fingerprint: &mut Fingerprint, name: &str, record: &Record) {
+    fingerprint.update(header(name, record.kind, &record.shape, record.bytes.len()).as_bytes());
+    fingerprint.update(&record.bytes);
+}
+
+/// The text of the list, and its SHA-256.
+pub(super) fn sealed(digests: &Digests) -> (String, String) {
+    let mut list = String::new();
+    for (path, digest) in digests {
+        writeln!(list, "{digest}  {path}").expect("writing to a String cannot fail");
+    }
+    let whole = sha256_hex(list.as_bytes());
+    (list, whole)
+}
+
+/// Digests of everything in `file`; of the datasets in `numbers` only the attributes are read.
+///
+/// # Errors
+/// The path of an entry that no flex-body file has, and what is wrong with it.
+pub(super) fn digests_of(
+    file: &hdf5::File,
+    numbers: &mut Numbers,
+    stored: &mut Stored,
+) -> Result<Digests, String> {
+    let mut walk = Walk { numbers, stored, found: Digests::new() };
+    let root = file.as_group().map_err(|e| format!("/: {e}"))?;
+    walk.group(&root, "/", 0)?;
+    Ok(walk.found)
+}
+
+struct Walk<'a> {
+    numbers: &'a mut Numbers,
+    stored: &'a mut Stored,
+    found: Digests,
+}
+
+impl Walk<'_> {
+    fn group(&mut self, group: &hdf5::Group, path: &str, depth: usize) -> Result<(), String> {
+        self.object(group, path, Fingerprint::default())?;
+        let links = group.links(IndexType::Name, IterationOrder::Native);
+        for (name, link) in links.map_err(|e| format!("{path}: {e}"))? {
+            let inner = format!("{}/{name}", path.trim_end_matches('/'));
+            if link.link_type != LinkType::Hard || depth == DEEPEST || name.contains('\n') {
+                return Err(format!("{inner}: no flex-body file has such an entry"));
+            }
+            self.member(group, &name, &inner, depth)?;
+        }
+        Ok(())
+    }
+
+    fn member(&mut self, group: &hdf5::Group, name: &str, path: &str, depth: usize) -> Result<(), String> {
+        let about = |e: hdf5::Error| format!("{path}: {e}");
+        match group.loc_type_by_name(name).map_err(about)? {
+            LocationType::Group => self.group(&group.group(name).map_err(about)?, path, depth + 1),
+            LocationType::Dataset => {
+                let dataset = group.dataset(name).map_err(about)?;
+                let numbers = match self.numbers.remove(path) {
+                    Some(fingerprint) => fingerprint,
+                    None => {
+                        let record =
+                            dataset_record(&dataset, self.stored).map_err(|e| format!("{path}: {e}"))?;
+                        let mut fingerprint = Fingerprint::default();
+                        add(&mut fingerprint, "", &record);
+                        fingerprint
+                    }
+                };
+                self.object(&dataset, path, numbers)
+            }
+            _ => Err(format!("{path}: no flex-body file has such an entry")),
+        }
+    }
+
+    /// Adds the attributes of a group or dataset, by name, and lists it.
+    fn object(
+        &mut self,
+        place: &hdf5::Location,
+        path: &str,
+        mut fingerprint: Fingerprint,
+    ) -> Result<(), String> {
+        let about = |problem: String| format!("{path}: {problem}");
+        let mut names = attribute_names(place).map_err(about)?;
+        names.sort_unstable();
+        for name in names.iter().filter(|name| path != "/" || ![LIST, WHOLE].contains(&name.as_str())) {
+            let record = attribute_record(place, name).map_err(|e| format!("{path}@{name}: {e}"))?;
+            add(&mut fingerprint, name, &record);
+        }
+        self.found.insert(path.to_owned(), fingerprint.hex());
+        if self.found.len() > MOST_ENTRIES {
+            return Err(format!("{path}: more than {MOST_ENTRIES} entries"));
+        }
+        Ok(())
+    }
+}
+
+/// How the content that was found differs from the list that was stored with it; `None`: not at all.
+pub(super) fn difference(found: &Digests, list: &str, whole: &str) -> Option<String> {
+    if sealed(found) == (list.to_owned(), whole.to_owned()) {
+        return None;
+    }
+    if sha256_hex(list.as_bytes()) != whole {
+        return Some(format!("/@{LIST} does not have the SHA-256 that /@{WHOLE} states"));
+    }
+    let stated: BTreeMap<&str, &str> =
+        list.lines().filter_map(|line| line.split_once("  ")).map(|(digest, path)| (path, digest)).collect();
+    let is_new = |path: &&String| !stated.contains_key(path.as_str());
+    let other = |path: &&String| stated.get(path.as_str()).is_some_and(|digest| *digest != found[*path]);
+    let parts = [
+        ("changed", found.keys().filter(other).map(String::as_str).collect::<Vec<_>>()),
+        ("added", found.keys().filter(is_new).map(String::as_str).collect()),
+        ("removed", stated.keys().filter(|path| !found.contains_key(**path)).copied().collect()),
+    ];
+    let told = parts.iter().filter(|(_, paths)| !paths.is_empty()).map(|(what, paths)| {
+        let more = match paths.len().saturating_sub(MOST_NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        format!("{what}: {}{more}", paths[..paths.len().min(MOST_NAMED)].join(", "))
+    });
+    Some(told.collect::<Vec<_>>().join("; "))
+}

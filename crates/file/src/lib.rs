@@ -1,0 +1,57 @@
+//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; the checkpoint of a
+//! search; the file of a simulation.
+
+#![deny(
+    clippy::exit,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used
+)]
+
+#[cfg(feature = "hdf5")]
+mod assemble;
+#[cfg(feature = "hdf5")]
+mod checkpoint;
+mod contents;
+#[cfg(feature = "hdf5")]
+mod derived;
+#[cfg(feature = "hdf5")]
+mod digest;
+mod document;
+#[cfg(feature = "hdf5")]
+mod extents;
+mod item;
+mod names;
+#[cfg(feature = "hdf5")]
+mod read;
+mod recorded_motion;
+#[cfg(feature = "hdf5")]
+mod scan;
+mod schema;
+#[cfg(feature = "hdf5")]
+mod simulation;
+#[cfg(feature = "hdf5")]
+mod simulation_read;
+#[cfg(feature = "hdf5")]
+mod structure;
+mod value;
+#[cfg(feature = "hdf5")]
+mod write;
+
+#[cfg(feature = "hdf5")]
+pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
+pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
+pub use document::{format_markdown, format_schema};
+pub use flexbody_base::output::OutputSlot;
+#[cfg(feature = "hdf5")]
+pub use read::{read, read_with_notes, validate};
+pub use recorded_motion::RecordedMotion;
+#[cfg(feature = "hdf5")]
+pub use simulation::fill_simulation;
+#[cfg(feature = "hdf5")]
+pub use simulation_read::read_simulation;
+#[cfg(feature = "hdf5")]
+pub use structure::structure;
+#[cfg(feature = "hdf5")]
+pub use write::{fill_slot, prepare_output, write, write_to};

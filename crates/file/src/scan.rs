@@ -1,0 +1,381 @@
+//! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing
+//! that the file declares before it is checked against the rest.
+
+use super::digest::{self, Numbers, digests_of, of_numbers};
+use super::extents::{Sizes, dataset, index};
+use super::item::{Group, Item, Kind, Origin, Per};
+use super::names;
+use super::names::place;
+use super::schema::terms::{DROPPED, KEPT};
+use super::schema::{DIGESTS_SINCE, TABLE};
+use super::schema::{LIST, WHOLE};
+use super::value::Value;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::hdf5_file::{self as hdf5_file, Array, Stored};
+use flexbody_base::units::UnitSystem;
+use flexbody_body::flex_body::{Group as TermGroup, Groups, Storage};
+use hdf5_metno as hdf5;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
+
+/// A damaged file can break every entry of every scheme: enough to see the pattern.
+const MOST_PROBLEMS: usize = 200;
+
+/// The contents of a file that fit the table, and the problems of the rest.
+pub(super) struct Scan {
+    file: std::path::PathBuf,
+    /// Values by path, e.g. `/modes/residual` or `/source@model` for attributes.
+    pub values: HashMap<String, Value>,
+    /// By the parent group that decides: see [`Scan::instances`].
+    instances: BTreeMap<&'static str, Vec<(String, String)>>,
+    /// Everything that does not fit.
+    pub problems: Vec<Diagnostic>,
+    sizes: Sizes,
+    stored: Stored,
+    /// Fingerprints of the numbers that were read, where the file has digests.
+    numbers: Numbers,
+    units: Option<UnitSystem>,
+    /// Precision of the large arrays, which the root says.
+    pub storage: Storage,
+    /// Entries of groups of the kinetic energy, and whether they are there.
+    of_groups: Vec<(String, &'static Item, bool)>,
+}
+
+/// Key of an entry in [`Scan::values`].
+pub(super) fn key(place: &str, item: &Item) -> String {
+    let separator = if item.shape().is_none() {
+        "@"
+    } else if place == "/" {
+        ""
+    } else {
+        "/"
+    };
+    format!("{place}{separator}{}", item.name)
+}
+
+impl Scan {
+    /// Reads all entries of `file`, which lies at `path` and is `bytes` long.
+    pub(crate) fn new(file: &hdf5::File, path: &Path, bytes: u64) -> Self {
+        let mut scan = Self {
+            file: path.to_path_buf(),
+            values: HashMap::new(),
+            instances: BTreeMap::new(),
+            problems: Vec::new(),
+            sizes: Sizes::default(),
+            stored: Stored::new(bytes),
+            numbers: Numbers::default(),
+            units: None,
+            storage: Storage::F64,
+            of_groups: Vec::new(),
+        };
+        for group in TABLE {
+            match group.per {
+                Per::Body => scan.group(file, group, None),
+                Per::LumpingScheme | Per::Interface | Per::UnitLoad | Per::InertiaLoad => {
+                    scan.list(file, group);
+                    for (_, link) in scan.instances(group.parent()) {
+                        // Links cost nothing: a file may hold millions of them.
+                        if scan.problems.len() > MOST_PROBLEMS {
+                            break;
+                        }
+                        scan.group(file, group, Some(&link));
+                    }
+                }
+            }
+        }
+        scan.groups();
+        scan
+    }
+
+    /// Adds a violation of the schema.
+    pub(crate) fn add(&mut self, message: String) {
+        self.add_as(Code::BodySchema, message);
+    }
+
+    /// Adds a problem with a code of its own.
+    pub(crate) fn add_as(&mut self, code: Code, message: String) {
+        match self.problems.len() {
+            len if len < MOST_PROBLEMS => {
+                self.problems.push(Diagnostic::new(code, message).in_file(&self.file));
+            }
+            MOST_PROBLEMS => self.problems.push(
+                Diagnostic::new(code, "more problems follow, which are not listed").in_file(&self.file),
+            ),
+            _ => {}
+        }
+    }
+
+    /// Names that are data below `parent`, in file order, each with its link name.
+    pub(crate) fn instances(&self, parent: &str) -> Vec<(String, String)> {
+        // `/comparison` has the members of `/lumped`.
+        let per = TABLE.iter().find(|g| g.parent() == parent).map(|g| g.per);
+        let first = TABLE.iter().find(|g| Some(g.per) == per).map_or("", |g| g.parent());
+        self.instances.get(first).cloned().unwrap_or_default()
+    }
+
+    /// Looks up the instances of a group that occurs several times; groups of the same kind have the same
+    /// ones.
+    fn list(&mut self, file: &hdf5::File, group: &Group) {
+        let parent = group.parent();
+        let links = match hdf5_file::open_group(file, parent).and_then(|g| hdf5_file::members(&g)) {
+            Ok(links) => links,
+            // A file of an older minor version.
+            Err(found) if group.since() > 0 && found == hdf5_file::NOTHING => Vec::new(),
+            Err(found) => return self.add(format!("{parent}: expected a group, found {found}")),
+        };
+        let first = TABLE.iter().find(|g| g.per == group.per).map_or(parent, |g| g.parent());
+        if first == parent {
+            let named = links.into_iter().map(|link| (names::decode(&link), link)).collect();
+            self.instances.insert(first, named);
+            return;
+        }
+        let expected: HashSet<String> = self.instances(parent).into_iter().map(|(_, link)| link).collect();
+        for link in links {
+            if !expected.contains(&link) {
+                self.add(format!("{parent}/{link}: expected a group of that name in {first} too"));
+            }
+        }
+    }
+
+    fn group(&mut self, file: &hdf5::File, group: &Group, link: Option<&str>) {
+        let path = place(group, link);
+        let opened = match hdf5_file::open_group(file, &path) {
+            Ok(opened) => opened,
+            // Of a body that has none of it, or in a file of an older minor version.
+            Err(found) if group.since() > 0 && link.is_none() && found == hdf5_file::NOTHING => return,
+            Err(found) => return self.add(format!("{path}: expected a group, found {found}")),
+        };
+        let mut sizes = self.sizes;
+        sizes.interface_nodes = None;
+        for item in group.entries() {
+            let name = key(&path, item);
+            self.texts(&opened, &name, item);
+            let entry = self.entry(&opened, &name, item, &mut sizes);
+            if let (Ok(value), Some(_)) = (&entry, item.of) {
+                self.of_groups.push((name.clone(), item, value.is_some()));
+            }
+            match entry {
+                Ok(Some(value)) => {
+                    self.constant(&name, item, &value);
+                    self.values.insert(name, value);
+                }
+                Ok(None) if item.required && item.of.is_none() => {
+                    self.add(format!("{name}: expected {}, found nothing", kind(item)))
+                }
+                Ok(None) => {}
+                Err(problem) => self.add(format!("{name}: {problem}")),
+            }
+        }
+        self.sizes = sizes;
+        if group.path == "/" {
+            self.units = self.unit_system();
+            self.storage = self.precision();
+        }
+    }
+
+    fn entry(
+        &mut self,
+        place: &hdf5::Group,
+        name: &str,
+        item: &Item,
+        sizes: &mut Sizes,
+    ) -> Result<Option<Value>, String> {
+        match item.kind {
+            Kind::Floats(shape) => {
+                let stored = &mut self.stored;
+                let values = match item.is_short(self.storage) {
+                    false => dataset::<f64>(place, item.name, shape, sizes, stored)?
+                        .inspect(|read| self.hash(name, read)),
+                    true => dataset::<f32>(place, item.name, shape, sizes, stored)?
+                        .inspect(|read| self.hash(name, read))
+                        .map(|(values, dims)| (values.into_iter().map(f64::from).collect(), dims)),
+                };
+                let Some((values, dims)) = values else { return Ok(None) };
+                match values.iter().position(|v| !v.is_finite()) {
+                    Some(i) => {
+                        Err(format!("expected finite numbers, found {} at {}", values[i], index(i, &dims)))
+                    }
+                    None => Ok(Some(Value::Floats(values))),
+                }
+            }
+            Kind::Ints(shape) => {
+                let values = dataset::<i64>(place, item.name, shape, sizes, &mut self.stored)?
+                    .inspect(|read| self.hash(name, read));
+                Ok(values.map(|(values, _)| Value::Ints(values)))
+            }
+            Kind::Indices(shape) => {
+                let values = dataset::<i32>(place, item.name, shape, sizes, &mut self.stored)?
+                    .inspect(|read| self.hash(name, read));
+                Ok(values.map(|(values, _)| Value::Indices(values)))
+            }
+            Kind::Text => Ok(hdf5_file::text(place, item.name)?.map(Value::Text)),
+            Kind::Int => Ok(hdf5_file::int(place, item.name)?.map(Value::Int)),
+            Kind::Float => match hdf5_file::float(place, item.name)? {
+                Some(v) if !v.is_finite() => Err(format!("expected a finite number, found {v}")),
+                v => Ok(v.map(Value::Float)),
+            },
+            Kind::Named => {
+                let mut values = Vec::new();
+                for name in hdf5_file::attribute_names(place)? {
+                    match hdf5_file::float(place, &name) {
+                        Ok(Some(v)) if v.is_finite() => values.push((name, v)),
+                        Ok(v) => return Err(format!("{name}: expected a finite number, found {v:?}")),
+                        Err(e) => return Err(format!("{name}: {e}")),
+                    }
+                }
+                Ok(Some(Value::Named(values)))
+            }
+        }
+    }
+
+    /// Keeps the fingerprint of numbers that were read, so that they are not read again.
+    fn hash<T: digest::Number>(&mut self, name: &str, (values, dims): &Array<T>) {
+        if self.stated_digests().is_some() {
+            self.numbers.insert(name.to_owned(), of_numbers(dims, values));
+        }
+    }
+
+    /// The list of digests that the file states, and the SHA-256 of the list.
+    pub(crate) fn stated_digests(&self) -> Option<(&str, &str)> {
+        match [LIST, WHOLE].map(|name| self.values.get(&format!("/@{name}"))) {
+            [Some(Value::Text(list)), Some(Value::Text(whole))] => Some((list, whole)),
+            _ => None,
+        }
+    }
+
+    /// Holds all content of the file, unknown entries included, to the digests that it states.
+    pub(crate) fn check_digests(&mut self, file: &hdf5::File) {
+        let Some((list, whole)) = self.stated_digests() else {
+            let minor = self.values.get("/@format_minor");
+            if matches!(minor, Some(Value::Int(minor)) if *minor >= DIGESTS_SINCE) {
+                self.add_as(
+                    Code::BodyChanged,
+                    format!("the attributes `{LIST}` and `{WHOLE}` were removed from the file"),
+                );
+            }
+            return;
+        };
+        let (list, whole) = (list.to_owned(), whole.to_owned());
+        let found = digests_of(file, &mut self.numbers, &mut self.stored);
+        let differs = match found {
+            Ok(found) => digest::difference(&found, &list, &whole),
+            Err(problem) => Some(problem),
+        };
+        if let Some(differs) = differs {
+            self.add_as(Code::BodyChanged, format!("the content is not what was written; {differs}"));
+        }
+    }
+
+    /// What belongs to a group of the kinetic energy is there where `/terms` says that the group is kept, and
+    /// only there.
+    fn groups(&mut self) {
+        let Some(held) = self.held() else { return };
+        for (name, item, there) in std::mem::take(&mut self.of_groups) {
+            let Some(group) = item.of else { continue };
+            match (held.has(group), there) {
+                (true, false) => self.add(format!("{name}: expected {}, found nothing", kind(item))),
+                (false, true) => {
+                    let said = format!("/terms@{} says `{DROPPED}`", group.name());
+                    self.add(format!("{name}: expected nothing, since {said}, found a dataset"));
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// The groups of the kinetic energy that the file says the body holds; `None` when it says something
+    /// else.
+    pub(crate) fn held(&mut self) -> Option<Groups> {
+        let mut says = |group: TermGroup| match self.values.get(&format!("/terms@{}", group.name())) {
+            Some(Value::Text(text)) if text == KEPT => Some(true),
+            Some(Value::Text(text)) if text == DROPPED => Some(false),
+            Some(Value::Text(found)) => {
+                let message =
+                    format!("/terms@{}: expected `{KEPT}` or `{DROPPED}`, found {found:?}", group.name());
+                self.add(message);
+                None
+            }
+            // What is missing is among the problems.
+            _ => Some(true),
+        };
+        let [w1, w2, w3] = TermGroup::ALL.map(&mut says);
+        Some(Groups { w1: w1?, w2: w2?, w3: w3? })
+    }
+
+    fn constant(&mut self, name: &str, item: &Item, value: &Value) {
+        match (item.origin, value) {
+            (Origin::ConstantText(expected), Value::Text(found)) if found != expected => {
+                self.add(format!("{name}: expected `{expected}`, found {found:?}"));
+            }
+            (Origin::ConstantInt(expected), Value::Int(found)) if *found != expected => {
+                self.add(format!("{name}: expected {expected}, found {found}"));
+            }
+            _ => {}
+        }
+    }
+
+    /// The descriptive attributes of a dataset; units must be those of the body.
+    fn texts(&mut self, place: &hdf5::Group, name: &str, item: &Item) {
+        if item.shape().is_none() {
+            return;
+        }
+        let Ok(Some(dataset)) = hdf5_file::open_dataset(place, item.name) else { return };
+        for attribute in ["units", "symbol", "description"] {
+            match hdf5_file::text(&dataset, attribute) {
+                Ok(Some(found)) => {
+                    let expected = self.units.as_ref().map(|u| item.units.concrete(u));
+                    if let Some(expected) = expected.filter(|e| attribute == "units" && *e != found) {
+                        self.add(format!("{name}@units: expected `{expected}`, found {found:?}"));
+                    }
+                }
+                Ok(None) => self.add(format!("{name}@{attribute}: expected a text attribute, found nothing")),
+                Err(problem) => self.add(format!("{name}@{attribute}: {problem}")),
+            }
+        }
+    }
+
+    fn precision(&mut self) -> Storage {
+        let Some(Value::Text(name)) = self.values.get("/@storage") else { return Storage::F64 };
+        let known = Storage::ALL.into_iter().find(|storage| storage.name() == name);
+        if known.is_none() {
+            let message = format!("/@storage: expected `f64` or `f32`, found {name:?}");
+            self.add(message);
+        }
+        known.unwrap_or_default()
+    }
+
+    fn unit_system(&mut self) -> Option<UnitSystem> {
+        let name = |what: &str| match self.values.get(&format!("/@units_{what}")) {
+            Some(Value::Text(name)) => Some(name.clone()),
+            _ => None,
+        };
+        let (length, mass, time) = (name("length")?, name("mass")?, name("time")?);
+        match UnitSystem::parse(&length, &mass, &time) {
+            Ok(mut units) => {
+                units.stated = self.values.get("/@units_stated") == Some(&Value::Int(1));
+                Some(units)
+            }
+            Err(unknown) => {
+                let (what, found) = unknown.split_once(' ').unwrap_or(("", &unknown));
+                self.add(format!("/@units_{what}: expected a known unit or a number, found {found}"));
+                None
+            }
+        }
+    }
+
+    /// Units of the body; `None` when the file does not state them, which is then among the problems.
+    pub(crate) fn units(&self) -> Option<&UnitSystem> {
+        self.units.as_ref()
+    }
+}
+
+fn kind(item: &Item) -> &'static str {
+    match item.kind {
+        Kind::Floats(_) => "a dataset of 64-bit floats",
+        Kind::Ints(_) => "a dataset of 64-bit integers",
+        Kind::Indices(_) => "a dataset of 32-bit integers",
+        Kind::Text => "a text attribute",
+        Kind::Int => "an integer attribute",
+        Kind::Float | Kind::Named => "a float attribute",
+    }
+}

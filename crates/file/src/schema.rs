@@ -1,0 +1,617 @@
+//! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow
+//! it.
+
+use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, ThreeModes, Triangles};
+use super::item::Kind::{Floats, Indices, Int, Ints, Named, Text};
+use super::item::Origin::{ConstantInt, ConstantText, Primary};
+use super::item::{Get, Group, Item, Kind, Origin, Per};
+use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
+use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
+use flexbody_base::provenance;
+use flexbody_body::flex_body::{Group as TermGroup, MassStructure, Parts, Storage};
+use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
+use interfaces::{COORDINATES, INTERFACES};
+use terms::TERMS;
+
+mod certificate;
+mod geometric_stiffness;
+mod interfaces;
+pub(super) mod terms;
+
+/// Root attribute with the list: a line `SHA-256  path` for each group and dataset, by path.
+pub(super) const LIST: &str = "digests";
+/// Root attribute with the SHA-256 of the list.
+pub(super) const WHOLE: &str = "sha256";
+
+/// Version of the format: readers refuse a newer major; a newer minor only adds entries.
+pub(super) const MAJOR: i64 = 1;
+/// The minor version that has all entries; see [`MAJOR`]. A file states the least version that has those that
+/// it holds.
+pub(super) const MINOR: i64 = 7;
+/// The minor version of files of bodies in mean axes.
+const MEAN_AXES_ONLY: i64 = 6;
+/// The minor version of files of bodies in mean axes without stiffness of inertia.
+const WITHOUT_INERTIA_STIFFNESS: i64 = 5;
+/// The minor version of files with neither that nor a surface.
+const WITHOUT_MESH: i64 = 4;
+/// The minor version from which on every file has digests.
+pub(super) const DIGESTS_SINCE: i64 = 4;
+/// Value of the root attribute `format`.
+pub(super) const FORMAT: &str = "flexbody";
+
+const ONE: Units = Units::One;
+const MASS: Units = Units::Of { mass_halves: 2, length: 0, time: 0 };
+const LENGTH: Units = Units::Of { mass_halves: 0, length: 1, time: 0 };
+const MASS_LENGTH: Units = Units::Of { mass_halves: 2, length: 1, time: 0 };
+const MASS_LENGTH2: Units = Units::Of { mass_halves: 2, length: 2, time: 0 };
+const ROOT_MASS: Units = Units::Of { mass_halves: 1, length: 0, time: 0 };
+const ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: 1, length: 1, time: 0 };
+const PER_ROOT_MASS: Units = Units::Of { mass_halves: -1, length: 0, time: 0 };
+const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, time: 0 };
+const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
+const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
+
+/// A required dataset of version 1.0.
+const fn dataset(
+    name: &'static str,
+    kind: Kind,
+    units: Units,
+    symbol: &'static str,
+    description: &'static str,
+    get: Get,
+) -> Item {
+    Item {
+        name,
+        kind,
+        units,
+        symbol,
+        description,
+        required: true,
+        since: 0,
+        origin: Primary(get),
+        of: None,
+        large: false,
+    }
+}
+
+/// A required attribute of version 1.0.
+const fn attribute(
+    name: &'static str,
+    kind: Kind,
+    units: Units,
+    description: &'static str,
+    get: Get,
+) -> Item {
+    dataset(name, kind, units, "", description, get)
+}
+
+/// A required attribute of version 1.0 with one value for every file.
+const fn constant(name: &'static str, kind: Kind, origin: Origin, description: &'static str) -> Item {
+    Item {
+        name,
+        kind,
+        units: ONE,
+        symbol: "",
+        description,
+        required: true,
+        since: 0,
+        origin,
+        of: None,
+        large: false,
+    }
+}
+
+const ROOT: &[Item] = &[
+    constant("format", Text, ConstantText(FORMAT), "marks a flex-body file"),
+    constant("format_major", Int, ConstantInt(MAJOR), "version of the format; a reader refuses a newer one"),
+    attribute(
+        "format_minor",
+        Int,
+        ONE,
+        "additions within the major version; a reader ignores what it does not know",
+        |v| {
+            let Parts { conditions, inertia_stiffness, mesh, .. } = v.body;
+            Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
+                (false, _, _) => MINOR,
+                (true, Some(_), _) => MEAN_AXES_ONLY,
+                (true, None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
+                (true, None, None) => WITHOUT_MESH,
+            }))
+        },
+    ),
+    attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
+        text(provenance::generator())
+    }),
+    attribute(
+        "dimension",
+        Int,
+        ONE,
+        "3; 2: the body stays in its plane z = 0, all components along z are zero",
+        |v| count(v.body.dimension),
+    ),
+    attribute(
+        "units_length",
+        Text,
+        ONE,
+        "unit of length: a name (`m mm cm um km in ft`) or its size in m",
+        |v| text(v.body.units.length.name()),
+    ),
+    attribute(
+        "units_mass",
+        Text,
+        ONE,
+        "unit of mass: a name (`kg g t tonne lb slug slinch`) or its size in kg",
+        |v| text(v.body.units.mass.name()),
+    ),
+    attribute("units_time", Text, ONE, "unit of time: a name (`s ms us`) or its size in s", |v| {
+        text(v.body.units.time.name())
+    }),
+    attribute(
+        "storage",
+        Text,
+        ONE,
+        "`f32`: shapes and the inertia of the modes are rounded to 32-bit floats, in the datasets marked float32; absent: `f64`, all floats have 64 bits",
+        |v| text((v.body.storage == Storage::F32).then(|| v.body.storage.name())?),
+    )
+    .added(3),
+    attribute("units_stated", Int, ONE, "1: the user stated the units; 0: m, kg, s were assumed", |v| {
+        Some(Value::Int(v.body.units.stated.into()))
+    }),
+    attribute(
+        LIST,
+        Text,
+        ONE,
+        "SHA-256 of every group and dataset, as described above: a line for each, by path; absent before 1.4",
+        // Of what was written: the writer adds it at the end.
+        |_| None,
+    )
+    .added(DIGESTS_SINCE),
+    attribute(WHOLE, Text, ONE, "SHA-256 of the text of `digests`: of all content; absent before 1.4", |_| None)
+        .added(DIGESTS_SINCE),
+];
+
+const SOURCE: &[Item] = &[
+    attribute("model", Text, ONE, "name of the model", |v| text(v.body.source.name.as_str())),
+    attribute(
+        "files",
+        Text,
+        ONE,
+        "input files as a JSON array of objects with `role`, `name`, `sha256`",
+        |v| text(serde_json::to_string(&v.body.source.files).expect("structs of strings are valid JSON")),
+    ),
+    attribute(
+        "body_number",
+        Int,
+        ONE,
+        "which of several bodies in the same matrices this is, from 1 (`--split`)",
+        |v| count(v.body.source.number?.number),
+    )
+    .added(2),
+    attribute("bodies", Int, ONE, "how many bodies the matrices hold (`--split`)", |v| {
+        count(v.body.source.number?.of)
+    })
+    .added(2),
+    attribute("n_nodes", Int, ONE, "nodes of the body", |v| count(v.body.nodes.len())).derived(""),
+    attribute("n_dofs", Int, ONE, "rows of the FE matrices; 0: not known, the body comes from another program", |v| count(v.body.source.n_dofs)),
+    attribute(
+        "mass_structure",
+        Text,
+        ONE,
+        "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither, and `/invariants/W0` is there",
+        |v| text(mass_structure_name(v.body.source.mass_structure)),
+    ),
+    attribute(
+        "approximation",
+        Text,
+        ONE,
+        "what stays approximate for the mass structure `general`; absent: nothing, the invariants are those of the matrices",
+        |v| text(v.body.source.approximation.as_deref()?),
+    )
+    .added(2),
+    attribute("settings", Text, ONE, "settings of the run that can change the result, as JSON", |v| {
+        text(v.body.source.settings.to_string())
+    }),
+];
+
+const FRAME: &[Item] = &[
+    attribute(
+        "reference_conditions",
+        Text,
+        ONE,
+        "what ties the frame to the deformed body: `interface NAME`: its reference point is the origin and rests in every mode; `not stated`: the modes do, as in the file of another program that the body comes from; absent: `mean axes`, C1 = C2 = 0",
+        |v| text((!v.body.conditions.is_mean()).then(|| v.body.conditions.text())?),
+    )
+    .added(7),
+    dataset(
+        "origin",
+        Floats(&[Fixed(3)]),
+        LENGTH,
+        "r0",
+        "origin of the body frame in model coordinates",
+        |v| small(v.body.frame.origin),
+    ),
+    dataset(
+        "axes",
+        Floats(&[Fixed(3), Fixed(3)]),
+        ONE,
+        "A0",
+        "columns are the body axes in model axes, right-handed: x_model = r0 + A0 x_body",
+        |v| small(v.body.frame.axes),
+    ),
+];
+
+const NODES: &[Item] = &[
+    dataset("id", Ints(&[Nodes]), ONE, "id", "node numbers of the FE model, unique", |v| {
+        Some(Value::Ints(v.body.nodes.ids.clone()))
+    }),
+    dataset(
+        "position",
+        Floats(&[Nodes, Fixed(3)]),
+        LENGTH,
+        "x",
+        "undeformed node positions in the body frame",
+        |v| Some(Value::Floats(v.body.nodes.positions.as_flattened().to_vec())),
+    ),
+    dataset(
+        "rotational_first_moment",
+        Floats(&[Nodes, Fixed(3)]),
+        MASS_LENGTH,
+        "h",
+        "moments of the mass that turns with each node, about the frame origin: of director a the sum of E_s over all points (theory section 6); with `rotational_second_moment` what `/inertia_stiffness` follows from",
+        |v| {
+            let moments = &v.body.inertia_stiffness.as_ref()?.moments;
+            Some(Value::Floats(moments.iter().flat_map(|own| own.first.iter().copied()).collect()))
+        },
+    )
+    .added(6),
+    dataset(
+        "rotational_second_moment",
+        Floats(&[Nodes, Fixed(3), Fixed(3)]),
+        MASS_LENGTH2,
+        "z",
+        "row a: of director a the sum of E_s with the places of all points and directors",
+        |v| {
+            let moments = &v.body.inertia_stiffness.as_ref()?.moments;
+            Some(Value::Floats(moments.iter().flat_map(|own| own.second.transpose().as_slice().to_vec()).collect()))
+        },
+    )
+    .added(6),
+];
+
+const MESH: &[Item] = &[
+    dataset(
+        "triangles",
+        Indices(&[Triangles, Fixed(3)]),
+        ONE,
+        "",
+        "triangles of the surface by the indices of their nodes in `/nodes`, from 0, counterclockwise seen from outside; absent: lines only",
+        |v| {
+            let triangles = v.body.mesh.as_ref()?.triangles();
+            (!triangles.is_empty()).then(|| indices(triangles.as_flattened()))
+        },
+    )
+    .added(5),
+    dataset(
+        "edges",
+        Indices(&[Edges, Fixed(2)]),
+        ONE,
+        "",
+        "edges to draw: where the surface turns by more than 30 degrees or ends, and beams; absent: none",
+        |v| {
+            let edges = v.body.mesh.as_ref()?.edges();
+            (!edges.is_empty()).then(|| indices(edges.as_flattened()))
+        },
+    )
+    .added(5),
+];
+
+const MODES: &[Item] = &[
+    attribute(
+        "truncation",
+        Text,
+        ONE,
+        "JSON array with the `load` of every residual vector and of every interface, and what the modes lack of the static response to it, in the norm of K, `before` (free modes alone) and `after`; absent: not known",
+        |v| {
+            let truncation = &v.body.modes.truncation;
+            let json = || serde_json::to_string(truncation).expect("finite numbers and strings are valid JSON");
+            (!truncation.is_empty()).then(|| Value::Text(json()))
+        },
+    )
+    .added(2),
+    attribute(
+        "provenance",
+        Text,
+        ONE,
+        "where each mode comes from, as a JSON array of nf texts; absent: not known",
+        |v| {
+            let provenance = &v.body.modes.provenance;
+            let json = || serde_json::to_string(provenance).expect("strings are valid JSON");
+            (!provenance.is_empty()).then(|| Value::Text(json()))
+        },
+    )
+    .added(2),
+    dataset(
+        "eigenvalue",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda",
+        "eigenvalues of K psi = lambda M psi, positive, ascending",
+        |v| Some(Value::Floats(v.body.modes.eigenvalue.clone())),
+    ),
+    dataset(
+        "frequency_hz",
+        Floats(&[Modes]),
+        Units::Hertz,
+        "f",
+        "sqrt(lambda) / (2 pi), in hertz whatever the unit of time",
+        |v| {
+            let hertz = v.body.units.hertz();
+            let frequency = |l: &f64| l.sqrt() / std::f64::consts::TAU * hertz;
+            Some(Value::Floats(v.body.modes.eigenvalue.iter().map(frequency).collect()))
+        },
+    )
+    .derived("frequency_hz"),
+    dataset(
+        "residual",
+        Floats(&[Modes]),
+        ONE,
+        "rho",
+        "|K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), 2-norms",
+        |v| Some(Value::Floats(v.body.modes.residual.clone())),
+    ),
+    dataset(
+        "damping_ratio",
+        Floats(&[Modes]),
+        ONE,
+        "zeta",
+        "modal damping ratios; 0 where none was given",
+        |v| Some(Value::Floats(v.body.modes.damping_ratio.clone())),
+    ),
+    dataset(
+        "eigenvalue_lower",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda-",
+        "guaranteed lower bounds of the eigenvalues of K and M as stored; accuracy `certified` only",
+        |v| Some(Value::Floats(guarantee(v)?.eigenvalue_lower.clone())),
+    )
+    .added(1),
+    dataset(
+        "eigenvalue_upper",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda+",
+        "guaranteed upper bounds of the eigenvalues of K and M as stored; accuracy `certified` only",
+        |v| Some(Value::Floats(guarantee(v)?.eigenvalue_upper.clone())),
+    )
+    .added(1),
+    dataset(
+        "shape_error",
+        Floats(&[Modes]),
+        ONE,
+        "e",
+        "guaranteed upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the norm of M; accuracy `certified` only",
+        |v| Some(Value::Floats(guarantee(v)?.shape_error.clone())),
+    )
+    .added(1),
+    dataset(
+        "free_eigenvalue",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda~",
+        "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
+        |v| Some(Value::Floats(fixed_interface(v)?.free_estimate.clone())),
+    )
+    .added(4),
+    dataset(
+        "free_eigenvalue_lower",
+        Floats(&[Modes]),
+        PER_TIME2,
+        "lambda~-",
+        "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
+        |v| Some(Value::Floats(fixed_interface(v)?.free_lower.clone())),
+    )
+    .added(4),
+    dataset(
+        "shape",
+        Floats(&[Modes, Nodes, Fixed(3)]),
+        PER_ROOT_MASS,
+        "Psi",
+        "mass-normalised mode shapes: displacement of every node in body axes; the largest component of each mode is positive",
+        |v| Some(shape_rows(&v.body.modes.shape, 0..v.body.nodes.len())),
+    )
+    .large(),
+    dataset(
+        "rotation",
+        Floats(&[Modes, Nodes, Fixed(3)]),
+        PER_ROOT_MASS_LENGTH,
+        "theta",
+        "rotation of every node in body axes, zero where the model has none; absent: a model of displacements",
+        |v| Some(shape_rows(v.body.modes.rotation.as_ref()?, 0..v.body.nodes.len())),
+    )
+    .added(2)
+    .large(),
+    dataset(
+        "internal_dof",
+        Ints(&[InternalRows, Fixed(2)]),
+        ONE,
+        "",
+        "number and direction (1 to 6) that label each row of the FE model without coordinates",
+        |v| Some(Value::Ints(v.body.modes.internal.as_ref()?.dofs.as_flattened().to_vec())),
+    )
+    .added(2),
+    dataset(
+        "internal",
+        Floats(&[InternalRows, Modes]),
+        ONE,
+        "",
+        "the modes at these rows, as the FE model scales them; vectors (three rows) in body axes",
+        |v| matrix(v.body.modes.internal.as_ref()?.shape.as_ref()),
+    )
+    .added(2)
+    .large(),
+];
+
+const INVARIANTS: &[Item] = &[
+    dataset("mass", Floats(&[Fixed(1)]), MASS, "m", "mass, 1' Ms 1", |v| Some(Value::Floats(vec![v.invariants().mass()]))),
+    dataset("first_moment", Floats(&[Fixed(3)]), MASS_LENGTH, "c", "first moment about the frame origin, c_k = 1' Ms x_k", |v| {
+        small(v.invariants().first_moment())
+    }),
+    dataset("second_moment", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "J", "second moment about the frame origin, J_kl = x_k' Ms x_l", |v| {
+        small(v.invariants().second_moment())
+    }),
+    dataset("C1", Floats(&[Fixed(3), Modes]), ROOT_MASS, "C1", "linear momentum of the modes, 1' Ms Psi_k", |v| {
+        matrix(v.invariants().c1().as_ref())
+    }),
+    dataset("Ibar", Floats(&[Fixed(3), Fixed(3), Modes]), ROOT_MASS_LENGTH, "Ibar", "Ibar_kl = x_k' Ms Psi_l", |v| {
+        v.invariants().ibar().map(|ibar| Value::Floats(ibar.as_flattened().iter().flatten().copied().collect()))
+    })
+    .of(TermGroup::W1)
+    .large(),
+    dataset("S", Floats(&[Fixed(3), Fixed(3), Modes, Modes]), ONE, "S", "S_kl = Psi_k' Ms Psi_l", |v| {
+        v.invariants().s().map(|s| Value::Floats(s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
+    })
+    .of(TermGroup::W2)
+    .large(),
+    dataset("modal_stiffness", Floats(&[Modes, Modes]), PER_TIME2, "K_ff", "Psi' K Psi", |v| {
+        matrix(v.invariants().modal_stiffness().as_ref())
+    }),
+    dataset("I0", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "I0", "inertia about the frame origin, tr(J) I - J", |v| {
+        small(v.invariants().inertia())
+    })
+    .derived("second_moment"),
+    dataset("W0", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS, "W0", "mass structure `general` only: Phi_t' M B_j, column b nf + j; else block b is (-C1~) e_b", |v| {
+        matrix(v.invariants().general()?.w0.as_ref())
+    })
+    .added(2)
+    .large(),
+    dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
+        matrix(v.invariants().w1()?.as_ref())
+    })
+    .derived("Ibar")
+    .of(TermGroup::W1)
+    .large(),
+    dataset("W2", Floats(&[ThreeModes, ThreeModes]), ONE, "W2", "diagonal blocks S_ll + S_mm, block (k,l) = -S_lk; row and column b nf + j", |v| {
+        matrix(v.invariants().w2()?.as_ref())
+    })
+    .derived("S")
+    .of(TermGroup::W2)
+    .large(),
+    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general` (B_j' M Psi) and without W2: information of its own", |v| {
+        matrix(v.invariants().w3()?.as_ref())
+    })
+    .derived("S")
+    .of(TermGroup::W3)
+    .large(),
+    dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]; without W1: information of its own", |v| {
+        matrix(v.invariants().c2().as_ref())
+    })
+    .derived("Ibar"),
+    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33 = Psi' M Psi; mass structure `general` and without W2: information of its own", |v| matrix(v.invariants().modal_mass().as_ref()))
+        .derived("S"),
+];
+
+/// Damping has nothing to do with the mass: lumped masses have none of their own.
+const DAMPING: &[Item] = &[dataset(
+    "modal_damping",
+    Floats(&[Modes, Modes]),
+    PER_TIME,
+    "D_ff",
+    "Psi' D Psi, where damping was given; `/modes/damping_ratio` is its diagonal over 2 sqrt(lambda)",
+    |v| matrix(v.body.modes.modal_damping.as_ref()?.as_ref()),
+)
+.added(2)];
+
+const LUMPED: &[Item] = &[attribute("negative_masses", Int, ONE, "number of negative nodal masses", |v| {
+    count(v.lumped?.negative_masses)
+})];
+
+const COMPARISON: &[Item] =
+    &[attribute("<norm>", Named, ONE, "one attribute per error norm, in creation order", |v| {
+        Some(Value::Named(v.lumped?.comparison.clone()))
+    })];
+
+/// The groups, in the order in which they are written.
+pub(super) const TABLE: &[Group] = &[
+    Group { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
+    Group { path: "/source", per: Per::Body, description: "Where the body came from.", items: &[SOURCE] },
+    Group { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
+    Group { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
+    Group {
+        path: "/mesh",
+        per: Per::Body,
+        description: "The surface of the part on some of its nodes, to draw it by. Nothing is computed from it. Absent: not known. Since 1.5; a file without it is one of 1.4.",
+        items: &[MESH],
+    },
+    Group {
+        path: "/modes",
+        per: Per::Body,
+        description: "Mode shapes and what is known of each mode.",
+        items: &[MODES],
+    },
+    Group {
+        path: "/invariants",
+        per: Per::Body,
+        description: "Exact invariants from the consistent mass, about the frame origin, in body axes.",
+        items: &[INVARIANTS, DAMPING],
+    },
+    Group {
+        path: "/lumped/<scheme>",
+        per: Per::LumpingScheme,
+        description: "The same invariants from lumped masses, with the same modes.",
+        items: &[LUMPED, INVARIANTS],
+    },
+    Group {
+        path: "/comparison/<scheme>",
+        per: Per::LumpingScheme,
+        description: "Errors of the lumped invariants against the exact ones.",
+        items: &[COMPARISON],
+    },
+    Group {
+        path: "/certificate",
+        per: Per::Body,
+        description: "What was proved about the modes, and the digits of the input.",
+        items: &[CERTIFICATE, INVARIANT_DIGITS],
+    },
+    Group {
+        path: "/terms",
+        per: Per::Body,
+        description: "Which groups of the kinetic energy the body holds, and why. A solver leaves out what is dropped, in all places.",
+        items: &[TERMS],
+    },
+    Group {
+        path: "/interfaces/<name>",
+        per: Per::Interface,
+        description: "Named node sets, what they are coupled to, and the modes there.",
+        items: &[INTERFACES],
+    },
+    Group {
+        path: "/geometric_stiffness/<load>",
+        per: Per::UnitLoad,
+        description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
+        items: &[GEOMETRIC_STIFFNESS],
+    },
+    Group {
+        path: "/inertia_stiffness/<load>",
+        per: Per::InertiaLoad,
+        description: "Stiffness that the inertia of turning nodes adds: terms of the kinetic energy of second order in the rotations of nodes that carry rotational inertia or an eccentric mass. Signs and loads are those of `/geometric_stiffness`, to which a solver adds it: `acceleration_x` to `_z`, `angular_acceleration_x` to `_z`, `spin_xx` to `_xz`, all of them; in the plane `acceleration_x`, `_y`, `angular_acceleration_z`, `spin_zz`. Absent: zero; in files before 1.6 of mass structure `general`: not known. Since 1.6; a file without it is one of 1.5.",
+        items: &[INERTIA_STIFFNESS],
+    },
+    Group {
+        path: "/interface_coordinates",
+        per: Per::Body,
+        description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",
+        items: &[COORDINATES],
+    },
+];
+
+/// Names of the mass structures in the file.
+pub(super) const MASS_STRUCTURES: [(&str, MassStructure); 3] = [
+    ("rotation-invariant", MassStructure::RotationInvariant),
+    ("diagonal", MassStructure::Diagonal),
+    ("general", MassStructure::General),
+];
+
+fn mass_structure_name(structure: MassStructure) -> &'static str {
+    MASS_STRUCTURES.iter().find(|(_, s)| *s == structure).map_or("general", |(name, _)| name)
+}

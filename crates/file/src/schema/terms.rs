@@ -1,0 +1,84 @@
+//! What was decided about the groups of the kinetic energy: the rows of `/terms`.
+
+use super::super::item::Item;
+use super::super::item::Kind::{Float, Int, Text};
+use super::super::value::{Value, View, text};
+use super::{ONE, attribute};
+use flexbody_body::flex_body::{Group, TermDecision};
+
+/// Texts of a group that is held, and of one that is not.
+pub(in super::super) const KEPT: &str = "kept";
+/// See [`KEPT`].
+pub(in super::super) const DROPPED: &str = "dropped";
+
+fn decision<'a>(view: &View<'a>, group: Group) -> Option<&'a TermDecision> {
+    view.body.terms.iter().find(|term| term.group == group)
+}
+
+fn held(view: &View<'_>, group: Group) -> Option<Value> {
+    text(if view.body.invariants.groups().has(group) { KEPT } else { DROPPED })
+}
+
+fn number(value: f64) -> Option<Value> {
+    value.is_finite().then_some(Value::Float(value))
+}
+
+/// The rows of every group.
+macro_rules! of_groups {
+    ($($group:ident $name:literal,)*) => {
+        &[
+            $(attribute(
+                $name,
+                Text,
+                ONE,
+                concat!(
+                    "`kept`, or `dropped`: the body has no group ", $name,
+                    " of the kinetic energy, and the file none of its datasets (files up to 1.2: always `kept`)"
+                ),
+                |v| held(v, Group::$group),
+            ),)*
+            attribute("reason", Text, ONE, "why", |v| {
+                text(match v.body.terms.is_empty() {
+                    true => "no scene was given: every term is kept",
+                    false => "every group that was decided about has its own",
+                })
+            }),
+            $(
+                attribute(concat!($name, "_reason"), Text, ONE, "why, where it was decided", |v| {
+                    text(decision(v, Group::$group)?.reason.as_str())
+                })
+                .added(3),
+                attribute(
+                    concat!($name, "_tier"),
+                    Int,
+                    ONE,
+                    "what decided: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
+                    |v| Some(Value::Int(decision(v, Group::$group)?.tier.into())),
+                )
+                .added(3),
+                attribute(
+                    concat!($name, "_bound"),
+                    Float,
+                    ONE,
+                    "largest error that dropping makes, of what the reason names; absent: none is known",
+                    |v| number(decision(v, Group::$group)?.bound),
+                )
+                .added(3),
+                attribute(
+                    concat!($name, "_limit"),
+                    Float,
+                    ONE,
+                    "largest error that is allowed; absent: no limit",
+                    |v| number(decision(v, Group::$group)?.limit),
+                )
+                .added(3),
+            )*
+        ]
+    };
+}
+
+pub(super) const TERMS: &[Item] = of_groups![
+    W1 "W1",
+    W2 "W2",
+    W3 "W3",
+];

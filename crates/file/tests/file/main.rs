@@ -1,0 +1,12 @@
+//! The flex-body file: round trips, refusals, digest, schema.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod certified_bodies;
+mod general_models;
+mod statements;
+mod store_digest;
+mod store_output;
+mod store_refusals;
+mod store_roundtrip;
+mod store_schema;

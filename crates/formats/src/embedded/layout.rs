@@ -1,0 +1,213 @@
+//! What stands where in the file: the tables that drive the writer, the C header and
+//! `docs/formats/embedded.md`.
+
+use std::fmt::Write;
+
+/// First bytes of the file.
+pub(crate) const MAGIC: [u8; 8] = *b"FLEXBODY";
+
+/// What the byte order mark is on a machine that can read the file in place.
+pub(crate) const BYTE_ORDER: u32 = 0x0102_0304;
+
+/// Version of this layout.
+pub(crate) const VERSION: u32 = 1;
+
+/// Where arrays start: at multiples of a cache line.
+pub(crate) const ALIGNMENT: usize = 64;
+
+/// The checksum is that of all bytes from here on.
+pub(crate) const CHECKED_FROM: usize = 24;
+
+/// Entries in front of the table of arrays: name, type, content. In this order, without gaps.
+pub(crate) const HEADER: &[(&str, Kind, &str)] = &[
+    ("magic", Kind::Bytes, "`FLEXBODY`"),
+    ("byte_order", Kind::U32, "0x01020304"),
+    ("version", Kind::U32, "1"),
+    ("size", Kind::U32, "bytes of the file"),
+    ("checksum", Kind::U32, "CRC-32 (that of gzip and zlib) of all bytes from here on"),
+    ("precision", Kind::U32, "bytes per number of the arrays: 8 (binary64) or 4 (binary32)"),
+    ("modes", Kind::U32, "nf"),
+    ("translations", Kind::U32, "T: axes that the body moves along, 3 or, in the plane, 2 (x, y)"),
+    ("axes", Kind::U32, "A: axes that it turns about, 3 or, in the plane, 1 (z)"),
+    ("frames", Kind::U32, "n: places of the body"),
+    ("terms", Kind::U32, "bit 0: `linear` has W1; bit 1: W2 is held; bit 2: W3 is held; others 0"),
+    ("length", Kind::F64, "unit of length in m"),
+    ("mass", Kind::F64, "unit of mass in kg"),
+    ("time", Kind::F64, "unit of time in s"),
+];
+
+/// Types of the header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Bytes,
+    U32,
+    F64,
+}
+
+impl Kind {
+    fn bytes(self) -> usize {
+        match self {
+            Self::Bytes | Self::F64 => 8,
+            Self::U32 => 4,
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Bytes => "8 bytes",
+            Self::U32 => "u32",
+            Self::F64 => "f64",
+        }
+    }
+}
+
+/// Entry of the table of arrays: where the array starts, rows, columns, and numbers from one column to the
+/// next; four u32.
+pub(crate) const ENTRY: usize = 16;
+
+/// An array of the file: name, rows and columns, content.
+pub(crate) struct Described {
+    /// Name: lower case here and in the documentation, upper case in the C header.
+    pub name: &'static str,
+    shape: &'static str,
+    content: &'static str,
+}
+
+const fn array(name: &'static str, shape: &'static str, content: &'static str) -> Described {
+    Described { name, shape, content }
+}
+
+/// Every array that there can be, in the order of the table and of the file.
+pub(crate) const ARRAYS: &[Described] = &[
+    array("rigid", "1 + T + P x 1", "m; c; I0 of the pairs"),
+    array(
+        "linear",
+        "T A + P + T + A x nf",
+        "what is linear in q, a row each: W0 (row T-axis, in it A-axes); W1 of the pairs, only if held (symmetric part of the \
+         3 x 3 matrix of each mode); C1; C2",
+    ),
+    array(
+        "w2",
+        "P nf x nf",
+        "E of the pairs (theory 6.7), less stiffness of inertia (6.2b) and geometric stiffness for spin (7.4); absent without both",
+    ),
+    array(
+        "w3",
+        "A nf x nf",
+        "transposed blocks of W3, each with stiffness of inertia and geometric stiffness for angular acceleration (7.4); absent without both",
+    ),
+    array(
+        "w3_skew",
+        "A nf x nf",
+        "transposed blocks of W3 less the blocks; absent where that is twice `w3`, which is skew",
+    ),
+    array(
+        "acceleration",
+        "T nf x nf",
+        "stiffness of inertia and geometric stiffness for acceleration (7.4); absent without",
+    ),
+    array("modal_mass", "nf x nf", "m_ff; absent: the identity"),
+    array("modal_mass_factor", "nf x nf", "L' of m_ff = L L', zeros below its diagonal; as `modal_mass`"),
+    array("stiffness", "nf x 1 or nf x nf", "K_ff: its diagonal, or in full"),
+    array("damping", "nf x 1 or nf x nf", "D: its diagonal, or in full; absent: no damping"),
+    array(
+        "frame_number",
+        "1 x n",
+        "i64: number of the node of each frame; of a reference point that is no node, one above all nodes; absent without frames",
+    ),
+    array("frame_parts", "3 x n", "i32, described below; as `frame_number`"),
+    array("frame_position", "T x n", "undeformed position of each frame"),
+    array(
+        "frame_translation",
+        "nf x T n",
+        "displacement of each frame in each mode: a column per frame and axis",
+    ),
+    array(
+        "frame_rotation",
+        "nf x A k",
+        "rotation of each of k frames that have one in each mode: a column per frame and axis; absent without such",
+    ),
+    array(
+        "frame_second",
+        "nf x nf k",
+        "k matrices K of motion of second order (7.5): geometric stiffness for a force or moment at a frame; absent without",
+    ),
+];
+
+/// Rows of `frame_parts`.
+const PARTS: &[(&str, &str)] = &[
+    ("rotation", "index among the frames of `frame_rotation`, -1 without orientation"),
+    ("second", "index of the first of its matrices in `frame_second`"),
+    (
+        "components",
+        "bits: which matrices it has, in this order: forces along x (bit 0), y, z, moments about x, y, z (bit 5)",
+    ),
+];
+
+/// Where an array stands.
+pub(crate) struct ArrayPosition {
+    pub offset: usize,
+    pub rows: usize,
+    pub columns: usize,
+    pub stride: usize,
+}
+
+impl ArrayPosition {
+    /// The entry of the table.
+    pub(super) fn entry(place: Option<&Self>) -> [u32; 4] {
+        // A file has less than 4 GiB, as the writer makes sure.
+        place.map_or([0; 4], |p| [p.offset, p.rows, p.columns, p.stride].map(|v| v as u32))
+    }
+}
+
+/// Bytes of the entries in front of the table.
+pub(crate) fn fixed_header() -> usize {
+    HEADER.iter().map(|(_, kind, _)| kind.bytes()).sum()
+}
+
+/// Offset of a header entry.
+pub(crate) fn header_offset(name: &str) -> usize {
+    HEADER.iter().take_while(|(own, ..)| *own != name).map(|(_, kind, _)| kind.bytes()).sum()
+}
+
+/// Bytes of header and table, where the first array starts.
+pub(crate) fn header_bytes() -> usize {
+    (fixed_header() + ENTRY * ARRAYS.len()).next_multiple_of(ALIGNMENT)
+}
+
+/// The layout as the documentation has it.
+pub fn embedded_markdown() -> String {
+    let mut text = String::from("| offset | type | name | content |\n|---|---|---|---|\n");
+    let mut line = |cells: std::fmt::Arguments<'_>| writeln!(text, "{cells}").expect("strings take all text");
+    for (name, kind, content) in HEADER {
+        line(format_args!("| {} | {} | `{name}` | {content} |", header_offset(name), kind.name()));
+    }
+    line(format_args!(
+        "| {} | {} x 4 u32 | | the table of arrays: start (bytes from the first of the file; 0: absent), rows, columns, numbers from one \
+         column to the next |",
+        fixed_header(),
+        ARRAYS.len()
+    ));
+    line(format_args!("| {} | | | the arrays |", header_bytes()));
+    line(format_args!("\n| entry at | array | rows x columns | content |\n|---|---|---|---|"));
+    for (at, Described { name, shape, content }) in ARRAYS.iter().enumerate() {
+        line(format_args!("| {} | `{name}` | {shape} | {content} |", fixed_header() + ENTRY * at));
+    }
+    line(format_args!("\n| row of `frame_parts` | name | content |\n|---|---|---|"));
+    for (at, (name, content)) in PARTS.iter().enumerate() {
+        line(format_args!("| {at} | `{name}` | {content} |"));
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_checked_starts_behind_the_checksum() {
+        assert_eq!(header_offset("checksum") + 4, CHECKED_FROM);
+        assert_eq!(fixed_header() % 8, 0);
+        assert!(HEADER.iter().all(|(name, kind, _)| header_offset(name).is_multiple_of(kind.bytes())));
+    }
+}

@@ -1,0 +1,98 @@
+//! Places of a body that joints and forces take hold of: what formats call nodes or frames.
+
+use super::Points;
+use faer::Mat;
+use flexbody_body::flex_body::{FlexBody, Interface};
+
+/// One place of a body and its motion in every mode, body axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExportFrame {
+    /// Number: that of the node; of the reference point of an interface that is no node of the body, one
+    /// above all node numbers.
+    pub id: i64,
+    /// Name of the interface.
+    pub name: Option<String>,
+    /// Undeformed position. Unit: length.
+    pub position: [f64; 3],
+    /// Displacement of each mode (3 x nf).
+    pub translation: Mat<f64>,
+    /// Rotation of each mode (3 x nf); `None` where the body does not know it, as of nodes of solid elements.
+    pub rotation: Option<Mat<f64>>,
+}
+
+/// The places of `body` that `points` names: nodes in the order of the body, reference points in the order of
+/// the interfaces. Of a free interface, and of one whose nodes determine no motion of a reference point, all
+/// nodes.
+///
+/// [`Points::Usual`] stands for the interfaces where there are some, else for all nodes.
+pub fn frames(body: &FlexBody, points: &Points) -> Vec<ExportFrame> {
+    let all = || (0..body.n_nodes()).map(|i| node(body, i)).collect();
+    match points {
+        Points::Usual if body.interfaces().is_empty() => all(),
+        Points::Usual | Points::Interfaces => interfaces(body),
+        Points::InterfacesAnd(ids) => {
+            let mut found = interfaces(body);
+            let others = named_nodes(body, ids).filter(|own| found.iter().all(|frame| frame.id != own.id));
+            let others: Vec<ExportFrame> = others.collect();
+            found.extend(others);
+            found
+        }
+        Points::Nodes => all(),
+        Points::Some(ids) => named_nodes(body, ids).collect(),
+    }
+}
+
+/// The nodes with these numbers, in the order of the body.
+pub(crate) fn named_nodes(body: &FlexBody, ids: &[i64]) -> impl Iterator<Item = ExportFrame> {
+    (0..body.n_nodes()).filter(|&i| ids.contains(&body.nodes().ids[i])).map(|i| node(body, i))
+}
+
+fn node(body: &FlexBody, i: usize) -> ExportFrame {
+    let modes = body.modes();
+    let rows = |a: &Mat<f64>| a.as_ref().subrows(3 * i, 3).to_owned();
+    let turns = |a: &Mat<f64>| a.col_iter().any(|column| column.iter().any(|v| *v != 0.0));
+    ExportFrame {
+        id: body.nodes().ids[i],
+        name: None,
+        position: body.nodes().positions[i],
+        translation: rows(&modes.shape),
+        // Nodes without rotations have zeros in their place.
+        rotation: modes.rotation.as_ref().map(rows).filter(turns),
+    }
+}
+
+fn interfaces(body: &FlexBody) -> Vec<ExportFrame> {
+    let mut found: Vec<ExportFrame> = Vec::new();
+    for (number, interface) in body.interfaces().iter().enumerate() {
+        let ids: Vec<i64> = found.iter().map(|frame| frame.id).collect();
+        let frames = interface_frames(body, interface, number);
+        found.extend(frames.into_iter().filter(|frame| !ids.contains(&frame.id)));
+    }
+    found
+}
+
+/// The reference point of the interface with this `number` (from 0); of a free interface, and of one whose
+/// nodes determine no motion of a reference point, all nodes.
+pub(crate) fn interface_frames(body: &FlexBody, interface: &Interface, number: usize) -> Vec<ExportFrame> {
+    let above = body.nodes().ids.iter().copied().max().unwrap_or(0);
+    let named = |i: usize| ExportFrame { name: Some(interface.name.clone()), ..node(body, i) };
+    match reference(body, interface, above.saturating_add(1 + number as i64)) {
+        Some(frame) => vec![frame],
+        None => interface.nodes.iter().map(|&i| named(i)).collect(),
+    }
+}
+
+/// The reference point of an interface: the node itself where it is a single one that lies there.
+fn reference(body: &FlexBody, interface: &Interface, id: i64) -> Option<ExportFrame> {
+    let (modes, nodes) = (body.modes(), body.nodes());
+    let position = interface.reference?;
+    let name = Some(interface.name.clone());
+    if let [single] = interface.nodes[..]
+        && nodes.positions[single] == position
+    {
+        return Some(ExportFrame { name, ..node(body, single) });
+    }
+    let rotation = modes.rotation.as_ref().map(Mat::as_ref);
+    let rows = interface.rows(nodes, modes.shape.as_ref(), rotation, body.dimension())?;
+    Some(ExportFrame { id, name, position, translation: rows.translation, rotation: rows.rotation })
+}

@@ -1,0 +1,38 @@
+//! The nine invariants as programs take them whose mass commutes with rotations.
+
+use faer::Mat;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::Numbered;
+
+/// I1 to I9 of a body for programs that take I5_jk as antisymmetric in j and k and use I9 in two places: its
+/// part that is symmetric in a and b where W2 stands, the other one where W3 stands (Coriolis). I5 and I9 are
+/// always there, zero where the body does not hold them.
+///
+/// For a mass that commutes with rotations this is
+/// [`Invariants::numbered`](flexbody_body::invariants::Invariants::numbered). Of others, and of a body that
+/// holds one of W2 and W3 only, I9_jk(a,b) = -(W2 + W2')/2 -+ W3_c / 2 is put together from what the body
+/// holds, with the antisymmetric part of W3: the equations then conserve momentum and energy as those of the
+/// body do. What is left out is the loss that [`general_w3`](super::losses::general_w3) tells.
+pub(crate) fn inertia(body: &FlexBody) -> Numbered {
+    let invariants = body.invariants();
+    let nf = body.n_modes();
+    let mut told = invariants.numbered();
+    if invariants.general().is_none() && told.groups.w2 && told.groups.w3 {
+        return told;
+    }
+    let w3 = told.i5.take().unwrap_or_else(|| Mat::zeros(3 * nf, nf));
+    let w2 = told.i9.take().unwrap_or_else(|| Mat::zeros(3 * nf, 3 * nf));
+    let i5 = |c: usize, j: usize, k: usize| 0.5 * (w3[(c * nf + j, k)] - w3[(c * nf + k, j)]);
+    let i9 = |row: usize, column: usize| {
+        let (a, j, b, k) = (row / nf, row % nf, column / nf, column % nf);
+        let symmetric = 0.5 * (w2[(row, column)] + w2[(b * nf + j, a * nf + k)]);
+        match (3 + b - a) % 3 {
+            0 => symmetric,
+            1 => symmetric - 0.5 * i5(3 - a - b, j, k),
+            _ => symmetric + 0.5 * i5(3 - a - b, j, k),
+        }
+    };
+    told.i9 = Some(Mat::from_fn(3 * nf, 3 * nf, i9));
+    told.i5 = Some(Mat::from_fn(3 * nf, nf, |row, k| i5(row / nf, row % nf, k)));
+    told
+}

@@ -1,0 +1,99 @@
+//! K, M and D in the motions of interface frames, as reduced-order blocks take them: six coordinates for each
+//! frame, then the fixed-interface modes.
+
+use super::{ExportOptions, losses};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::combine;
+
+/// The body in interface coordinates \[q; eta\]: translations and rotations of each frame along body axes, in
+/// the order of the frames, then the amplitudes of the fixed-interface modes.
+pub(crate) struct InterfaceMatrices<'a> {
+    /// Name and origin of each frame, body axes. Unit: length.
+    pub frames: Vec<(&'a str, [f64; 3])>,
+    /// K (nc x nc).
+    pub stiffness: &'a Mat<f64>,
+    /// M (nc x nc).
+    pub mass: &'a Mat<f64>,
+    /// D (nc x nc), where the body has damping: M B D_ff B' M, so that B' D B = D_ff and rigid motion is not
+    /// damped.
+    pub damping: Option<Mat<f64>>,
+}
+
+impl<'a> InterfaceMatrices<'a> {
+    /// Of a body with Craig-Bampton coordinates in space, all of whose interfaces have reference points.
+    /// `format` is named in messages.
+    ///
+    /// # Errors
+    /// [`ExportLoses`](Code::ExportLoses) for any other body.
+    pub(crate) fn of(body: &'a FlexBody, format: &str) -> Result<Self> {
+        let refuse = |what: String, help: &str| {
+            let message = format!("{format} needs K and M in the motions of frames: {what}");
+            Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into())
+        };
+        let Some(coordinates) = body.coordinates() else {
+            if !body.conditions().is_mean() {
+                let help = "export the body that --basis craig-bampton with --frame com gives: the matrices hold the motion of every interface";
+                return refuse(body.conditions().to_string(), help);
+            }
+            let what = "the body has free modes only".to_owned();
+            return refuse(what, "make it anew: flexbody convert --basis craig-bampton");
+        };
+        if body.dimension() != 3 {
+            return refuse(
+                "those of a plane body have no inertia out of the plane".to_owned(),
+                "export a body in space",
+            );
+        }
+        if let Some(free) = body.interfaces().iter().find(|interface| interface.reference.is_none()) {
+            let help = "couple the interface rigidly or by averaging, and make the body anew";
+            return refuse(format!("the interface `{}` is free and has none", free.name), help);
+        }
+        let frames: Vec<(&str, [f64; 3])> = body
+            .interfaces()
+            .iter()
+            .filter_map(|interface| Some((interface.name.as_str(), interface.reference?)))
+            .collect();
+        // Files may be made by anyone: what the coordinates are called must be what they are taken for.
+        let names = &coordinates.names;
+        let expected = frames.iter().flat_map(|(name, _)| AXES.map(|axis| format!("{name} {axis}")));
+        let modal = |name: &String| name.starts_with("fixed-interface mode ");
+        let fits = expected.zip(names).filter(|(expected, name)| expected == *name).count()
+            == 6 * frames.len()
+            && names.iter().skip(6 * frames.len()).all(modal);
+        if !fits {
+            let what = "the coordinates of the body are not those of its interfaces".to_owned();
+            return refuse(what, "make it anew: flexbody convert --basis craig-bampton");
+        }
+        let damping = losses::is_damped(body).then(|| {
+            let weighted = combine(coordinates.mass.as_ref(), coordinates.of_modes.as_ref());
+            let half = combine(weighted.as_ref(), body.damping().as_ref());
+            let whole = combine(half.as_ref(), weighted.as_ref().transpose());
+            Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]))
+        });
+        let finite = |a: &Mat<f64>| a.col_iter().all(|column| column.iter().all(|v| v.is_finite()));
+        if !damping.as_ref().is_none_or(finite) {
+            let what = "their damping leaves the range of double precision".to_owned();
+            return refuse(what, "--to-units");
+        }
+        Ok(Self { frames, stiffness: &coordinates.stiffness, mass: &coordinates.mass, damping })
+    }
+}
+
+const AXES: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
+
+/// What such matrices cannot hold of a body.
+pub(crate) fn matrix_losses(body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+    let small = "K and M are those of small motions";
+    [
+        losses::changing_inertia(body, "W1", small),
+        losses::general_w0(body),
+        losses::geometric_stiffness(body, |_| false),
+        losses::inertia_stiffness(body, options, |_| false),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
+}

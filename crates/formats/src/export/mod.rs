@@ -1,0 +1,15 @@
+//! What the formats that are written share: the trait, frames, losses, containers.
+
+pub(crate) mod arrays;
+mod format;
+pub(crate) mod frames;
+#[cfg(feature = "hdf5")]
+pub(crate) mod hdf5_contents;
+pub(crate) mod inertia;
+pub(crate) mod interface_matrices;
+pub(crate) mod losses;
+#[cfg(feature = "hdf5")]
+pub(crate) mod mat5;
+
+pub use format::{ExportFormat, ExportOptions, Exported, InertiaInScene, Points};
+pub use frames::{ExportFrame, frames};

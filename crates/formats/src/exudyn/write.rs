@@ -1,0 +1,143 @@
+//! Exudyn: the file that `ObjectFFRFreducedOrderInterface.LoadFromFile` reads (FEM.py, 1.13.6).
+//!
+//! The nodal formulation of Zwölfer and Gerstmayr (Acta Mech. 2021) with matrices that are blocked by modes:
+//! three columns, along x, y and z, for each mode. With S_j~ the skew matrices of a mode shape and x~ those
+//! of the positions, mPsiTildePsi = int S_j~' S_k = -I5, mPsiTildePsiTilde = int S_j~' S_k~ = -I9, mPhitTPsi
+//! = int S_j = I3, mPhitTPsiTilde = int S_j~, mXRefTildePsi = int x~' S_j = -I4, mXRefTildePsiTilde = int x~'
+//! S_j~ = I8.
+
+use super::interfaces;
+use super::mesh::Mesh;
+use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
+use crate::export::inertia::inertia;
+use crate::export::{ExportFormat, ExportOptions, Exported, losses};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::Numbered;
+use nalgebra::{Matrix3, Vector3};
+
+/// The format.
+pub(crate) struct Exudyn;
+
+impl ExportFormat for Exudyn {
+    fn name(&self) -> &'static str {
+        "exudyn"
+    }
+
+    fn reader(&self) -> &'static str {
+        "Exudyn, ObjectFFRFreducedOrderInterface.LoadFromFile"
+    }
+
+    fn has_points(&self) -> bool {
+        true
+    }
+
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        [
+            losses::plane(body),
+            losses::general_w0(body),
+            losses::general_w3(body),
+            losses::geometric_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, options, |_| false),
+            losses::damping(body),
+            // An interface as a cross of nodes turns as it does in the body.
+            losses::rotations(body).filter(|_| !options.points.of_interfaces()),
+            losses::internal_rows(body),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        let mesh = Mesh::new(body, &options.points);
+        let file = hdf5_bytes(&entries(body, &mesh))?;
+        let script = (!mesh.interfaces.is_empty())
+            .then(|| (interfaces::SCRIPT_NAME, interfaces::SCRIPT.as_bytes().to_vec()));
+        Ok(Exported { file, beside: script.into_iter().map(|(name, text)| (name.into(), text)).collect() })
+    }
+}
+
+/// Contents of the file, in the order of the program's own writer. The attribute `datatype` is the Python
+/// type.
+fn entries(body: &FlexBody, mesh: &Mesh) -> Vec<Hdf5Entry> {
+    let (n, nf) = (mesh.numbers.len(), body.n_modes());
+    let told = inertia(body);
+    let center = told.i2 / told.i1;
+    let [info, version] = [vec![nf, n, 3, 4, 7, 7 + nf], vec![1]]
+        .map(|counts| counts.into_iter().map(|count| count as i64).collect::<Vec<_>>());
+    let text = |text: &str| Hdf5Contents::Text(text.to_owned());
+    let mut all = vec![
+        array("modeBasis", Hdf5Contents::matrix(&mesh.shape)),
+        array("trigList", triangles(body, mesh)),
+        Hdf5Contents::Group(Vec::new()).named("postProcessingModes").with("datatype", "dict"),
+        modal_mass(body, &told),
+        array("stiffnessMatrixReduced", Hdf5Contents::matrix(body.invariants().modal_stiffness())),
+        array("infoList", Hdf5Contents::Integers(vec![6], info)),
+        text("NodeType.RotationEulerParameters").named("rigidBodyNodeType").with("datatype", "str"),
+        array("xRef", Hdf5Contents::list(mesh.positions.as_flattened())),
+        array("inertiaLocal", square(&told.i7)),
+        array("Mtt", square(&(Matrix3::identity() * told.i1))),
+        Hdf5Contents::number(told.i1).named("totalMass").with("datatype", "float64"),
+        array("chiU", Hdf5Contents::list(center.as_slice())),
+        array("chiUtilde", square(&center.cross_matrix())),
+    ];
+    all.extend(coupling(&told, nf));
+    all.extend(interfaces::entries(body, mesh));
+    all.push(Hdf5Contents::Integers(Vec::new(), version).named("fileVersion").with("datatype", "int"));
+    all.push(text("ObjectFFRFreducedOrderInterface").named("type").with("datatype", "str"));
+    all
+}
+
+/// Triangles of the surface by the indices of mesh nodes (k x 3), for drawing and contact; none if the mesh is not
+/// that of the nodes.
+fn triangles(body: &FlexBody, mesh: &Mesh) -> Hdf5Contents {
+    let own = body.mesh().filter(|_| mesh.numbers == body.nodes().ids);
+    let corners: Vec<i64> = own.map_or(Vec::new(), |own| {
+        own.triangles().as_flattened().iter().map(|&index| i64::from(index)).collect()
+    });
+    Hdf5Contents::Integers(vec![corners.len() / 3, 3], corners)
+}
+
+/// m_ff; for a mass that does not commute with rotations with an attribute that says so, as no array of the
+/// file tells: m_ff and mPsiTildePsiTilde then need not agree. Exudyn does not look at it.
+fn modal_mass(body: &FlexBody, told: &Numbered) -> Hdf5Entry {
+    let entry = array("massMatrixReduced", Hdf5Contents::matrix(&told.i6));
+    match body.invariants().general() {
+        Some(_) => entry.with("mass_structure", "general"),
+        None => entry,
+    }
+}
+
+/// What couples translation, rotation and modes. Row or column 3 j + a belongs to axis a of mode j.
+fn coupling(told: &Numbered, nf: usize) -> Vec<Hdf5Entry> {
+    let zero = || 0.0;
+    let i5 = |row: usize, k: usize| told.i5.as_ref().map_or_else(zero, |i5| i5[(row % 3 * nf + row / 3, k)]);
+    let i9 = |row: usize, column: usize| {
+        let at = |index: usize| index % 3 * nf + index / 3;
+        told.i9.as_ref().map_or_else(zero, |i9| i9[(at(row), at(column))])
+    };
+    let skew = |a: usize, column: usize| {
+        let j = column / 3;
+        Vector3::new(told.i3[(0, j)], told.i3[(1, j)], told.i3[(2, j)]).cross_matrix()[(a, column % 3)]
+    };
+    vec![
+        array("mPsiTildePsi", Hdf5Contents::from_fn(3 * nf, nf, |row, k| -i5(row, k))),
+        array("mPsiTildePsiTilde", Hdf5Contents::from_fn(3 * nf, 3 * nf, |row, column| -i9(row, column))),
+        array("mPhitTPsi", Hdf5Contents::matrix(&told.i3)),
+        array("mPhitTPsiTilde", Hdf5Contents::from_fn(3, 3 * nf, skew)),
+        array("mXRefTildePsi", Hdf5Contents::from_fn(3, nf, |a, j| -told.i4[(a, j)])),
+        array(
+            "mXRefTildePsiTilde",
+            Hdf5Contents::from_fn(3, 3 * nf, |a, column| told.i8[column / 3][(a, column % 3)]),
+        ),
+    ]
+}
+
+fn array(name: &str, contents: Hdf5Contents) -> Hdf5Entry {
+    contents.named(name).with("datatype", "ndarray")
+}
+
+fn square(a: &Matrix3<f64>) -> Hdf5Contents {
+    Hdf5Contents::from_fn(3, 3, |i, j| a[(i, j)])
+}

@@ -1,0 +1,277 @@
+//! glTF: the surface with a morph target for each mode, and animations of them.
+//! <https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html>
+//!
+//! Lengths are metres and y is up, as glTF demands: a node at the top turns the axes of the model, whose z is
+//! taken as up. Below it the node of the body has the mesh, and one node for each interface with a reference
+//! point.
+
+use super::animations::{MOTION, of_modes, of_motion, place};
+use super::binary::Binary;
+use super::vertices::Vertices;
+use crate::export::{ExportFormat, ExportOptions, Exported};
+use crate::picture::{Drawn, Played, mode_names, named, rounded};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::generator;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_file::RecordedMotion;
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+use std::f64::consts::FRAC_1_SQRT_2;
+
+/// The format.
+pub(crate) struct Gltf;
+
+/// Modes where nobody says how many: as many morph targets as every viewer should play.
+const MODES: usize = 8;
+
+/// Largest displacement of a mode, as part of the largest extent of the body.
+const DEFLECTION: f64 = 0.1;
+
+/// Numbers of all key frames of a motion at the most.
+const MOST_NUMBERS: usize = 2_000_000;
+
+/// Nodes of the file: the axes, the body; then the interfaces.
+const AXES: usize = 0;
+const BODY: usize = 1;
+const INTERFACES: usize = 2;
+
+impl ExportFormat for Gltf {
+    fn name(&self) -> &'static str {
+        "gltf"
+    }
+
+    fn reader(&self) -> &'static str {
+        "viewers and the web, Blender: modes or a motion as animations of one .glb"
+    }
+
+    fn is_picture(&self) -> bool {
+        true
+    }
+
+    fn losses(&self, _: &FlexBody, _: &ExportOptions) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn needs(&self, _: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        named(options, "glb").into_iter().collect()
+    }
+
+    fn leaves_out(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        let mut left = vec![
+            "gltf has the surface, its motion and the places of the interfaces to look at, in single precision: no mass, stiffness, damping or inertia, and no numbers of nodes"
+                .to_owned(),
+        ];
+        let (modes, all) = (modes(body, options), body.n_modes());
+        if modes < all {
+            left.push(format!("the first {modes} of {all} modes are shown: --modes shows more"));
+        } else if modes > MODES {
+            left.push(format!("{modes} modes are shown: some viewers play {MODES} morph targets only"));
+        }
+        if let Some(motion) = &options.motion {
+            let played = played(motion);
+            let seconds = played.duration() * body.units().time.to_si();
+            left.push(format!(
+                "the motion of {} s takes {MOTION} s, by {}",
+                rounded(seconds),
+                played.in_words()
+            ));
+        }
+        left
+    }
+
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        let played = options.motion.as_ref().map(played);
+        let scene = Scene::new(body, modes(body, options), played.as_ref());
+        let file = scene.file(played.as_ref())?;
+        Ok(Exported::single(file))
+    }
+}
+
+/// Number of modes that are shown: of a motion all of them.
+fn modes(body: &FlexBody, options: &ExportOptions) -> usize {
+    let usual = if options.motion.is_some() { body.n_modes() } else { body.n_modes().min(MODES) };
+    options.modes.unwrap_or(usual)
+}
+
+fn played(motion: &RecordedMotion) -> Played<'_> {
+    Played::new(motion, MOST_NUMBERS / (8 + motion.modes))
+}
+
+/// What the file shows.
+struct Scene<'b> {
+    body: &'b FlexBody,
+    drawn: Drawn<'b>,
+    names: Vec<String>,
+    /// What the positions of the mesh are told from: the origin of the frame, in model coordinates.
+    origin: Vector3<f64>,
+    /// Metres in a unit of length.
+    metres: f64,
+    /// The largest value of each modal coordinate in the motion; empty without one.
+    largest: Vec<f64>,
+}
+
+impl<'b> Scene<'b> {
+    fn new(body: &'b FlexBody, modes: usize, played: Option<&Played<'_>>) -> Self {
+        let largest = |played: &Played<'_>| -> Vec<f64> {
+            let one = |j: usize| (0..played.len()).map(|at| played.q(at)[j].abs()).fold(0.0, f64::max);
+            (0..modes).map(one).collect()
+        };
+        Self {
+            body,
+            drawn: Drawn::surface(body),
+            names: mode_names(body, modes),
+            origin: played.map_or(body.frame().origin, Played::origin_in_model),
+            metres: body.units().length.to_si(),
+            largest: played.map(largest).unwrap_or_default(),
+        }
+    }
+
+    /// The file.
+    ///
+    /// # Errors
+    /// [`ExportLoses`](Code::ExportLoses) where a length is beyond single precision, or the file too long.
+    fn file(&self, played: Option<&Played<'_>>) -> Result<Vec<u8>> {
+        let mut binary = Binary::default();
+        let mesh = self.mesh(&mut binary, played.is_some())?;
+        let nodes = self.nodes(played)?;
+        let animations = match played {
+            Some(played) => vec![of_motion(&mut binary, played, &self.largest, self.metres, BODY)],
+            None => of_modes(&mut binary, &self.names, BODY),
+        };
+        let mut document = json!({
+            "asset": { "version": "2.0", "generator": generator() },
+            "scene": 0,
+            "scenes": [{ "name": self.body.source().name, "nodes": [AXES] }],
+            "nodes": nodes,
+            "meshes": [mesh],
+            "materials": [
+                material("surface", [0.52, 0.60, 0.68, 1.0], true),
+                material("lines", [0.05, 0.07, 0.09, 1.0], false),
+            ],
+        });
+        if !animations.is_empty() {
+            document["animations"] = Value::Array(animations);
+        }
+        binary
+            .file(document)
+            .ok_or_else(|| refused("a file of more than 4 GB: take fewer modes with --modes"))
+    }
+
+    fn mesh(&self, binary: &mut Binary, moves: bool) -> Result<Value> {
+        let positions = self.drawn.positions();
+        let vertices = Vertices::new(&self.drawn, &positions);
+        let at_vertices = |of_points: &[[f64; 3]]| {
+            let one = |point: &u32| single(Vector3::from(of_points[*point as usize]));
+            vertices.points.iter().map(one).collect::<Result<Vec<_>>>()
+        };
+        let told: Vec<[f64; 3]> =
+            positions.iter().map(|x| ((Vector3::from(*x) - self.origin) * self.metres).into()).collect();
+        let position = binary.vertices(&at_vertices(&told)?);
+        let mut targets = Vec::new();
+        for j in 0..self.names.len() {
+            let target = if moves { self.largest_motion(j) } else { self.scaled_shape(j) };
+            targets.push(json!({ "POSITION": binary.vertices(&at_vertices(&target)?) }));
+        }
+        let mut primitives = Vec::new();
+        if !vertices.triangles.is_empty() {
+            let normal = binary.directions(&vertices.normals);
+            let indices = binary.indices(vertices.triangles.as_flattened());
+            let attributes = json!({ "POSITION": position, "NORMAL": normal });
+            primitives
+                .push(json!({ "mode": 4, "attributes": attributes, "indices": indices, "material": 0 }));
+        }
+        let attributes = json!({ "POSITION": position });
+        if !vertices.edges.is_empty() {
+            let indices = binary.indices(vertices.edges.as_flattened());
+            primitives
+                .push(json!({ "mode": 1, "attributes": attributes, "indices": indices, "material": 1 }));
+        }
+        if primitives.is_empty() {
+            primitives.push(json!({ "mode": 0, "attributes": attributes, "material": 1 }));
+        }
+        let mut mesh = json!({ "name": self.body.source().name });
+        if !targets.is_empty() {
+            primitives.iter_mut().for_each(|primitive| primitive["targets"] = json!(targets));
+            mesh["weights"] = json!(vec![0.0; targets.len()]);
+            mesh["extras"] = json!({ "targetNames": self.names });
+        }
+        mesh["primitives"] = Value::Array(primitives);
+        Ok(mesh)
+    }
+
+    /// A mode with the largest displacement that pictures of modes have, in metres.
+    fn scaled_shape(&self, j: usize) -> Vec<[f64; 3]> {
+        let shape = self.drawn.shape(j);
+        let component = shape.as_flattened().iter().fold(0.0f64, |own, x| own.max(x.abs()));
+        if component == 0.0 {
+            return shape;
+        }
+        // Squares of the largest numbers and of the smallest are none.
+        let parts: Vec<Vector3<f64>> = shape.iter().map(|u| Vector3::from(*u) / component).collect();
+        let longest = parts.iter().map(Vector3::norm).fold(0.0, f64::max);
+        let extent = self.body.extent();
+        let wanted = DEFLECTION * self.metres * if extent > 0.0 { extent } else { 1.0 };
+        parts.iter().map(|part| (part / longest * wanted).into()).collect()
+    }
+
+    /// A mode as large as it ever is in the motion, in metres.
+    fn largest_motion(&self, j: usize) -> Vec<[f64; 3]> {
+        let one = |u: &[f64; 3]| u.map(|x| x * self.largest[j] * self.metres);
+        self.drawn.shape(j).iter().map(one).collect()
+    }
+
+    fn nodes(&self, played: Option<&Played<'_>>) -> Result<Vec<Value>> {
+        let start = match played {
+            Some(played) => {
+                // That the file holds all of them is found out here.
+                (0..played.len()).try_for_each(|at| finite(place(played, at, self.metres)).map(drop))?;
+                place(played, 0, self.metres)
+            }
+            None => single(self.origin * self.metres)?,
+        };
+        let mut body = json!({ "name": self.body.source().name, "mesh": 0, "translation": start });
+        if let Some(played) = played {
+            let attitude = <[f64; 4]>::from(played.attitude(0).coords);
+            body["rotation"] = json!(attitude.map(|x| x as f32));
+        }
+        let mut interfaces = Vec::new();
+        for interface in self.body.interfaces() {
+            if let Some(reference) = interface.reference {
+                let place = Vector3::from(self.body.frame().to_model(reference)) - self.origin;
+                let translation = single(place * self.metres)?;
+                interfaces.push(json!({ "name": interface.name, "translation": translation }));
+            }
+        }
+        if !interfaces.is_empty() {
+            body["children"] = (INTERFACES..INTERFACES + interfaces.len()).collect();
+        }
+        let turned = [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2];
+        let axes = json!({ "name": "axes of the model, z up", "rotation": turned, "children": [BODY] });
+        Ok([vec![axes, body], interfaces].concat())
+    }
+}
+
+fn material(name: &str, colour: [f64; 4], both_sides: bool) -> Value {
+    json!({
+        "name": name,
+        "doubleSided": both_sides,
+        "pbrMetallicRoughness": { "baseColorFactor": colour, "metallicFactor": 0.1, "roughnessFactor": 0.6 },
+    })
+}
+
+/// A vector in single precision.
+fn single(x: Vector3<f64>) -> Result<[f32; 3]> {
+    finite(<[f64; 3]>::from(x).map(|x| x as f32))
+}
+
+fn finite(x: [f32; 3]) -> Result<[f32; 3]> {
+    if x.iter().all(|x| x.is_finite()) {
+        return Ok(x);
+    }
+    Err(refused("lengths beyond 3e38 m, which single precision has not"))
+}
+
+fn refused(what: &str) -> Error {
+    Diagnostic::new(Code::ExportLoses, format!("gltf cannot hold {what}")).into()
+}

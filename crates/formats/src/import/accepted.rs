@@ -1,0 +1,24 @@
+//! Accepts the body of another program's file only where every identity of a body holds.
+
+use super::Imported;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::verification::own_identities;
+
+/// Refuses an imported body that an identity of theory section 10 does not hold for: its file contradicts itself.
+///
+/// # Errors
+/// [`ForeignUnsound`](Code::ForeignUnsound), one for every identity that does not hold.
+pub fn accept_imported(imported: &Imported) -> Result<()> {
+    let broken = own_identities(&imported.body).into_iter().filter(|check| !check.passed);
+    let found: Vec<Diagnostic> = broken
+        .map(|check| {
+            let message = format!(
+                "the file states a body that breaks `{}` ({}): {:.1e}, where at most {:.1e} is rounding",
+                check.name, check.formula, check.value, check.limit
+            );
+            Diagnostic::new(Code::ForeignUnsound, message)
+        })
+        .collect();
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}

@@ -1,0 +1,308 @@
+//! The audit of a file: what its format promises, and what every flexible body must fulfil.
+
+use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
+use super::kind_of_modes::beside_free_surface;
+use super::{AuditCheck, ImportedBody, ImportedFile, ImportedFrame};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_body::flex_body::rigid_motions;
+use flexbody_body::invariants::{IdentityCheck, Invariants, identities};
+use flexbody_linalg::{dense_cholesky, symmetric_eigen};
+
+/// Radius of gyration relative to the extent of the places of the body: a rod has 0.29, a ring 0.5. Far
+/// outside lengths have different units; frames may stand for a part of a body only.
+const GYRATION: (f64, f64) = (0.02, 5.0);
+
+/// Facts and checks of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Audit {
+    /// Name of the format.
+    pub format: &'static str,
+    /// The variant.
+    pub dialect: String,
+    /// Name of the body, where the file has one.
+    pub name: String,
+    /// m. Unit: mass of the file.
+    pub mass: f64,
+    /// Number of modes.
+    pub n_modes: usize,
+    /// Number of nodes or frames.
+    pub n_frames: usize,
+    /// Frequencies sqrt(lambda) / (2 pi) of the modes by themselves, cycles per time unit of the file.
+    pub frequencies: Vec<f64>,
+    /// Facts that are no fault.
+    pub notes: Vec<String>,
+    /// Every check, those of the format first.
+    pub checks: Vec<AuditCheck>,
+}
+
+impl Audit {
+    /// The diagnostics of the checks that failed.
+    pub fn findings(&self) -> Vec<Diagnostic> {
+        self.checks.iter().filter_map(AuditCheck::finding).collect()
+    }
+
+    /// Whether every check passed.
+    pub fn passed(&self) -> bool {
+        self.checks.iter().all(AuditCheck::passed)
+    }
+}
+
+/// Holds a file to its format and to theory section 10. Identities pass up to `tolerance`, relative to the
+/// size of their terms, or the rounding of their formulas where that is more.
+pub fn audit(file: &ImportedFile, tolerance: f64) -> Audit {
+    let body = &file.body;
+    let invariants =
+        Invariants::from_numbered(&body.inertia, body.modal_stiffness.clone(), tolerance.max(DIGITS));
+    let mut checks = file.checks.clone();
+    let mut notes = file.notes.clone();
+    let identities_of_any_body = identities(&invariants, &ANY_BODY);
+    if let Some(cause) = identities_of_any_body.iter().find(|check| is_cause_of_others(check)) {
+        // What follows from it would only repeat it.
+        checks.retain(|check| check.value.is_finite());
+        checks.push(of_identity(cause.clone()));
+        notes.push("checks that need a mass, and numbers, are left out".to_owned());
+    } else {
+        // Of a mass that does not commute with rotations no file tells W0, which this one needs.
+        let told = |check: &IdentityCheck| check.name != "velocity_gram_psd";
+        checks.extend(identities_of_any_body.into_iter().filter(told).map(of_identity));
+        checks.push(turns(body));
+        checks.push(deform(&invariants));
+        checks.extend(modal_checks(&invariants));
+        checks.extend(size(body));
+        notes.push(kind_of_modes(&invariants, &body.frames));
+    }
+    for check in checks.iter_mut().filter(|check| is_identity(check.code)) {
+        check.limit = check.limit.max(tolerance);
+    }
+    let frequency = |j: usize| {
+        let (k, m) = (body.modal_stiffness[(j, j)], body.inertia.i6[(j, j)]);
+        (k / m).sqrt() / std::f64::consts::TAU
+    };
+    Audit {
+        format: file.format,
+        dialect: file.dialect.clone(),
+        name: body.name.clone(),
+        mass: body.inertia.i1,
+        n_modes: body.n_modes(),
+        n_frames: body.frames.len(),
+        frequencies: (0..body.n_modes()).map(frequency).collect(),
+        notes,
+        checks,
+    }
+}
+
+/// Whether a check fails without which no other means anything.
+fn is_cause_of_others(check: &IdentityCheck) -> bool {
+    matches!(check.name, "finite" | "mass_positive") && !check.passed
+}
+
+/// Rotation about every axis has inertia: [`import_body`](super::import_body()) makes no other body.
+fn turns(body: &ImportedBody) -> AuditCheck {
+    AuditCheck {
+        name: "turns_about_every_axis",
+        formula: "principal moments about the centre of mass that are zero",
+        value: axes_without_inertia(&body.inertia),
+        limit: 0.0,
+        code: Code::AuditImplausible,
+        meaning: NO_INERTIA.to_owned(),
+    }
+}
+
+/// No motion of the modes is rigid: frame and modes would move the body in the same way twice, and the mass matrix of
+/// the free body is singular.
+fn deform(invariants: &Invariants) -> AuditCheck {
+    // A mass of no body has findings of its own.
+    let rigid = rigid_motions(invariants).unwrap_or_default();
+    let named = rigid.in_words().unwrap_or_else(|| "modes are rigid motions".to_owned());
+    AuditCheck {
+        name: "modes_deform",
+        formula: "motions of the modes that are rigid",
+        value: rigid.count as f64,
+        limit: 0.0,
+        code: Code::AuditImplausible,
+        meaning: format!(
+            "{named}: the frame makes the same motions, and the mass matrix of the free body is singular; convert --from leaves them out"
+        ),
+    }
+}
+
+/// Findings whose size is that of an identity: those that a tolerance is about.
+fn is_identity(code: Code) -> bool {
+    use Code::{AuditFrame, AuditIdentity, AuditImplausible, AuditLayout, AuditLumped};
+    matches!(code, AuditIdentity | AuditLumped | AuditLayout | AuditImplausible | AuditFrame)
+}
+
+fn of_identity(check: IdentityCheck) -> AuditCheck {
+    let (code, meaning) = match check.name {
+        "finite" => (Code::AuditImplausible, "some numbers are missing or no numbers"),
+        "mass_positive" => (Code::AuditImplausible, "the mass is not positive"),
+        "second_moment_symmetric" => (Code::AuditImplausible, "the inertia tensor is not symmetric"),
+        "second_moment_psd" | "inertia_psd" => (
+            Code::AuditImplausible,
+            "no distribution of mass has this inertia and centre of mass: they refer to different points, or products of inertia have the wrong sign",
+        ),
+        "inertia_triangle" => (
+            Code::AuditImplausible,
+            "a principal moment is larger than the sum of the others: no body has this inertia",
+        ),
+        "motion_gram_psd" => (
+            Code::AuditIdentity,
+            "a rigid-flexible motion has negative kinetic energy: mass, coupling and modal mass come from different mass matrices or units",
+        ),
+        "scalar_gram_psd" | "s_psd" => (
+            Code::AuditIdentity,
+            "a motion has negative kinetic energy: the inertia of the modes does not belong to the rest, as with lumped masses beside a consistent modal mass",
+        ),
+        "s_transposed" | "w3_skew" => (
+            Code::AuditLayout,
+            "products of modes lack their symmetry: rows and columns or blocks are mixed up",
+        ),
+        _ => (Code::AuditIdentity, "entries are larger than the mass of the body allows"),
+    };
+    AuditCheck {
+        name: check.name,
+        formula: check.formula,
+        value: check.value,
+        limit: check.limit,
+        code,
+        meaning: meaning.to_owned(),
+    }
+}
+
+/// Mass and stiffness of the modes.
+fn modal_checks(invariants: &Invariants) -> Vec<AuditCheck> {
+    let (mass, stiffness) = (invariants.modal_mass(), invariants.modal_stiffness());
+    let check = |name, formula, value, code, meaning: &str| AuditCheck {
+        name,
+        formula,
+        value,
+        limit: 1e-12,
+        code,
+        meaning: meaning.to_owned(),
+    };
+    let mut checks = vec![
+        check(
+            "modal_mass_symmetric",
+            "m_ff = m_ff'",
+            asymmetry(&mass),
+            Code::AuditIdentity,
+            "the mass matrix of the modes is not symmetric",
+        ),
+        check(
+            "modal_stiffness_symmetric",
+            "K_ff = K_ff'",
+            asymmetry(stiffness),
+            Code::AuditIdentity,
+            "the stiffness matrix of the modes is not symmetric",
+        ),
+    ];
+    checks.push(check(
+        "modal_mass_positive",
+        "m_ff positive definite",
+        f64::from(dense_cholesky(mass).is_none()),
+        Code::AuditImplausible,
+        "modes without mass, or that depend on each other",
+    ));
+    let least = symmetric_eigen(stiffness.as_ref()).and_then(|eigen| {
+        let largest = eigen.values.last().copied()?.abs();
+        eigen.values.first().map(|first| if largest > 0.0 { (-first / largest).max(0.0) } else { 1.0 })
+    });
+    checks.push(check(
+        "modal_stiffness_psd",
+        "K_ff positive semidefinite, not zero",
+        least.unwrap_or(f64::NAN),
+        Code::AuditImplausible,
+        "some deformation takes negative energy, or none takes any: stiffness is missing or has a wrong sign",
+    ));
+    checks
+}
+
+/// |A - A'| relative to the largest entry.
+fn asymmetry(a: &Mat<f64>) -> f64 {
+    let skew = (a - a.transpose()).norm_max();
+    if skew == 0.0 { 0.0 } else { skew / a.norm_max() }
+}
+
+/// Inertia, centre of mass and places of the body against each other.
+fn size(body: &ImportedBody) -> Vec<AuditCheck> {
+    let inertia = &body.inertia;
+    let positions: Vec<_> = body.frames.iter().map(|frame| nalgebra::Vector3::from(frame.position)).collect();
+    let centre = inertia.i2 / inertia.i1;
+    let reach = |x: &nalgebra::Vector3<f64>| positions.iter().map(|y| (x - y).norm()).fold(0.0, f64::max);
+    let Some(first) = positions.first() else { return Vec::new() };
+    // At least half of the largest distance of two, whatever place comes first.
+    let extent = reach(first);
+    if positions.len() < 2 || extent <= 0.0 || !extent.is_finite() {
+        return Vec::new();
+    }
+    let about_centre = 0.5 * inertia.i7.trace() - inertia.i1 * centre.norm_squared();
+    let gyration = (about_centre.max(0.0) / inertia.i1).sqrt();
+    let ratio = gyration / extent;
+    // How many times it is out of range, so that 1 passes.
+    let times = (ratio / GYRATION.1).max(GYRATION.0 / ratio);
+    let check = |name, formula, value, meaning| AuditCheck {
+        name,
+        formula,
+        value,
+        limit: 1.0,
+        code: Code::AuditUnits,
+        meaning,
+    };
+    let guess = |factor: f64| match factor.log10().round() {
+        d if d.is_finite() && d != 0.0 => format!(", as if units of length differed by about 1e{d:+.0}"),
+        _ => String::new(),
+    };
+    vec![
+        check(
+            "gyration_fits",
+            "radius of gyration / extent of the frames, times out of 0.02 to 5",
+            times,
+            format!(
+                "the radius of gyration is {gyration:.3e}, the frames extend over {extent:.3e}{}",
+                guess(ratio / 0.3)
+            ),
+        ),
+        check(
+            "centre_fits",
+            "distance of the centre of mass from the frames / 10 extents",
+            positions.iter().map(|x| (x - centre).norm()).fold(f64::INFINITY, f64::min) / (10.0 * extent),
+            format!(
+                "the centre of mass is {:.3e} from the origin, the frames extend over {extent:.3e}{}",
+                centre.norm(),
+                guess(centre.norm() / extent)
+            ),
+        ),
+    ]
+}
+
+/// The kind of the modes and what ties the frame to the body, in words.
+fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
+    let Some(by) = beside_free_surface(invariants) else {
+        return "modes are mass-normalised free-surface modes".to_owned();
+    };
+    let at_rest = places_at_rest(frames);
+    let places = match &at_rest[..] {
+        [] => String::new(),
+        [one] => format!("; the frame stands on node {one}, which moves in no mode"),
+        [first, .., last] => {
+            format!("; the frame stands on {} nodes that move in no mode, {first} to {last}", at_rest.len())
+        }
+    };
+    format!("modes are no mass-normalised free-surface modes (by {by:.1e}){places}")
+}
+
+/// Displacement of a node relative to the largest of the mode up to which the node rests.
+const AT_REST: f64 = 1e-9;
+
+/// Labels of the nodes that move in no mode; they may turn, as the ends of a body whose frame follows its chord.
+fn places_at_rest(frames: &[ImportedFrame]) -> Vec<&str> {
+    let modes = frames.first().map_or(0, |frame| frame.translation.ncols());
+    let size = |frame: &ImportedFrame, j: usize| frame.translation.col(j).norm_max();
+    let largest: Vec<f64> =
+        (0..modes).map(|j| frames.iter().map(|frame| size(frame, j)).fold(0.0, f64::max)).collect();
+    let rests = |frame: &&ImportedFrame| {
+        largest.iter().enumerate().all(|(j, largest)| size(frame, j) <= AT_REST * largest)
+    };
+    frames.iter().filter(rests).map(|frame| frame.label.as_str()).collect()
+}

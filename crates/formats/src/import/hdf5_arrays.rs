@@ -1,0 +1,152 @@
+//! Arrays of HDF5 files of other programs, whose declarations may be false.
+
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::hdf5_file::{Element, Stored, dataset, elements, members, open_dataset, open_sound, text};
+use flexbody_base::text::InputFile;
+use hdf5_metno as hdf5;
+use std::path::PathBuf;
+
+/// An open file.
+pub(crate) struct Hdf5Arrays {
+    root: hdf5::Group,
+    stored: Stored,
+    path: PathBuf,
+}
+
+/// Values in row-major order with their extents.
+pub(crate) struct Values<T> {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) values: Vec<T>,
+}
+
+impl Hdf5Arrays {
+    /// Opens a file.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is no HDF5 file, or a damaged one.
+    pub(crate) fn open(file: &InputFile) -> Result<Self> {
+        let (opened, bytes) = open_sound(file.path(), "flexible body", Code::ForeignUnreadable)?;
+        let root = opened.as_group().map_err(|e| {
+            let message = format!("the root group cannot be read: {e}");
+            Error::from(Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()))
+        })?;
+        Ok(Self { root, stored: Stored::new(bytes), path: file.path().to_path_buf() })
+    }
+
+    /// Whether a file is one that has datasets with all these names.
+    pub(crate) fn is_with(file: &InputFile, names: &[&str]) -> bool {
+        const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
+        file.bytes().starts_with(SIGNATURE)
+            && Self::open(file).is_ok_and(|opened| opened.missing(names).is_empty())
+    }
+
+    /// Those of `names` that are not there.
+    pub(crate) fn missing<'n>(&self, names: &[&'n str]) -> Vec<&'n str> {
+        let there = members(&self.root).unwrap_or_default();
+        names.iter().filter(|name| !there.iter().any(|member| member == *name)).copied().collect()
+    }
+
+    /// Refuses a file that lacks one of `names`.
+    ///
+    /// # Errors
+    /// [`ForeignIncomplete`](Code::ForeignIncomplete).
+    pub(crate) fn require(&self, names: &[&str]) -> Result<()> {
+        let missing: Vec<String> = self.missing(names).iter().map(|name| format!("`{name}`")).collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let message = format!("the file lacks {}", missing.join(", "));
+        Err(Diagnostic::new(Code::ForeignIncomplete, message).in_file(&self.path).into())
+    }
+
+    /// Whether there is a dataset with this name.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        self.missing(&[name]).is_empty()
+    }
+
+    /// True if there is a group with this name that holds something.
+    pub(crate) fn has_members(&self, name: &str) -> bool {
+        let group = if self.has(name) { self.root.group(name).ok() } else { None };
+        group.is_some_and(|group| members(&group).is_ok_and(|names| !names.is_empty()))
+    }
+
+    /// The error that says what is wrong with a dataset.
+    pub(crate) fn refuse(&self, name: &str, what: &str) -> Error {
+        Diagnostic::new(Code::ForeignUnreadable, format!("`{name}`: {what}")).in_file(&self.path).into()
+    }
+
+    /// A dataset of any shape.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    pub(crate) fn values<T: Element>(&mut self, name: &str) -> Result<Values<T>> {
+        let read = dataset::<T>(&self.root, name, &mut self.stored, elements);
+        match read.and_then(|found| found.ok_or_else(|| "expected a dataset, found nothing".to_owned())) {
+            Ok((values, shape)) => Ok(Values { shape, values }),
+            Err(what) => Err(self.refuse(name, &what)),
+        }
+    }
+
+    /// Integers of 64 or 32 bits.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    pub(crate) fn integers(&mut self, name: &str) -> Result<Vec<i64>> {
+        match self.values::<i32>(name) {
+            Ok(found) => Ok(found.values.into_iter().map(i64::from).collect()),
+            Err(_) => self.values::<i64>(name).map(|found| found.values),
+        }
+    }
+
+    /// Floats of this shape; extents of one may be left out or added.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    pub(crate) fn floats(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f64>> {
+        let found = self.values::<f64>(name)?;
+        let long = |shape: &[usize]| shape.iter().copied().filter(|extent| *extent != 1).collect::<Vec<_>>();
+        if long(&found.shape) != long(shape) {
+            let what = format!("expected shape {shape:?}, found {:?}", found.shape);
+            return Err(self.refuse(name, &what));
+        }
+        Ok(found.values)
+    }
+
+    /// A single number.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    pub(crate) fn number(&mut self, name: &str) -> Result<f64> {
+        self.floats(name, &[]).map(|values| values[0])
+    }
+
+    /// An array with two extents.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    pub(crate) fn matrix(&mut self, name: &str, rows: usize, columns: usize) -> Result<Mat<f64>> {
+        let values = self.floats(name, &[rows, columns])?;
+        Ok(Mat::from_fn(rows, columns, |i, j| values[i * columns + j]))
+    }
+
+    /// Extents of an array that must have two.
+    ///
+    /// # Errors
+    /// [`ForeignUnreadable`](Code::ForeignUnreadable).
+    pub(crate) fn extents(&self, name: &str) -> Result<(usize, usize)> {
+        let shape = open_dataset(&self.root, name).map_err(|what| self.refuse(name, &what))?;
+        let shape = shape.map(|dataset| dataset.shape()).unwrap_or_default();
+        match shape[..] {
+            [rows, columns] if rows > 0 && columns > 0 => Ok((rows, columns)),
+            _ => Err(self.refuse(name, &format!("expected two extents, found {shape:?}"))),
+        }
+    }
+
+    /// A text attribute of a dataset.
+    pub(crate) fn attribute(&self, name: &str, attribute: &str) -> Option<String> {
+        let dataset = open_dataset(&self.root, name).ok().flatten()?;
+        text(&dataset, attribute).ok().flatten()
+    }
+}

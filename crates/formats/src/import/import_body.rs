@@ -1,0 +1,381 @@
+//! A body of a file of another program as a body of ours.
+
+use super::any_body::{ANY_BODY, DIGITS, NO_INERTIA, axes_without_inertia};
+use super::kind_of_modes::{beside_diagonal, beside_free_surface, beside_normalised};
+use super::{ImportedBody, ImportedFile, ImportedFrame};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::flex_body::{
+    Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, ModalChange, Modes,
+    Parts, ReferenceConditions, Source, Storage, TermDecision, diagonal_eigenvalues, reduced_residuals,
+    rigid_motions,
+};
+use flexbody_body::invariants::{BodyFrame, Invariants, identities, symmetric_part};
+use flexbody_linalg::larger;
+use flexbody_model::Nodes;
+use std::collections::HashSet;
+
+/// How far inertia may be from that of a body before nothing can be computed with it: rounding of few digits
+/// is far below.
+const BROKEN: f64 = 1e-2;
+
+/// A body that was made of a file, and the diagnostics of the way.
+#[derive(Debug, Clone)]
+pub struct Imported {
+    /// The body, in the frame of the file.
+    pub body: FlexBody,
+    /// What was changed, what is missing.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Body frame of a body that is read from a file of another program.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub enum ImportFrame {
+    /// The frame of the file, tied to the body as its modes tie it: a model that holds the frame keeps its meaning.
+    #[default]
+    Kept,
+    /// Mean axes: rigid motion is taken out of the modes.
+    Mean(BodyFrame),
+    /// The frame stands on the interface, or on the node with rotations, of this name.
+    Interface(String),
+}
+
+/// Makes a body of `file`, which was read from `source`; `units` count if the file states none.
+///
+/// Modes that are mass-normalised with a diagonal stiffness to 1e-9 are taken as they are, to the last bit, if the
+/// frame is kept or they are free of rigid motion. Others are made so by the small eigenproblem, with the products
+/// that the invariants hold (theory 5.2): the body is the same in other coordinates. Rigid motions among the modes
+/// are left out.
+///
+/// # Errors
+/// [`ForeignUnsound`](Code::ForeignUnsound) for what the reader says;
+/// [`ForeignIncomplete`](Code::ForeignIncomplete) when no place of the body is known, modes depend on each other, or
+/// the stiffness is not positive; those of [`FlexBody::new`], [`FlexBody::in_mean_axes_at`] and
+/// [`FlexBody::on_interface`].
+pub fn import_body(
+    file: &ImportedFile,
+    source: SourceFile,
+    units: UnitSystem,
+    frame: &ImportFrame,
+) -> Result<Imported> {
+    refuse_unsound(file)?;
+    let given = &file.body;
+    let lacking = |lack: &String| Diagnostic::new(Code::ForeignDropped, lack.clone());
+    let mut diagnostics: Vec<Diagnostic> = given.lacks.iter().map(lacking).collect();
+    let mut coordinates = ModalCoordinates::new(given)?;
+    if let Some((change, note)) = normalising(&coordinates.invariants)? {
+        diagnostics.push(note);
+        coordinates = coordinates.changed(&change, &given.frames);
+    }
+    let conditions = match beside_free_surface(&coordinates.invariants) {
+        None => ReferenceConditions::MeanAxes,
+        Some(_) => ReferenceConditions::Unstated,
+    };
+    let body = FlexBody::new(parts(file, coordinates, conditions, source, units))?;
+    let (body, warning) = with_own_rounding(body)?;
+    diagnostics.extend(warning);
+    let body = match frame {
+        ImportFrame::Kept => body,
+        ImportFrame::Mean(at) => body.in_mean_axes_at(*at)?,
+        ImportFrame::Interface(name) => with_interface(body, name)?.on_interface(name)?,
+    };
+    Ok(Imported { body, diagnostics })
+}
+
+/// The change to normalised modes in the frame of the file, with its note; `None` if the modes stay as they are.
+fn normalising(invariants: &Invariants) -> Result<Option<(ModalChange, Diagnostic)>> {
+    let refuse = |reason: String| {
+        let help = "flexbody audit says what is wrong with the file; write it again";
+        Diagnostic::new(Code::ForeignIncomplete, reason).with_help(help)
+    };
+    let beside = beside_normalised(invariants);
+    let rigid = rigid_motions(invariants).map_err(refuse)?;
+    if beside.is_none() && rigid.count == 0 {
+        return Ok(None);
+    }
+    let change = ModalChange::in_own_frame(invariants, 3).map_err(refuse)?;
+    let message = match (change.left_out().in_words(), beside) {
+        (Some(rigid), _) => format!("{rigid}: left out, the others are normalised"),
+        (None, by) => format!(
+            "the modes of the file are not mass-normalised with a diagonal stiffness (by {:.1e}): combinations of them that are were taken",
+            by.unwrap_or(0.0)
+        ),
+    };
+    Ok(Some((change, Diagnostic::new(Code::ForeignChanged, message))))
+}
+
+/// The body with an interface `name`: one that it has, or else its node of this number.
+fn with_interface(body: FlexBody, name: &str) -> Result<FlexBody> {
+    let known = body.interfaces().iter().any(|interface| interface.name == name);
+    let node = name.parse().ok().and_then(|id: i64| body.nodes().ids.iter().position(|own| *own == id));
+    let Some(node) = node.filter(|_| !known) else { return Ok(body) };
+    let mut parts = body.into_parts();
+    let reference = Some(parts.nodes.positions[node]);
+    let interface = Interface { name: name.to_owned(), nodes: vec![node], coupling: None, reference };
+    parts.interfaces.push(interface);
+    FlexBody::new(parts)
+}
+
+/// Refuses what the reader found unsound, and a file without places.
+fn refuse_unsound(file: &ImportedFile) -> Result<()> {
+    if !file.unsound.is_empty() {
+        let refused = |why: &String| Diagnostic::new(Code::ForeignUnsound, why.clone());
+        return Err(Error::new(file.unsound.iter().map(refused).collect()));
+    }
+    if file.body.frames.is_empty() {
+        let message = "the file has no node: neither positions nor shapes of the body are known";
+        return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
+    }
+    Ok(())
+}
+
+/// Everything of a body that depends on its modal coordinates.
+struct ModalCoordinates {
+    invariants: Invariants,
+    /// 3n x nf.
+    shape: Mat<f64>,
+    rotation: Option<Mat<f64>>,
+    damping: Option<Mat<f64>>,
+    geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
+}
+
+impl ModalCoordinates {
+    /// Those of the file, with the symmetries that every body has.
+    fn new(given: &ImportedBody) -> Result<Self> {
+        let invariants = sound_invariants(given)?;
+        let turns = given.frames.iter().any(|frame| frame.rotation.is_some());
+        let mut geometric_stiffness = given.geometric_stiffness.clone();
+        for one in &mut geometric_stiffness {
+            one.matrix = symmetric_part(&one.matrix);
+        }
+        Ok(Self {
+            invariants,
+            shape: stacked(&given.frames, |frame| Some(&frame.translation)),
+            rotation: turns.then(|| stacked(&given.frames, |frame| frame.rotation.as_ref())),
+            damping: given.modal_damping.as_ref().map(symmetric_part),
+            geometric_stiffness,
+        })
+    }
+
+    /// Returns the body in other modal coordinates.
+    fn changed(self, change: &ModalChange, frames: &[ImportedFrame]) -> Self {
+        let positions: Vec<[f64; 3]> = frames.iter().map(|frame| frame.position).collect();
+        Self {
+            invariants: change.invariants(&self.invariants),
+            shape: change.shapes(&self.shape, &positions),
+            rotation: self.rotation.map(|rotation| change.rotations(&rotation)),
+            damping: self.damping.map(|damping| change.congruent(&damping)),
+            geometric_stiffness: self
+                .geometric_stiffness
+                .into_iter()
+                .map(|one| GeometricStiffness { matrix: change.congruent(&one.matrix), load: one.load })
+                .collect(),
+        }
+    }
+}
+
+/// The invariants of the file, which must be those of some body.
+fn sound_invariants(given: &ImportedBody) -> Result<Invariants> {
+    let stiffness = symmetric_part(&given.modal_stiffness);
+    let invariants = Invariants::from_numbered(&given.inertia, stiffness, DIGITS).with_symmetries();
+    if let Some(broken) = identities(&invariants, &ANY_BODY).into_iter().find(|check| {
+        matches!(check.name, "finite" | "mass_positive" | "second_moment_psd" | "inertia_psd")
+            && check.value > BROKEN
+    }) {
+        let message = format!("inertia is not that of a body: {} does not hold", broken.formula);
+        return Err(Diagnostic::new(Code::ForeignIncomplete, message).into());
+    }
+    if axes_without_inertia(&given.inertia) != 0.0 {
+        return Err(Diagnostic::new(Code::ForeignIncomplete, NO_INERTIA).into());
+    }
+    Ok(invariants)
+}
+
+/// The parts of the body in its final coordinates.
+fn parts(
+    file: &ImportedFile,
+    coordinates: ModalCoordinates,
+    conditions: ReferenceConditions,
+    source: SourceFile,
+    units: UnitSystem,
+) -> Parts {
+    let given = &file.body;
+    let invariants = &coordinates.invariants;
+    Parts {
+        source: source_facts(file, invariants, source),
+        dimension: 3,
+        units: given.units.clone().unwrap_or(units),
+        frame: Frame::model(),
+        conditions,
+        nodes: nodes(&given.frames),
+        mesh: given.mesh.clone(),
+        lumped: Vec::new(),
+        certificate: certificate(file, invariants),
+        interfaces: interfaces(given),
+        coordinates: None,
+        terms: invariants.groups().dropped().map(|group| not_in_file(group, file.format)).collect(),
+        storage: Storage::F64,
+        modes: modes(
+            file,
+            &coordinates.invariants,
+            coordinates.shape,
+            coordinates.rotation,
+            coordinates.damping,
+        ),
+        invariants: coordinates.invariants,
+        geometric_stiffness: coordinates.geometric_stiffness,
+        inertia_stiffness: None,
+    }
+}
+
+/// Where the body comes from.
+fn source_facts(file: &ImportedFile, invariants: &Invariants, source: SourceFile) -> Source {
+    Source {
+        name: file.body.name.clone(),
+        files: vec![source],
+        number: None,
+        // The file does not tell the degrees of freedom of the model.
+        n_dofs: 0,
+        mass_structure: match invariants.general() {
+            Some(_) => MassStructure::General,
+            None => MassStructure::RotationInvariant,
+        },
+        approximation: None,
+        settings: serde_json::json!({
+            "from": file.format,
+            "dialect": file.dialect,
+            "frame": BodyFrame::Model.name(),
+        }),
+    }
+}
+
+fn modes(
+    file: &ImportedFile,
+    invariants: &Invariants,
+    shape: Mat<f64>,
+    rotation: Option<Mat<f64>>,
+    damping: Option<Mat<f64>>,
+) -> Modes {
+    let eigenvalue = diagonal_eigenvalues(invariants);
+    let damping_ratio = match &damping {
+        Some(d) => {
+            eigenvalue.iter().enumerate().map(|(j, l)| (0.5 * d[(j, j)] / l.sqrt()).max(0.0)).collect()
+        }
+        None => vec![0.0; eigenvalue.len()],
+    };
+    Modes {
+        residual: reduced_residuals(invariants, &eigenvalue),
+        provenance: (1..=eigenvalue.len()).map(|j| format!("mode {j} of a {} file", file.format)).collect(),
+        truncation: Vec::new(),
+        damping_ratio,
+        modal_damping: damping,
+        shape,
+        rotation,
+        internal: None,
+        eigenvalue,
+    }
+}
+
+/// Nothing is proved of modes whose matrices are not there.
+fn certificate(file: &ImportedFile, invariants: &Invariants) -> Certificate {
+    Certificate {
+        proved_modes: None,
+        shift: 0.0,
+        negative_pivots: None,
+        rigid_modes: 6,
+        remark: format!(
+            "read from a {} file: the FE matrices are not known; residuals are those of the reduced matrices",
+            file.format
+        ),
+        // What digits of K leave of the modes, as far as the file shows it.
+        rigid_noise: beside_diagonal(invariants),
+        rigid_residual: 0.0,
+        eigenvalue_rounding: 0.0,
+        inertia_rounding: 0.0,
+        guarantee: None,
+        fixed_interface: None,
+    }
+}
+
+/// The body with what the digits of its file leave of the identities of inertia, and a warning where this is
+/// more than rounding.
+fn with_own_rounding(body: FlexBody) -> Result<(FlexBody, Option<Diagnostic>)> {
+    let missed = body.identities(BodyFrame::Model).into_iter().filter(|check| !check.passed);
+    let missed = missed.map(|check| check.value).fold(0.0, larger);
+    if missed == 0.0 || missed.is_nan() || missed > BROKEN {
+        return Ok((body, None));
+    }
+    let mut parts = body.into_parts();
+    parts.certificate.inertia_rounding = missed;
+    let message = format!("the inertia data of the file are those of a body to {missed:.1e} of their size");
+    Ok((FlexBody::new(parts)?, Some(Diagnostic::new(Code::ForeignRounded, message))))
+}
+
+/// 3n x nf of the rows of all frames, zeros where one has none.
+fn stacked<'f>(
+    frames: &'f [ImportedFrame],
+    rows: impl Fn(&'f ImportedFrame) -> Option<&'f Mat<f64>>,
+) -> Mat<f64> {
+    let nf = frames.first().map_or(0, |frame| frame.translation.ncols());
+    Mat::from_fn(3 * frames.len(), nf, |row, j| rows(&frames[row / 3]).map_or(0.0, |rows| rows[(row % 3, j)]))
+}
+
+fn not_in_file(group: Group, format: &str) -> TermDecision {
+    TermDecision {
+        group,
+        kept: false,
+        tier: 0,
+        bound: f64::INFINITY,
+        limit: f64::INFINITY,
+        reason: format!("not told by the {format} file"),
+    }
+}
+
+/// Nodes with their labels as numbers. Labels that are names get numbers above all others, in their order, as places
+/// that are no nodes of the model have them; nodes are 1, 2, ... if no label is a number or two are the same.
+fn nodes(frames: &[ImportedFrame]) -> Nodes {
+    let numbers: Vec<Option<i64>> = frames.iter().map(|frame| frame.label.parse().ok()).collect();
+    let mut seen = HashSet::new();
+    let distinct = numbers.iter().flatten().all(|number| seen.insert(*number));
+    let highest = numbers.iter().flatten().max().copied();
+    let numbered = highest.filter(|_| distinct).and_then(|highest| {
+        let mut above = highest;
+        let mut next = || {
+            above = above.checked_add(1)?;
+            Some(above)
+        };
+        numbers.iter().map(|number| number.map_or_else(&mut next, Some)).collect::<Option<Vec<i64>>>()
+    });
+    let ids = numbered.unwrap_or_else(|| (1..=frames.len() as i64).collect());
+    Nodes { ids, positions: frames.iter().map(|frame| frame.position).collect() }
+}
+
+/// Frames that the file calls interfaces: single nodes with their reference point there.
+fn interfaces(given: &ImportedBody) -> Vec<Interface> {
+    let mut found: Vec<Interface> = Vec::new();
+    for (i, frame) in given.frames.iter().enumerate() {
+        let Some(name) = &frame.interface else { continue };
+        match found.iter_mut().find(|interface| interface.name == *name) {
+            // Several nodes of one name: their mean is the reference point.
+            Some(interface) => {
+                interface.nodes.push(i);
+                interface.reference = Some(mean_position(given, &interface.nodes));
+            }
+            None => found.push(Interface {
+                name: name.clone(),
+                nodes: vec![i],
+                coupling: None,
+                reference: Some(frame.position),
+            }),
+        }
+    }
+    found
+}
+
+fn mean_position(given: &ImportedBody, nodes: &[usize]) -> [f64; 3] {
+    let sum = |k: usize| nodes.iter().map(|&i| given.frames[i].position[k]).sum::<f64>();
+    [0, 1, 2].map(|k| sum(k) / nodes.len() as f64)
+}

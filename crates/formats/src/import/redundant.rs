@@ -1,0 +1,163 @@
+//! What files that list the nine invariants tell twice.
+//!
+//! I4 is the skew part of I8, I5 that of I9, I6 half the trace of -I9. Values are relative to the
+//! Cauchy-Schwarz bounds that I6 and I7 set, so that 1 is as far as two numbers can be apart.
+
+use super::AuditCheck;
+use faer::Mat;
+use flexbody_base::diagnostic::Code;
+use flexbody_body::invariants::Numbered;
+use flexbody_linalg::{larger, symmetric_eigen};
+
+/// Rounding of sums over the nodes of a large model.
+pub(crate) const ROUNDING: f64 = 1e-10;
+
+/// The invariants and the sizes that they can have.
+pub(crate) struct Redundant<'n> {
+    told: &'n Numbered,
+    /// sqrt(int x . x).
+    extent: f64,
+    /// sqrt(I6_jj).
+    modes: Vec<f64>,
+}
+
+impl<'n> Redundant<'n> {
+    pub(crate) fn new(told: &'n Numbered) -> Self {
+        let modes = (0..told.i8.len()).map(|j| told.i6[(j, j)].abs().sqrt()).collect();
+        Self { told, extent: (0.5 * told.i7.trace()).abs().sqrt(), modes }
+    }
+
+    fn nf(&self) -> usize {
+        self.modes.len()
+    }
+
+    fn of_pairs(&self, missed: impl Fn(usize, usize) -> f64) -> f64 {
+        let pairs = (0..self.nf()).flat_map(|j| (0..self.nf()).map(move |k| (j, k)));
+        pairs.map(|(j, k)| relative(missed(j, k), self.modes[j] * self.modes[k])).fold(0.0, larger)
+    }
+
+    /// I4_j against the skew part of I8_j.
+    pub(crate) fn i4_of_i8(&self) -> f64 {
+        let told = self.told;
+        let missed = |j: usize| {
+            let missed_along = |(a, b, c): (usize, usize, usize)| {
+                told.i4[(c, j)] - (told.i8[j][(a, b)] - told.i8[j][(b, a)])
+            };
+            CYCLIC.map(missed_along).into_iter().map(f64::abs).fold(0.0, larger)
+        };
+        (0..self.nf()).map(|j| relative(missed(j), self.extent * self.modes[j])).fold(0.0, larger)
+    }
+
+    /// I5_jk = -I5_kj.
+    pub(crate) fn i5_antisymmetric(&self) -> f64 {
+        let Some(i5) = &self.told.i5 else { return 0.0 };
+        let nf = self.nf();
+        self.of_pairs(|j, k| {
+            (0..3).map(|c| (i5[(c * nf + j, k)] + i5[(c * nf + k, j)]).abs()).fold(0.0, larger)
+        })
+    }
+
+    /// I5_jk against the skew part of I9_jk.
+    pub(crate) fn i5_of_i9(&self) -> f64 {
+        let (Some(i5), Some(i9)) = (&self.told.i5, &self.told.i9) else { return 0.0 };
+        let nf = self.nf();
+        self.of_pairs(|j, k| {
+            let at = |a: usize, b: usize| i9[(a * nf + j, b * nf + k)];
+            let missed_along =
+                |(a, b, c): (usize, usize, usize)| (i5[(c * nf + j, k)] - (at(b, a) - at(a, b))).abs();
+            CYCLIC.map(missed_along).into_iter().fold(0.0, larger)
+        })
+    }
+
+    /// I9_jk = I9_kj'.
+    pub(crate) fn i9_symmetric(&self) -> f64 {
+        let Some(i9) = &self.told.i9 else { return 0.0 };
+        let nf = self.nf();
+        self.of_pairs(|j, k| {
+            let axes = (0..9).map(|ab| (ab / 3, ab % 3));
+            let missed = |(a, b): (usize, usize)| i9[(a * nf + j, b * nf + k)] - i9[(b * nf + k, a * nf + j)];
+            axes.map(missed).map(f64::abs).fold(0.0, larger)
+        })
+    }
+
+    /// I6 against half the trace of -I9: of a mass that commutes with rotations the same sum.
+    pub(crate) fn i6_of_i9(&self) -> f64 {
+        let Some(i9) = &self.told.i9 else { return 0.0 };
+        self.of_pairs(|j, k| (self.told.i6[(j, k)] + self.half_trace(i9, j, k)).abs())
+    }
+
+    /// Least and largest eigenvalue of the modal mass that I9 tells, relative to I6, for messages.
+    pub(crate) fn mass_of_i9(&self) -> Option<(f64, f64)> {
+        let i9 = self.told.i9.as_ref()?;
+        let scaled = |j: usize, k: usize| -self.half_trace(i9, j, k) / (self.modes[j] * self.modes[k]);
+        let sum = Mat::from_fn(self.nf(), self.nf(), scaled);
+        if (0..self.nf()).any(|j| (0..self.nf()).any(|k| !sum[(j, k)].is_finite())) {
+            return None;
+        }
+        let values = symmetric_eigen(sum.as_ref())?.values;
+        Some((*values.first()?, *values.last()?))
+    }
+
+    fn half_trace(&self, i9: &Mat<f64>, j: usize, k: usize) -> f64 {
+        let nf = self.nf();
+        0.5 * (0..3).map(|a| i9[(a * nf + j, a * nf + k)]).sum::<f64>()
+    }
+
+    /// The check of I6 against I9 with what its failure means; `arrays` names the arrays of the file.
+    pub(crate) fn lumped(&self, name: &'static str, formula: &'static str, arrays: &str) -> AuditCheck {
+        let sizes = match self.mass_of_i9() {
+            Some((least, most)) => format!(", which by {arrays} is {least:.3} to {most:.3} of itself"),
+            None => String::new(),
+        };
+        AuditCheck {
+            name,
+            formula,
+            value: self.i6_of_i9(),
+            limit: ROUNDING,
+            code: Code::AuditLumped,
+            meaning: format!(
+                "the inertia of the modes does not give their mass{sizes}: lumped masses beside a consistent modal mass, unless the model has nodes with rotations or constraints"
+            ),
+        }
+    }
+}
+
+/// Makes findings of another order of the entries out of checks that fail, where all of these hold in that
+/// order: `other` has the names of checks that the order is seen by, with their values in the other one.
+pub(crate) fn in_other_order(checks: &mut [AuditCheck], other: &[(&str, f64)], meaning: &str) {
+    let failed = |name: &str| checks.iter().any(|check| check.name == name && !check.passed());
+    let seen: Vec<(&str, f64)> = other.iter().copied().filter(|(name, _)| failed(name)).collect();
+    if seen.iter().any(|(_, value)| value.is_nan() || *value > ROUNDING) {
+        return;
+    }
+    for check in checks.iter_mut().filter(|check| seen.iter().any(|(name, _)| *name == check.name)) {
+        check.code = Code::AuditLayout;
+        check.meaning = meaning.to_owned();
+    }
+}
+
+/// I9 of a body that does without W2 has no part that is symmetric in its axes, although the modes have mass.
+pub(crate) fn lacks_w2(told: &Numbered) -> bool {
+    let nf = told.i8.len();
+    let Some(i9) = &told.i9 else { return true };
+    let symmetric = |row: usize, column: usize| {
+        let (a, j, b, k) = (row / nf, row % nf, column / nf, column % nf);
+        i9[(row, column)] + i9[(b * nf + j, a * nf + k)]
+    };
+    (0..3 * nf).all(|row| (0..3 * nf).all(|column| symmetric(row, column) == 0.0))
+}
+
+/// |A - A'| relative to the geometric mean of the diagonal entries.
+pub(crate) fn asymmetry(a: &Mat<f64>) -> f64 {
+    let pairs = (0..a.nrows()).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let bound = |i: usize, j: usize| (a[(i, i)] * a[(j, j)]).abs().sqrt();
+    pairs.map(|(i, j)| relative((a[(i, j)] - a[(j, i)]).abs(), bound(i, j))).fold(0.0, larger)
+}
+
+/// `missed / size`; nothing missed is perfect whatever the size.
+pub(crate) fn relative(missed: f64, size: f64) -> f64 {
+    if missed == 0.0 { 0.0 } else { missed / size }
+}
+
+/// (a, b, c) in cyclic order.
+const CYCLIC: [(usize, usize, usize); 3] = [(1, 2, 0), (2, 0, 1), (0, 1, 2)];

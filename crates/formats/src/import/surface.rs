@@ -1,0 +1,33 @@
+//! The surface of a body of another program, which is for drawing only.
+
+use flexbody_model::SurfaceMesh;
+
+/// Polygons and lines of a file as the surface of `n` nodes. Polygons are split into triangles from their first
+/// corner. A file whose indices name no nodes loses its surface: `lacks` says so.
+///
+/// * `name`: name of the array in the file.
+pub(crate) fn surface(
+    name: &str,
+    polygons: &[Vec<i64>],
+    n: usize,
+    lacks: &mut Vec<String>,
+) -> Option<SurfaceMesh> {
+    let (mut triangles, mut edges) = (Vec::new(), Vec::new());
+    let index = |i: i64| u32::try_from(i).unwrap_or(u32::MAX);
+    for corners in polygons {
+        match corners[..] {
+            [] | [_] => {}
+            [a, b] => edges.push([index(a), index(b)]),
+            [first, ref others @ ..] => {
+                triangles
+                    .extend(others.windows(2).map(|pair| [index(first), index(pair[0]), index(pair[1])]));
+            }
+        }
+    }
+    if triangles.is_empty() && edges.is_empty() {
+        return None;
+    }
+    SurfaceMesh::new(triangles, edges, n)
+        .map_err(|problem| lacks.push(format!("`{name}`: {problem}; the body has no surface")))
+        .ok()
+}

@@ -1,0 +1,197 @@
+//! What the record groups must fulfil.
+
+use super::read::body::{COUPLING, Read, by_columns, from_masses, missing};
+use super::read::records::Records;
+use super::read::words::Surplus;
+use crate::import::AuditCheck;
+use crate::import::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, relative};
+use flexbody_base::diagnostic::Code;
+use flexbody_linalg::larger;
+
+/// Digits that a number may lack.
+const LOST: f64 = 1e-8;
+
+/// Roundings of the last digit that an identity may add up.
+const TERMS: f64 = 10.0;
+
+pub(crate) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {
+    let mut all = vec![digits(records), surplus(records)];
+    all.extend(masses(records, read));
+    if missing(records).is_empty() {
+        all.extend(identities(records, read));
+    } else if !from_masses(records) {
+        all.push(coupling(records));
+    }
+    if let Some(damping) = &read.body.modal_damping {
+        all.push(AuditCheck {
+            name: "damping_symmetric",
+            formula: "record group 13 = its transpose",
+            value: asymmetry(damping),
+            limit: ROUNDING + TERMS * records.rounding(),
+            code: Code::AuditIdentity,
+            meaning: "damping of a mode by another depends on their order".to_owned(),
+        });
+    }
+    all
+}
+
+fn digits(records: &Records) -> AuditCheck {
+    AuditCheck {
+        name: "digits",
+        formula: "half a unit of the last digit of numbers of size one",
+        value: records.rounding(),
+        limit: LOST,
+        code: Code::AuditDigits,
+        meaning: format!("numbers are written with {}", records.digits.words()),
+    }
+}
+
+/// What MBDyn skips without a word. A matrix of another size than the header says is then read wrong.
+fn surplus(records: &Records) -> AuditCheck {
+    let in_words = |(group, surplus): &(Option<usize>, Surplus)| {
+        let zeros = if surplus.zero { ", all zero" } else { "" };
+        let place =
+            group.map_or("before record group 1".to_owned(), |group| format!("after record group {group}"));
+        format!("{} words{zeros}, in line {} {place}", surplus.words, surplus.line)
+    };
+    let all: Vec<String> = records.skipped.iter().map(in_words).collect();
+    AuditCheck {
+        name: "no_more_than_the_header_says",
+        formula: "number of words beyond those of the header",
+        value: records.skipped.iter().map(|(_, surplus)| surplus.words as f64).sum(),
+        limit: 0.0,
+        code: Code::AuditSurplus,
+        meaning: format!(
+            "the file has more than its header says, which MBDyn skips without a word: {}",
+            if all.is_empty() { "nothing".to_owned() } else { all.join("; ") }
+        ),
+    }
+}
+
+fn coupling(records: &Records) -> AuditCheck {
+    let missing = missing(records);
+    AuditCheck {
+        name: "coupling_there",
+        formula: "record groups 14 to 18, share that is missing",
+        value: missing.len() as f64 / COUPLING.len() as f64,
+        limit: 0.0,
+        code: Code::AuditCoupling,
+        meaning: format!(
+            "record groups {} are missing and no lumped masses are there: modes do not feel the motion of the body, nor the body that of the modes",
+            missing.join(", ")
+        ),
+    }
+}
+
+/// Lumped masses: that they stand alone, are positive, and are what the modes belong to.
+fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
+    let Some(lumped) = &read.lumped else { return Vec::new() };
+    let n = records.n_nodes;
+    let nf = records.n_modes;
+    let beside = !from_masses(records);
+    let twice = AuditCheck {
+        name: "lumped_masses_alone",
+        formula: "no record group 11 beside 14 to 18",
+        value: f64::from(u8::from(beside)),
+        limit: 0.0,
+        code: Code::AuditIdentity,
+        meaning:
+            "lumped masses stand beside invariants: MBDyn adds the sums over the masses to the invariants of the file, which then count twice"
+                .to_owned(),
+    };
+    let negative = AuditCheck {
+        name: "lumped_masses_positive",
+        formula: "share of negative lumped masses",
+        value: lumped.negative_share,
+        limit: 0.0,
+        code: Code::AuditLumped,
+        meaning: format!("{} of {n} lumped masses are negative", lumped.negative),
+    };
+    let (own, sums) = (&read.body.inertia.i6, &lumped.told.i6);
+    let size = |j: usize, k: usize| (own[(j, j)] * own[(k, k)]).abs().sqrt();
+    let modal = (0..nf)
+        .flat_map(|j| (0..nf).map(move |k| (j, k)))
+        .map(|(j, k)| relative((own[(j, k)] - sums[(j, k)]).abs(), size(j, k)))
+        .fold(0.0, larger);
+    let total = relative((read.body.inertia.i1 - lumped.told.i1).abs(), read.body.inertia.i1.abs());
+    let tensor =
+        relative((read.body.inertia.i7 - lumped.told.i7).abs().max(), read.body.inertia.i7.abs().max());
+    let consistent = AuditCheck {
+        name: "lumped_masses_carry_modes",
+        formula: "record groups 9 and 12 = sums over the masses of record group 11",
+        value: larger(modal, larger(total, tensor)),
+        limit: ROUNDING + TERMS * records.rounding(),
+        code: Code::AuditLumped,
+        meaning: format!(
+            "the coupling of rigid motion and modes comes from {n} lumped masses, which are not the mass matrix of the modes: modal mass differs by {modal:.1e}, mass by {total:.1e}, inertia by {tensor:.1e}"
+        ),
+    };
+    vec![twice, negative, consistent]
+}
+
+/// What groups 9 and 14 to 18 tell twice.
+fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
+    let redundant = Redundant::new(&read.body.inertia);
+    let limit = ROUNDING + TERMS * records.rounding();
+    let identity = |name, formula, value, meaning: &str| AuditCheck {
+        name,
+        formula,
+        value,
+        limit,
+        code: Code::AuditIdentity,
+        meaning: meaning.to_owned(),
+    };
+    let mut all = vec![
+        identity(
+            "i4_of_i8",
+            "invariant 4 = skew part of invariant 8",
+            redundant.i4_of_i8(),
+            "modes couple to rotation in two ways: groups 15 and 16 are about different points, or group 16 is transposed",
+        ),
+        identity(
+            "i5_antisymmetric",
+            "invariant 5_jk = -invariant 5_kj",
+            redundant.i5_antisymmetric(),
+            "a mode has moment of momentum with itself",
+        ),
+        identity(
+            "i9_symmetric",
+            "invariant 9_jk = transpose of invariant 9_kj",
+            redundant.i9_symmetric(),
+            "the inertia of pairs of modes depends on their order",
+        ),
+        identity(
+            "i5_of_i9",
+            "invariant 5_jk = skew part of invariant 9_jk",
+            redundant.i5_of_i9(),
+            "pairs of modes couple to rotation in two ways: group 18 is transposed, or one of groups 17 and 18 has the other sign",
+        ),
+    ];
+    if !records.general && read.body.inertia.i9.is_some() {
+        let mut lumped = redundant.lumped(
+            "modal_mass_of_i9",
+            "modal mass = half the trace of -invariant 9_jk",
+            "record group 18",
+        );
+        lumped.limit = limit;
+        all.push(lumped);
+    }
+    find_column_order(records, read, &mut all);
+    all
+}
+
+/// Tells groups that stand column by column from wrong ones: their identities hold in that order.
+fn find_column_order(records: &Records, read: &Read, checks: &mut [AuditCheck]) {
+    let columns = by_columns(records, &read.body.inertia);
+    let redundant = Redundant::new(&columns);
+    let seen_by = [
+        ("i4_of_i8", redundant.i4_of_i8()),
+        ("i5_antisymmetric", redundant.i5_antisymmetric()),
+        ("i9_symmetric", redundant.i9_symmetric()),
+        ("i5_of_i9", redundant.i5_of_i9()),
+        ("modal_mass_of_i9", redundant.i6_of_i9()),
+    ];
+    let meaning =
+        "groups 14 to 18 stand column by column, as the manual calls them; MBDyn reads them row by row";
+    in_other_order(checks, &seen_by, meaning);
+}

@@ -1,0 +1,173 @@
+//! What a file says of the body.
+
+use super::lumped::{Lumped, lumped};
+use super::records::Records;
+use crate::import::redundant::lacks_w2;
+use crate::import::{ImportedBody, ImportedFrame};
+use faer::Mat;
+use flexbody_body::flex_body::{GeometricStiffness, LoadKind, UnitLoad};
+use flexbody_body::invariants::{Groups, Numbered};
+use nalgebra::{Matrix3, Vector3};
+
+/// Groups of the invariants that couple rigid motion and modes.
+pub(crate) const COUPLING: [usize; 5] = [14, 15, 16, 17, 18];
+
+/// A body, and what was found on the way.
+pub(crate) struct Read {
+    pub(crate) body: ImportedBody,
+    pub(crate) lumped: Option<Lumped>,
+}
+
+/// Whether the coupling of the body is taken from lumped masses: as MBDyn does where nothing else is there.
+pub(crate) fn from_masses(records: &Records) -> bool {
+    records.has(11) && !COUPLING.iter().any(|group| records.has(*group))
+}
+
+/// Groups of the coupling that are not there.
+pub(crate) fn missing(records: &Records) -> Vec<String> {
+    COUPLING.iter().filter(|group| !records.has(**group)).map(usize::to_string).collect()
+}
+
+/// Mass, centre of mass and inertia come from group 12, or from lumped masses; `None` where both are missing.
+pub(crate) fn body(records: &Records) -> Option<Read> {
+    let nf = records.n_modes;
+    let square = |values: &[f64]| Mat::from_fn(nf, nf, |i, j| values[i * nf + j]);
+    let matrix = |group: usize| records.get(group).map(square);
+    let lumped = lumped(records);
+    let mut inertia = match &lumped {
+        Some(masses) if from_masses(records) => masses.told.clone(),
+        _ => file(records, Order::Rows),
+    };
+    // MBDyn leaves what group 12 says in its place.
+    match (records.get(12), &lumped) {
+        (Some(values), _) => rigid(&mut inertia, values),
+        (None, Some(masses)) => {
+            (inertia.i1, inertia.i2, inertia.i7) = (masses.told.i1, masses.told.i2, masses.told.i7);
+        }
+        (None, None) => return None,
+    }
+    inertia.i6 = matrix(9)?;
+    let mut lacks: Vec<String> = Vec::new();
+    let missing = missing(records);
+    if !missing.is_empty() && !from_masses(records) {
+        lacks
+            .push(format!("the file lacks record groups {}: the body does without them", missing.join(", ")));
+    } else if lacks_w2(&inertia) {
+        inertia.i9 = None;
+        lacks.push("invariant 9 is zero: the body does without W2".to_owned());
+    }
+    let (geometric_stiffness, named) = stiffening(records, &mut lacks, square);
+    let turns = (0..records.n_nodes)
+        .map(|node| (0..nf).any(|mode| (3..6).any(|component| records.shape(node, component, mode) != 0.0)));
+    let frames = turns.enumerate().map(|(node, turns)| frame(records, node, turns, &named)).collect();
+    let body = ImportedBody {
+        name: String::new(),
+        units: None,
+        inertia,
+        modal_stiffness: matrix(10)?,
+        modal_damping: matrix(13),
+        geometric_stiffness,
+        frames,
+        mesh: None,
+        lacks,
+    };
+    Some(Read { body, lumped })
+}
+
+/// Order of the entries of the matrices of three rows in groups 14 to 18.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Order {
+    /// As MBDyn reads them.
+    Rows,
+    /// As its manual says.
+    Columns,
+}
+
+/// Groups 14 to 18 as they stand in the file.
+fn file(records: &Records, order: Order) -> Numbered {
+    let nf = records.n_modes;
+    let at = |group: usize, a: usize, column: usize| {
+        let entry = |values: &[f64]| match order {
+            Order::Rows => values[a * (values.len() / 3) + column],
+            Order::Columns => values[3 * column + a],
+        };
+        records.get(group).map_or(0.0, entry)
+    };
+    let i9 = |row: usize, column: usize| at(18, row / nf, 3 * (row % nf * nf + column % nf) + column / nf);
+    let i5 = |row: usize, k: usize| at(17, row / nf, row % nf * nf + k);
+    // Large arrays are made only where the file has them.
+    Numbered {
+        i1: 0.0,
+        i2: Vector3::zeros(),
+        i3: Mat::from_fn(3, nf, |a, j| at(14, a, j)),
+        i4: Mat::from_fn(3, nf, |a, j| at(15, a, j)),
+        i5: records.has(17).then(|| Mat::from_fn(3 * nf, nf, i5)),
+        i6: Mat::zeros(nf, nf),
+        i7: Matrix3::zeros(),
+        i8: (0..nf).map(|j| Matrix3::from_fn(|a, b| at(16, a, 3 * j + b))).collect(),
+        i9: records.has(18).then(|| Mat::from_fn(3 * nf, 3 * nf, i9)),
+        groups: Groups { w1: records.has(16), ..Groups::ALL },
+    }
+}
+
+/// The invariants that the file would tell in the order of columns, beside the same mass and modal mass.
+pub(crate) fn by_columns(records: &Records, told: &Numbered) -> Numbered {
+    Numbered { i1: told.i1, i2: told.i2, i6: told.i6.clone(), i7: told.i7, ..file(records, Order::Columns) }
+}
+
+/// Mass, centre of mass, inertia about it.
+fn rigid(told: &mut Numbered, values: &[f64]) {
+    let center = Vector3::new(values[1], values[2], values[3]);
+    told.i1 = values[0];
+    told.i2 = center * told.i1;
+    let about_center = Matrix3::from_fn(|i, j| values[4 + 3 * i + j]);
+    told.i7 = about_center - center.cross_matrix() * center.cross_matrix() * told.i1;
+}
+
+fn frame(records: &Records, node: usize, turns: bool, named: &[String]) -> ImportedFrame {
+    let rows =
+        |first: usize| Mat::from_fn(3, records.n_modes, |k, mode| records.shape(node, first + k, mode));
+    let label = &records.labels[node];
+    let is_interface = label.parse::<i64>().is_err() || named.contains(label);
+    ImportedFrame {
+        label: label.clone(),
+        interface: is_interface.then(|| label.clone()),
+        position: records.position(node),
+        translation: rows(0),
+        // Nodes of solids have zeros.
+        rotation: turns.then(|| rows(3)),
+    }
+}
+
+/// Group 19, and the labels of the nodes that its forces act at.
+fn stiffening(
+    records: &Records,
+    lacks: &mut Vec<String>,
+    square: impl Fn(&[f64]) -> Mat<f64>,
+) -> (Vec<GeometricStiffness<Mat<f64>>>, Vec<String>) {
+    let (mut all, mut named) = (Vec::new(), Vec::new());
+    for (index, values) in &records.stiffening {
+        let at = |offset: usize| records.labels.get(offset / 6).cloned();
+        let load = match index {
+            1..=6 => Some((LoadKind::Spin, index - 1)),
+            7..=9 => Some((LoadKind::AngularAcceleration, index - 7)),
+            10..=12 => Some((LoadKind::Acceleration, index - 10)),
+            13.. => at(index - 13).map(|label| {
+                named.push(label.clone());
+                let component = (index - 13) % 6;
+                let kind = if component < 3 { LoadKind::Force(label) } else { LoadKind::Moment(label) };
+                (kind, component % 3)
+            }),
+            0 => None,
+        };
+        match load {
+            Some((kind, component)) => {
+                all.push(GeometricStiffness { load: UnitLoad { kind, component }, matrix: square(values) })
+            }
+            None => {
+                lacks.push(format!("stress stiffening with index {index} belongs to no load of the file"))
+            }
+        }
+    }
+    (all, named)
+}

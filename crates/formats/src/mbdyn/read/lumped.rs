@@ -1,0 +1,71 @@
+//! The invariants that MBDyn itself makes of lumped masses (record group 11), in Modal.cc: sums over the
+//! nodes.
+
+use super::records::Records;
+use faer::Mat;
+use flexbody_body::invariants::{Groups, Numbered};
+use nalgebra::{Matrix3, Vector3};
+
+/// Masses and inertias of the nodes, and what follows from them.
+pub(crate) struct Lumped {
+    /// I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
+    pub(crate) told: Numbered,
+    /// Nodes with a mass below zero.
+    pub(crate) negative: usize,
+    /// Sum of the magnitudes of negative masses over that of all.
+    pub(crate) negative_share: f64,
+}
+
+/// What a file of record groups 8 and 11 says.
+pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
+    let diagonal = records.get(11)?;
+    let (n, nf) = (records.n_nodes, records.n_modes);
+    let mut told = Numbered {
+        i1: 0.0,
+        i2: Vector3::zeros(),
+        i3: Mat::zeros(3, nf),
+        i4: Mat::zeros(3, nf),
+        i5: None,
+        i6: Mat::zeros(nf, nf),
+        i7: Matrix3::zeros(),
+        i8: vec![Matrix3::zeros(); nf],
+        i9: None,
+        groups: Groups::ALL,
+    };
+    let (mut i5, mut i9) = (Mat::zeros(3 * nf, nf), Mat::zeros(3 * nf, 3 * nf));
+    let (mut negative, mut below, mut all) = (0, 0.0, 0.0);
+    for node in 0..n {
+        let [mass, _, _, jx, jy, jz] = *diagonal[6 * node..].first_chunk::<6>().expect("six per node");
+        let x = Vector3::from(records.position(node));
+        let inertia = Matrix3::from_diagonal(&Vector3::new(jx, jy, jz));
+        let shape = |first: usize, j: usize| Vector3::from_fn(|k, _| records.shape(node, first + k, j));
+        negative += usize::from(mass < 0.0);
+        below += (-mass).max(0.0);
+        all += mass.abs();
+        told.i1 += mass;
+        told.i2 += x * mass;
+        told.i7 += inertia - x.cross_matrix() * x.cross_matrix() * mass;
+        for j in 0..nf {
+            let (psi, turn) = (shape(0, j), shape(3, j));
+            let coupled = x.cross(&psi) * mass + inertia * turn;
+            for a in 0..3 {
+                told.i3[(a, j)] += mass * psi[a];
+                told.i4[(a, j)] += coupled[a];
+            }
+            told.i8[j] -= x.cross_matrix() * psi.cross_matrix() * mass;
+            for k in 0..nf {
+                let other = shape(0, k);
+                told.i6[(j, k)] += psi.dot(&other) * mass + turn.dot(&(inertia * shape(3, k)));
+                let (cross, double) = (psi.cross(&other), psi.cross_matrix() * other.cross_matrix());
+                for a in 0..3 {
+                    i5[(a * nf + j, k)] += mass * cross[a];
+                    for b in 0..3 {
+                        i9[(a * nf + j, b * nf + k)] += mass * double[(a, b)];
+                    }
+                }
+            }
+        }
+    }
+    (told.i5, told.i9) = (Some(i5), Some(i9));
+    Some(Lumped { told, negative, negative_share: if all > 0.0 { below / all } else { 0.0 } })
+}

@@ -1,0 +1,219 @@
+//! The record groups of a file, read as MBDyn does: of each group as many numbers as the header says. What
+//! stands after them MBDyn skips without a word; here it is told.
+
+use super::words::{GROUP, Surplus, Words};
+use crate::import::digits::Digits;
+use flexbody_base::error::Result;
+use flexbody_base::text::InputFile;
+use std::collections::BTreeMap;
+
+/// Beginning of the last line.
+const END: &str = "** END OF FILE";
+/// Beginning of the comment of flexbody's own files about a mass that does not commute with rotations.
+const GENERAL_MASS: &str = "** GENERAL MASS";
+
+/// Groups without which MBDyn reads no file.
+const REQUIRED: [usize; 8] = [1, 2, 5, 6, 7, 8, 9, 10];
+
+/// Contents of a file.
+#[derive(Default)]
+pub(crate) struct Records {
+    /// The word before the counts, which MBDyn ignores.
+    pub(crate) revision: String,
+    pub(crate) n_nodes: usize,
+    pub(crate) n_modes: usize,
+    pub(crate) labels: Vec<String>,
+    /// Shapes, six numbers for each node of each mode.
+    pub(crate) shapes: Vec<f64>,
+    /// Numbers of the groups that hold nothing else, in the order of the file.
+    numbers: BTreeMap<usize, Vec<f64>>,
+    /// Index and matrix of group 19.
+    pub(crate) stiffening: Vec<(usize, Vec<f64>)>,
+    /// Whether the file says that record groups 9 and 18 need not agree.
+    pub(crate) general: bool,
+    /// Whether the line that ends a file is there.
+    pub(crate) ended: bool,
+    pub(crate) digits: Digits,
+    /// What MBDyn skips, and the record group before it; none before the first.
+    pub(crate) skipped: Vec<(Option<usize>, Surplus)>,
+}
+
+impl Records {
+    pub(crate) fn read(file: &InputFile) -> Result<Self> {
+        let text = std::str::from_utf8(file.bytes()).map_err(|e| {
+            let line = 1 + file.bytes()[..e.valid_up_to()].iter().filter(|byte| **byte == b'\n').count();
+            Words::new(file.path(), "").refuse_at(line, "the file is no text")
+        })?;
+        let mut words = Words::new(file.path(), text);
+        let mut records = Self::default();
+        let mut seen: Vec<usize> = Vec::new();
+        let mut rejected = 0;
+        while !records.ended {
+            let line = words.at();
+            let Some(text) = words.take_line() else { break };
+            let Some(title) = text.strip_prefix(GROUP) else {
+                records.comment(line, text, seen.last().copied());
+                continue;
+            };
+            let group = group_number(title, &seen).map_err(|what| words.refuse_at(line, what))?;
+            seen.push(group);
+            if group == 1 {
+                rejected = records.header(&mut words)?;
+            } else {
+                records.group(group, rejected, line, &mut words)?;
+            }
+            records.skip(Some(group), words.surplus());
+        }
+        let missing: Vec<String> =
+            REQUIRED.iter().filter(|group| !seen.contains(group)).map(usize::to_string).collect();
+        if !missing.is_empty() {
+            return Err(words.incomplete(format!("the file lacks record groups {}", missing.join(", "))));
+        }
+        records.digits = words.digits;
+        Ok(records)
+    }
+
+    /// Takes a line between record groups, the last of which is `group`.
+    fn comment(&mut self, line: usize, text: &str, group: Option<usize>) {
+        self.ended = text.starts_with(END);
+        self.general |= text.starts_with(GENERAL_MASS);
+        if !text.starts_with("**") {
+            self.skip(group, Surplus::of(line, text));
+        }
+    }
+
+    /// Takes note of words where none are expected.
+    fn skip(&mut self, group: Option<usize>, surplus: Surplus) {
+        if surplus.words == 0 {
+            return;
+        }
+        match self.skipped.last_mut() {
+            Some((last, found)) if *last == group && found.numbers == surplus.numbers => {
+                found.words += surplus.words;
+                found.zero &= surplus.zero;
+            }
+            _ => self.skipped.push((group, surplus)),
+        }
+    }
+
+    /// Record group 1; gives the number of rejected modes, whose shapes come first.
+    fn header(&mut self, words: &mut Words<'_>) -> Result<usize> {
+        const WHAT: &str = "record group 1";
+        words.take_line();
+        self.revision = words.expect(WHAT)?.to_owned();
+        self.n_nodes = words.count(WHAT)?;
+        let (mut modes, mut rejected) = (0usize, 0);
+        for kind in 0..4 {
+            let count = words.count(WHAT)?;
+            if kind < 3 {
+                modes = modes.saturating_add(count);
+            } else {
+                rejected = count;
+            }
+        }
+        self.n_modes = modes.checked_sub(rejected).filter(|modes| *modes > 0).ok_or_else(|| {
+            words.refuse(format!("{WHAT}: {modes} modes, of which {rejected} are rejected"))
+        })?;
+        Ok(rejected)
+    }
+
+    fn group(&mut self, group: usize, rejected: usize, line: usize, words: &mut Words<'_>) -> Result<()> {
+        let (n, nf) = (self.n_nodes, self.n_modes);
+        let square = nf.saturating_mul(nf);
+        let what = format!("record group {group}");
+        let before = words.digits;
+        match group {
+            2 => {
+                while self.labels.len() < n {
+                    let label = words.expect(&what)?.to_owned();
+                    self.labels.push(label);
+                }
+            }
+            8 => self.shapes(rejected, words)?,
+            19 => {
+                for _ in 0..words.count(&what)? {
+                    let index = words.count(&what)?;
+                    self.stiffening.push((index, words.numbers(square, &what)?));
+                }
+            }
+            _ => {
+                let count = match group {
+                    3 | 4 => nf,
+                    5..=7 => n,
+                    9 | 10 | 13 => square,
+                    11 => n.saturating_mul(6),
+                    12 => 13,
+                    14 | 15 => nf.saturating_mul(3),
+                    16 => nf.saturating_mul(9),
+                    17 => square.saturating_mul(3),
+                    18 => square.saturating_mul(9),
+                    _ => return Err(words.refuse_at(line, format!("{what}: there is no such group"))),
+                };
+                let values = words.numbers(count, &what)?;
+                self.numbers.insert(group, values);
+            }
+        }
+        // Coordinates are short where the model is, and initial values.
+        if matches!(group, 2..=7) {
+            words.digits = before;
+        }
+        Ok(())
+    }
+
+    fn shapes(&mut self, rejected: usize, words: &mut Words<'_>) -> Result<()> {
+        const WHAT: &str = "record group 8";
+        let numbers_per_mode = self.n_nodes.saturating_mul(6);
+        for mode in 0..rejected.saturating_add(self.n_modes) {
+            words
+                .take_title()
+                .map_err(|line| words.refuse_at(line, format!("{WHAT}: mode {} has no title", mode + 1)))?;
+            let values = words.numbers(numbers_per_mode, WHAT)?;
+            if mode >= rejected {
+                self.shapes.extend(values);
+            }
+            self.skip(Some(8), words.surplus_of_line());
+        }
+        Ok(())
+    }
+
+    /// Half a unit of the last digit of a number of size one, as far as the file shows it.
+    pub(crate) fn rounding(&self) -> f64 {
+        if self.digits.are_few() { 0.0 } else { self.digits.rounding(1.0) }
+    }
+
+    /// Numbers of a group.
+    pub(crate) fn get(&self, group: usize) -> Option<&[f64]> {
+        self.numbers.get(&group).map(Vec::as_slice)
+    }
+
+    /// Whether the group is there.
+    pub(crate) fn has(&self, group: usize) -> bool {
+        self.numbers.contains_key(&group) || group == 19 && !self.stiffening.is_empty()
+    }
+
+    /// Component of a shape: 0 to 2 translation, 3 to 5 rotation.
+    pub(crate) fn shape(&self, node: usize, component: usize, mode: usize) -> f64 {
+        self.shapes[(mode * self.n_nodes + node) * 6 + component]
+    }
+
+    /// Position of a node; groups 5 to 7 are required.
+    pub(crate) fn position(&self, node: usize) -> [f64; 3] {
+        [5, 6, 7].map(|group| self.get(group).map_or(f64::NAN, |values| values[node]))
+    }
+}
+
+/// The number in the title of a record group, where it may stand after those that were `seen`.
+fn group_number(title: &str, seen: &[usize]) -> std::result::Result<usize, String> {
+    let digits = title.trim_start();
+    let end = digits.find(|c: char| !c.is_ascii_digit()).unwrap_or(digits.len());
+    let Ok(group) = digits[..end].parse::<usize>() else {
+        return Err("a record group without a number".to_owned());
+    };
+    if seen.contains(&group) {
+        return Err(format!("record group {group} stands in the file twice"));
+    }
+    if seen.is_empty() && group != 1 {
+        return Err(format!("record group {group} stands before record group 1"));
+    }
+    Ok(group)
+}

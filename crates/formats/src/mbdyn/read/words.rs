@@ -1,0 +1,211 @@
+//! Lines and blank-separated words of a file, with their places.
+
+use crate::import::digits::Digits;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use std::path::Path;
+
+/// First words of a record group.
+pub(crate) const GROUP: &str = "** RECORD GROUP ";
+
+/// A place in the text.
+pub(crate) struct Words<'t> {
+    path: &'t Path,
+    lines: Vec<&'t str>,
+    /// Index of the line that is read.
+    line: usize,
+    /// The rest of the line that is read.
+    rest: &'t str,
+    /// Digits of the numbers of record groups that no program writes short on purpose.
+    pub(crate) digits: Digits,
+}
+
+impl<'t> Words<'t> {
+    pub(crate) fn new(path: &'t Path, text: &'t str) -> Self {
+        let lines: Vec<&str> = text.lines().collect();
+        let rest = lines.first().copied().unwrap_or("");
+        Self { path, lines, line: 0, rest, digits: Digits::default() }
+    }
+
+    /// Number of the line that is read, from 1.
+    pub(crate) fn at(&self) -> usize {
+        self.line + 1
+    }
+
+    pub(crate) fn refuse(&self, what: impl Into<String>) -> Error {
+        self.refuse_at(self.at(), what)
+    }
+
+    pub(crate) fn refuse_at(&self, line: usize, what: impl Into<String>) -> Error {
+        Diagnostic::new(Code::ForeignUnreadable, what).in_file(self.path).at_line(line).into()
+    }
+
+    pub(crate) fn incomplete(&self, what: impl Into<String>) -> Error {
+        Diagnostic::new(Code::ForeignIncomplete, what).in_file(self.path).into()
+    }
+
+    /// What is left of the line, and on to the next one.
+    pub(crate) fn take_line(&mut self) -> Option<&'t str> {
+        if self.line >= self.lines.len() {
+            return None;
+        }
+        let rest = self.rest;
+        self.line += 1;
+        self.rest = self.lines.get(self.line).copied().unwrap_or("");
+        Some(rest)
+    }
+
+    /// The next word, wherever it stands.
+    pub(crate) fn word(&mut self) -> Option<&'t str> {
+        loop {
+            let rest = self.rest.trim_start();
+            if rest.is_empty() {
+                self.take_line()?;
+                continue;
+            }
+            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+            self.rest = &rest[end..];
+            return Some(&rest[..end]);
+        }
+    }
+
+    /// The next word of a record that is not complete yet.
+    pub(crate) fn expect(&mut self, what: &str) -> Result<&'t str> {
+        match self.word() {
+            Some(word) if word.starts_with("**") => {
+                Err(self.refuse(format!("{what}: the record group ends too early")))
+            }
+            Some(word) => Ok(word),
+            None => {
+                let last = self.lines.len();
+                Err(self.refuse_at(last, format!("{what}: the file ends too early")))
+            }
+        }
+    }
+
+    /// The next number. One that touches the next, as fields of Fortran do, ends where that begins.
+    pub(crate) fn number(&mut self, what: &str) -> Result<f64> {
+        let word = self.expect(what)?;
+        let (word, touching) = word.split_at(end_of_number(word));
+        let could_be_exponent = |part: &str| part.bytes().skip(1).all(|b| b.is_ascii_digit());
+        if !touching.is_empty() && !word.contains(['e', 'E']) && could_be_exponent(touching) {
+            return Err(self.refuse(format!(
+                "{what}: `{word}{touching}` is no finite number: MBDyn takes it for two, write the letter of the exponent"
+            )));
+        }
+        if !touching.is_empty() {
+            // What was taken ends where the rest of the line begins.
+            let line = self.lines[self.line];
+            self.rest = &line[line.len() - self.rest.len() - touching.len()..];
+        }
+        match word.parse::<f64>() {
+            Ok(value) if value.is_finite() => {
+                self.digits.see(word);
+                Ok(value)
+            }
+            _ => Err(self.refuse(format!("{what}: {word:?} is no finite number"))),
+        }
+    }
+
+    /// `count` numbers, as far as the file has them: what a header promises is not believed.
+    pub(crate) fn numbers(&mut self, count: usize, what: &str) -> Result<Vec<f64>> {
+        let mut values = Vec::new();
+        while values.len() < count {
+            values.push(self.number(what)?);
+        }
+        Ok(values)
+    }
+
+    /// A whole number that is not negative.
+    pub(crate) fn count(&mut self, what: &str) -> Result<usize> {
+        let word = self.expect(what)?;
+        word.parse().map_err(|_| self.refuse(format!("{what}: {word:?} is no count")))
+    }
+
+    /// What stands up to the next comment, which is not taken: nothing, of a record group that is over.
+    pub(crate) fn surplus(&mut self) -> Surplus {
+        let mut found = Surplus::of(self.at(), "");
+        while self.line < self.lines.len() && !self.rest.trim_start().starts_with("**") {
+            found.see(self.line + 1, self.rest);
+            self.take_line();
+        }
+        found
+    }
+
+    /// Words where none are expected, up to the end of the line.
+    pub(crate) fn surplus_of_line(&mut self) -> Surplus {
+        let line = self.at();
+        Surplus::of(line, self.take_line().unwrap_or(""))
+    }
+
+    /// Takes the title of a mode: a comment, or a blank line where the numbers follow. Gives the line where
+    /// it should be.
+    pub(crate) fn take_title(&mut self) -> std::result::Result<(), usize> {
+        let first = self.at();
+        while self.rest.trim().is_empty() && self.line < self.lines.len() {
+            self.take_line();
+        }
+        if self.rest.starts_with("**") && !self.rest.starts_with(GROUP) {
+            self.take_line();
+            return Ok(());
+        }
+        if self.at() > first && !self.rest.starts_with("**") { Ok(()) } else { Err(first) }
+    }
+}
+
+/// Words where none are expected.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Surplus {
+    /// Line of the first.
+    pub(crate) line: usize,
+    pub(crate) words: usize,
+    /// Whether all of the words are zeros.
+    pub(crate) zero: bool,
+    /// Whether all of the words are numbers.
+    pub(crate) numbers: bool,
+}
+
+impl Surplus {
+    /// The words of a line.
+    pub(crate) fn of(line: usize, text: &str) -> Self {
+        let mut found = Self { line, words: 0, zero: true, numbers: true };
+        found.see(line, text);
+        found
+    }
+
+    fn see(&mut self, line: usize, text: &str) {
+        for word in text.split_whitespace() {
+            if self.words == 0 {
+                self.line = line;
+            }
+            self.words += 1;
+            let number = word.parse::<f64>().ok();
+            self.zero &= number == Some(0.0);
+            self.numbers &= number.is_some();
+        }
+    }
+}
+
+/// Bytes of the number that a word begins with: up to a sign that neither begins it nor follows the letter of
+/// an exponent.
+fn end_of_number(word: &str) -> usize {
+    let bytes = word.as_bytes();
+    let is_next = |&at: &usize| matches!(bytes[at], b'+' | b'-') && !matches!(bytes[at - 1], b'e' | b'E');
+    (1..bytes.len()).find(is_next).unwrap_or(bytes.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_touch_are_two() {
+        let numbers = |text: &str, count| Words::new(Path::new("body.fem"), text).numbers(count, "group 9");
+        assert_eq!(
+            numbers("-0.12E+01-0.5E-01+3 .5\n1.5-2.5", 6).expect("six"),
+            [-1.2, -0.05, 3.0, 0.5, 1.5, -2.5]
+        );
+        let error = numbers("1.2345678901-101 2", 2).expect_err("an exponent without its letter");
+        assert!(error.to_string().contains("letter of the exponent"), "{error}");
+    }
+}

@@ -1,0 +1,157 @@
+//! MBSim: the HDF5 file of its `ExternalFlexibleFfrBody` (external_flexible_ffr_body.cc,
+//! generic_flexible_ffr_body.cc).
+//!
+//! The integrals from which MBSim itself forms everything else: of a symmetric pair of shape functions, x_a
+//! S_b and S_a S_b. The modal mass has no place of its own, it is the sum of the integrals of S_a S_a; W2 and
+//! W3 follow from the same integrals.
+
+use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
+use crate::export::inertia::inertia;
+use crate::export::{ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
+use faer::Mat;
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::{CauchySchwarz, MassKind};
+
+/// The format.
+pub(crate) struct Mbsim;
+
+/// Blocks of the shape function shape function integral.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+
+impl ExportFormat for Mbsim {
+    fn name(&self) -> &'static str {
+        "mbsim"
+    }
+
+    fn reader(&self) -> &'static str {
+        "MBSim, ExternalFlexibleFfrBody"
+    }
+
+    fn has_points(&self) -> bool {
+        true
+    }
+
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        [
+            losses::plane(body),
+            losses::general_w0(body),
+            losses::general_w3(body),
+            other_w2(body),
+            losses::geometric_stiffness(body, |_| false),
+            losses::inertia_stiffness(body, options, |_| false),
+            losses::internal_rows(body),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        hdf5_bytes(&entries(body, &frames(body, &options.points))).map(Exported::single)
+    }
+}
+
+/// S_aa of the file: those of W2 and, where the sum of these is not the modal mass, what lacks in equal
+/// parts.
+fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
+    let invariants = body.invariants();
+    let s = invariants.s();
+    if let (MassKind::Solid, Some(s)) = (invariants.kind(), s) {
+        return [0, 1, 2].map(|a| s[a][a].clone());
+    }
+    let modal_mass = invariants.modal_mass();
+    let nf = body.n_modes();
+    let held = |a: usize, j: usize, k: usize| s.map_or(0.0, |s| s[a][a][(j, k)]);
+    [0, 1, 2].map(|a| {
+        Mat::from_fn(nf, nf, |j, k| {
+            let sum: f64 = (0..3).map(|c| held(c, j, k)).sum();
+            held(a, j, k) + (modal_mass[(j, k)] - sum) / 3.0
+        })
+    })
+}
+
+/// W2 that is not what gives the modal mass: of a mass that does not commute with rotations, or of a body
+/// that does not hold W2.
+fn other_w2(body: &FlexBody) -> Option<String> {
+    let invariants = body.invariants();
+    let nf = body.n_modes();
+    let bound = CauchySchwarz::of(invariants);
+    let written = diagonal(body);
+    let own = invariants.w2();
+    let places = (0..3).flat_map(|a| (0..nf).flat_map(move |j| (0..nf).map(move |k| (a, j, k))));
+    let lost = places
+        .map(|(a, j, k)| {
+            let told: f64 = (0..3).filter(|b| *b != a).map(|b| written[b][(j, k)]).sum();
+            let held = own.as_ref().map_or(0.0, |w2| w2[(a * nf + j, a * nf + k)]);
+            (told - held).abs() / bound.s(j, k)
+        })
+        .fold(0.0, f64::max);
+    match own {
+        Some(_) => losses::told_if(
+            lost,
+            "W2 other than what the modal mass says, which is the sum of the same integrals",
+        ),
+        None => Some(format!(
+            "that the body does without W2: it follows from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
+        )),
+    }
+}
+
+fn entries(body: &FlexBody, places: &[ExportFrame]) -> Vec<Hdf5Entry> {
+    let nf = body.n_modes();
+    let invariants = body.invariants();
+    let told = inertia(body);
+    let s_aa = diagonal(body);
+    // S_ab is at (b, a) of I9 where a is not b.
+    let s = |pair: usize, j: usize, k: usize| match PAIRS[pair] {
+        (a, b) if a == b => s_aa[a][(j, k)],
+        (a, b) => told.i9.as_ref().map_or(0.0, |i9| i9[(b * nf + j, a * nf + k)]),
+    };
+    let second = invariants.second_moment();
+    let positions: Vec<f64> = places.iter().flat_map(|place| place.position).collect();
+    let numbers = places.iter().map(|place| place.id).collect();
+    let turn = |row: usize, j: usize| {
+        places[row / 3].rotation.as_ref().map_or(0.0, |rotation| rotation[(row % 3, j)])
+    };
+    let mut all = vec![
+        Hdf5Contents::number(told.i1).named("mass"),
+        Hdf5Contents::list(told.i2.as_slice()).named("position integral"),
+        Hdf5Contents::from_fn(3, 3, |i, j| second[(i, j)]).named("position position integral"),
+        Hdf5Contents::matrix(&told.i3).named("shape function integral"),
+        Hdf5Contents::matrix(invariants.modal_stiffness()).named("stiffness matrix"),
+        Hdf5Contents::from_fn(9, nf, |row, j| invariants.ibar_or_half_c2()[row / 3][row % 3][j])
+            .named("position shape function integral"),
+        Hdf5Contents::from_fn(6 * nf, nf, |row, k| s(row / nf, row % nf, k))
+            .named("shape function shape function integral"),
+    ];
+    if losses::is_damped(body) {
+        all.push(Hdf5Contents::matrix(&body.damping()).named("damping matrix"));
+    }
+    let translation = |row: usize, j: usize| places[row / 3].translation[(row % 3, j)];
+    all.extend([
+        Hdf5Contents::Integers(vec![places.len()], numbers).named("node numbers"),
+        Hdf5Contents::list(&positions).named("nodal relative position"),
+        Hdf5Contents::from_fn(3 * places.len(), nf, translation).named("nodal shape matrix of translation"),
+    ]);
+    if places.iter().any(|place| place.rotation.is_some()) {
+        all.push(Hdf5Contents::from_fn(3 * places.len(), nf, turn).named("nodal shape matrix of rotation"));
+    }
+    all.extend(openmbv_indices(body, places));
+    all
+}
+
+/// Triangles, or else edges, of the surface on the places of the file, each ended by -1.
+fn openmbv_indices(body: &FlexBody, places: &[ExportFrame]) -> Option<Hdf5Entry> {
+    let numbers: Vec<i64> = places.iter().map(|place| place.id).collect();
+    let mesh = body.mesh()?.among(&body.nodes().ids, &numbers)?;
+    let ended = |corners: &[u32]| {
+        let indices: Vec<i64> = corners.iter().map(|&index| i64::from(index)).chain([-1]).collect();
+        indices
+    };
+    let indices: Vec<i64> = match mesh.triangles() {
+        [] => mesh.edges().iter().flat_map(|edge| ended(edge)).collect(),
+        triangles => triangles.iter().flat_map(|triangle| ended(triangle)).collect(),
+    };
+    Some(Hdf5Contents::Integers(vec![indices.len()], indices).named("openmbv indices"))
+}

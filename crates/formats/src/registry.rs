@@ -1,0 +1,147 @@
+//! Every format of other programs: those that are written, and those that are read.
+
+use super::export::{ExportFormat, ExportOptions, Exported, Points};
+use super::gltf::Gltf;
+use super::import::ImportFormat;
+use super::vtk::Vtk;
+use super::{adams, chrono, embedded, json, mbdyn, npz, openradioss, sid};
+#[cfg(feature = "hdf5")]
+use super::{exudyn, mbsim, simscape};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::text::InputFile;
+use flexbody_body::flex_body::FlexBody;
+use std::borrow::Cow;
+
+/// Every format, in the order of the documentation.
+pub const FORMATS: &[&dyn ExportFormat] = &[
+    #[cfg(feature = "hdf5")]
+    &exudyn::write::Exudyn,
+    &sid::write::Sid,
+    &mbdyn::write::Mbdyn,
+    #[cfg(feature = "hdf5")]
+    &mbsim::write::Mbsim,
+    &openradioss::OpenRadioss,
+    &chrono::Chrono,
+    #[cfg(feature = "hdf5")]
+    &simscape::Simscape,
+    &adams::AdamsInvariants,
+    &npz::Npz,
+    &json::Json,
+    &embedded::Embedded,
+    &Vtk,
+    &Gltf,
+];
+
+/// The format of that name.
+///
+/// # Errors
+/// [`Usage`](Code::Usage), with the names that there are.
+pub fn find_format(name: &str) -> Result<&'static dyn ExportFormat> {
+    FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("`{name}` is no export format");
+        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    })
+}
+
+/// Writes `body` in a format, with a warning for everything that the format cannot hold, and a note for every
+/// setting that its program needs and for what a picture leaves out.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for options that the format does not have, or nodes that the body does not have;
+/// [`ExportLoses`](Code::ExportLoses), one diagnostic per loss, unless `allow_loss`; those of
+/// [`RecordedMotion::staged`](flexbody_file::RecordedMotion::staged) and of [`ExportFormat::write`].
+pub fn export(
+    body: &FlexBody,
+    format: &dyn ExportFormat,
+    options: &ExportOptions,
+    allow_loss: bool,
+) -> Result<(Exported, Vec<Diagnostic>)> {
+    check_options(body, format, options)?;
+    let body = match &options.motion {
+        Some(motion) => Cow::Owned(motion.staged(body)?),
+        None => Cow::Borrowed(body),
+    };
+    let body = body.as_ref();
+    let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
+    let losses: Vec<Diagnostic> = format
+        .losses(body, options)
+        .into_iter()
+        .map(|loss| Diagnostic::new(code, format!("{} cannot hold {loss}", format.name())))
+        .collect();
+    if !(allow_loss || losses.is_empty()) {
+        return Err(Error::new(losses));
+    }
+    let needs = format.needs(body, options).into_iter().map(|need| Diagnostic::new(Code::ExportNeeds, need));
+    let left =
+        format.leaves_out(body, options).into_iter().map(|what| Diagnostic::new(Code::ExportPicture, what));
+    let exported = format.write(body, options)?;
+    Ok((exported, losses.into_iter().chain(needs).chain(left).collect()))
+}
+
+fn check_options(body: &FlexBody, format: &dyn ExportFormat, options: &ExportOptions) -> Result<()> {
+    let refuse =
+        |message: String, help: String| Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    let name = format.name();
+    if let Some(dialect) = &options.dialect
+        && !format.dialects().contains(&dialect.as_str())
+    {
+        let known = format.dialects().join(", ");
+        let help = if known.is_empty() { format!("{name} has no dialects") } else { known };
+        return refuse(format!("`{dialect}` is no dialect of {name}"), help);
+    }
+    if options.points != Points::Usual && !format.has_points() {
+        return refuse(format!("{name} has all nodes or none"), "leave --points out".to_owned());
+    }
+    if (options.modes.is_some() || options.motion.is_some()) && !format.is_picture() {
+        let help = "leave --modes and --simulation out, or take vtk or gltf".to_owned();
+        return refuse(format!("{name} has all modes of the body, and no motion"), help);
+    }
+    if let Some(modes) = options.modes.filter(|modes| *modes > body.n_modes()) {
+        let help = format!("--modes {} at the most", body.n_modes());
+        return refuse(format!("the body has {} modes, not {modes}", body.n_modes()), help);
+    }
+    if options.points.of_interfaces() && body.interfaces().is_empty() {
+        return refuse("the body has no interfaces".to_owned(), "--points nodes, or node numbers".to_owned());
+    }
+    if let Some(id) = options.points.named().iter().find(|&id| !body.nodes().ids.contains(id)) {
+        let help = "flexbody inspect names the nodes".to_owned();
+        return refuse(format!("the body has no node {id}"), help);
+    }
+    Ok(())
+}
+
+/// Every format, in the order in which files are recognised.
+pub const IMPORT_FORMATS: &[&dyn ImportFormat] = &[
+    &sid::import::SidFile,
+    &mbdyn::import::Mbdyn,
+    #[cfg(feature = "hdf5")]
+    &mbsim::read::Mbsim,
+    #[cfg(feature = "hdf5")]
+    &exudyn::read::Exudyn,
+];
+
+/// The format of that name.
+///
+/// # Errors
+/// [`Usage`](Code::Usage), with the names that there are.
+pub fn find_import_format(name: &str) -> Result<&'static dyn ImportFormat> {
+    IMPORT_FORMATS.iter().copied().find(|format| format.name() == name).ok_or_else(|| {
+        let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("`{name}` is no format that is read");
+        Diagnostic::new(Code::Usage, message).with_help(names.join(", ")).into()
+    })
+}
+
+/// The format of a file.
+///
+/// # Errors
+/// [`ForeignUnreadable`](Code::ForeignUnreadable) when it is none of them.
+pub fn recognise(file: &InputFile) -> Result<&'static dyn ImportFormat> {
+    IMPORT_FORMATS.iter().copied().find(|format| format.recognises(file)).ok_or_else(|| {
+        let names: Vec<&str> = IMPORT_FORMATS.iter().map(|format| format.name()).collect();
+        let message = format!("the file is of no format that is read: {}", names.join(", "));
+        Diagnostic::new(Code::ForeignUnreadable, message).in_file(file.path()).into()
+    })
+}

@@ -1,0 +1,91 @@
+//! Frequencies in the texts of the modes, beside those of the matrices.
+
+use crate::import::AuditCheck;
+use crate::sid::read::arrays::Arrays;
+use crate::sid::read::parse::Listed;
+use flexbody_base::diagnostic::Code;
+use std::f64::consts::TAU;
+
+/// Frequencies in texts are often those of the model before its reduction.
+const FREQUENCY: f64 = 0.01;
+
+/// Entries of Ke beside the diagonal, relative to it, with which the diagonal still gives frequencies.
+const DIAGONAL: f64 = 1e-6;
+
+/// The frequency of a text such as `Eigen Mode 1 : 9.089 Hz` in the unit of the text, half a unit of its last
+/// digit, and whether it is in radians.
+fn frequency_of(text: &str) -> Option<(f64, f64, bool)> {
+    let words: Vec<&str> =
+        text.split([' ', '\t', ':', '=', ',', ';']).filter(|word| !word.is_empty()).collect();
+    let unit = |word: &str| {
+        let word = word.to_lowercase();
+        if word == "rad/s" { Some(true) } else { (word == "hz" || word.starts_with("1/")).then_some(false) }
+    };
+    words.windows(2).find_map(|pair| {
+        let radians = unit(pair[1])?;
+        let value: f64 = pair[0].replace(['D', 'd'], "e").parse().ok().filter(|v: &f64| v.is_finite())?;
+        let (mantissa, exponent) = pair[0].split_once(['e', 'E', 'd', 'D']).unwrap_or((pair[0], "0"));
+        let decimals = mantissa.split_once('.').map_or(0, |(_, decimals)| decimals.len()) as f64;
+        let exponent: f64 = exponent.parse().unwrap_or(0.0);
+        Some((value, 0.5 * 10f64.powf(exponent - decimals), radians))
+    })
+}
+
+/// The text that is farthest off; `None` where no mode has a frequency in its text, or modes are coupled by
+/// Ke.
+pub(crate) fn frequencies(listed: &Listed<'_>, arrays: &Arrays) -> Option<AuditCheck> {
+    let (ke, me, nq) = (&arrays.ke.m0, &arrays.me.m0, arrays.nq);
+    let coupled = (0..nq).any(|i| {
+        (0..nq).any(|j| i != j && ke[(i, j)].abs() > DIAGONAL * (ke[(i, i)] * ke[(j, j)]).abs().sqrt())
+    });
+    if coupled {
+        return None;
+    }
+    // Mode, what the text says beside what the matrices say, and by how much more than its digits it differs.
+    let compared = |&(mode, text): &(usize, &str)| {
+        let (said, half, radians) = frequency_of(text)?;
+        let lambda = (mode < nq).then(|| ke[(mode, mode)] / me[(mode, mode)])?;
+        let own = lambda.sqrt() / if radians { 1.0 } else { TAU };
+        let apart = ((said - own).abs() - half).max(0.0) / own;
+        Some((mode, said / own, if lambda > 0.0 { apart } else { f64::NAN }))
+    };
+    let all: Vec<(usize, f64, f64)> = listed.mode_texts.iter().filter_map(compared).collect();
+    let &(mode, ratio, value) = all.iter().max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let known = [
+        (TAU, "2 pi, as of radians per second"),
+        (1.0 / TAU, "1 / (2 pi), as of radians per second"),
+        (1000.0, "1000, as of milliseconds beside seconds"),
+        (0.001, "1/1000, as of milliseconds beside seconds"),
+        (1000f64.sqrt(), "sqrt(1000), as of a mass or length in a unit a thousand times another"),
+        (0.001f64.sqrt(), "1/sqrt(1000), as of a mass or length in a unit a thousand times another"),
+        (60.0, "60, as of revolutions per minute"),
+    ];
+    let factor = known.iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < FREQUENCY);
+    let factor = factor.map_or_else(|| format!("{ratio:.4}"), |(_, words)| (*words).to_owned());
+    Some(AuditCheck {
+        name: "frequencies",
+        formula: "frequency of the text of each mode = sqrt(Ke/Me) / (2 pi)",
+        value,
+        limit: FREQUENCY,
+        code: Code::AuditUnits,
+        meaning: format!(
+            "the text of mode {} has another frequency than stiffness and mass, by the factor {factor}",
+            mode + 1
+        ),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_of_texts() {
+        let (value, half, radians) = frequency_of("Eigen Mode    1 :        9.089 Hz").expect("a frequency");
+        assert!(value == 9.089 && (half - 5e-4).abs() < 1e-16 && !radians);
+        let (value, half, _) = frequency_of("Eigen Mode 3 : 1.25e-3 1/ms").expect("a frequency");
+        assert!(value == 1.25e-3 && (half - 5e-6).abs() < 1e-18);
+        assert_eq!(frequency_of("7 rad/s").map(|f| (f.0, f.2)), Some((7.0, true)));
+        assert_eq!(frequency_of("MatMorembs ansatz function #1"), None);
+    }
+}

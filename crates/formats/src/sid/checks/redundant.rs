@@ -1,0 +1,335 @@
+//! What the redundant arrays of the body must fulfil.
+
+use super::digits::digits;
+use super::frames::frame_checks;
+use super::frequencies::frequencies;
+use super::missed::{Missed, largest_entry};
+use super::missing::{Missing, is_free};
+use crate::import::AuditCheck;
+use crate::sid::read::arrays::{Array, Arrays, FrameArrays, PAIRS, largest};
+use crate::sid::read::body::Declared;
+use crate::sid::read::layout::{Blocks, Layout};
+use crate::sid::read::parse::Listed;
+use flexbody_base::diagnostic::Code;
+use flexbody_linalg::larger;
+
+/// The checks of a file, and what they say of its Oe1.
+pub(crate) struct Found {
+    pub(crate) checks: Vec<AuditCheck>,
+    /// Whether Oe1 holds more than Me does: geometric stiffness for spin, or inertia that does not belong to
+    /// Me.
+    pub(crate) spin_in_oe: bool,
+}
+
+/// Holds the arrays of a file to each other. The checks stand in the order of a report.
+pub(crate) fn checks(
+    listed: &Listed<'_>,
+    arrays: &Arrays,
+    frames: &[FrameArrays],
+    layout: &Layout,
+    declared: &Declared,
+) -> Found {
+    let missing = Missing::find(arrays, layout, declared);
+    let mut all = vec![digits(listed, arrays, frames), missing.check()];
+    let identities = Identities { arrays, layout, declared, missing };
+    let centrifugal = identities.linear_centrifugal();
+    all.extend(identities.first_moment());
+    all.extend(identities.gyroscopic_symmetric());
+    all.extend(identities.coriolis());
+    all.extend(identities.layouts());
+    all.extend(identities.constant_centrifugal());
+    all.extend(centrifugal.checks);
+    all.extend(identities.gyroscopic_skew(centrifugal.two_masses));
+    all.extend(identities.acceleration_stiffness());
+    all.push(identities.damping());
+    all.extend(frame_checks(listed, frames));
+    all.extend(frequencies(listed, arrays));
+    Found { checks: all, spin_in_oe: centrifugal.spin_in_oe }
+}
+
+/// The arrays of the body, how they are to be read, and which of them are not there: identities of those are
+/// left out.
+struct Identities<'a> {
+    arrays: &'a Arrays,
+    layout: &'a Layout,
+    declared: &'a Declared,
+    missing: Missing,
+}
+
+/// The checks of Oe1, and what they say of the masses behind the arrays.
+struct LinearCentrifugal {
+    checks: Vec<AuditCheck>,
+    /// Whether Oe1 belongs to another mass than Me, where it should not.
+    two_masses: bool,
+    spin_in_oe: bool,
+}
+
+impl Identities<'_> {
+    /// mdCM1 against Ct0.
+    fn first_moment(&self) -> Option<AuditCheck> {
+        if !self.missing.none_of(&["mdCM1", "Ct"]) {
+            return None;
+        }
+        let (moment, ct) = (&self.arrays.first_moment, &self.arrays.ct);
+        let [bound, ..] = self.arrays.bounds();
+        let missed = Missed {
+            by: largest_entry(self.arrays.nq, 3, |k, a| moment.linear(k, a, 0) - ct.m0[(k, a)]),
+            scale: scale(bound, &[moment.sizes()[1], ct.sizes()[0]]),
+            rounding: moment.rounding[1] + ct.rounding[0],
+        };
+        Some(missed.check(
+            "mdcm1_is_ct0",
+            "mdCM1_k = Ct0_k",
+            Code::AuditIdentity,
+            "the first moment moves with the modes in another way than the modes couple to translation",
+        ))
+    }
+
+    /// The symmetric part of Gr against J1.
+    fn gyroscopic_symmetric(&self) -> Option<AuditCheck> {
+        if !self.missing.none_of(&["Gr", "J1"]) {
+            return None;
+        }
+        let (gr, inertia) = (&self.arrays.gr, &self.arrays.inertia);
+        let [_, bound, _] = self.arrays.bounds();
+        let [even, _] = self.layout.gr.gr_misfit(self.arrays);
+        let missed = Missed {
+            by: even,
+            scale: scale(bound, &[gr.sizes()[0], inertia.sizes()[1]]),
+            rounding: gr.rounding[0] + inertia.rounding[1],
+        };
+        Some(missed.check(
+            "gr_symmetric_is_j1",
+            "sym(Gr_k) = J1_k",
+            Code::AuditIdentity,
+            "the gyroscopic torque does not belong to the inertia that changes with the modes",
+        ))
+    }
+
+    /// The skew part of Gr against Cr0. Where Oe1 does not belong to Me either, the two come from two masses.
+    fn gyroscopic_skew(&self, two_masses: bool) -> Option<AuditCheck> {
+        if !self.missing.none_of(&["Gr", "Cr0"]) {
+            return None;
+        }
+        let (gr, cr) = (&self.arrays.gr, &self.arrays.cr);
+        let (code, meaning) = if two_masses {
+            (
+                Code::AuditLumped,
+                "the gyroscopic torque and the coupling of rotation and modes come from different masses",
+            )
+        } else if is_free(self.arrays, self.layout) {
+            (
+                Code::AuditIdentity,
+                "Cr0, Ct and mdCM1 are zero as of free modes, but Gr has a skew part: Gr is wrong, or all of the three are missing",
+            )
+        } else {
+            (
+                Code::AuditIdentity,
+                "the gyroscopic torque does not belong to the coupling of rotation and modes",
+            )
+        };
+        let [_, bound, _] = self.arrays.bounds();
+        let [_, odd] = self.layout.gr.gr_misfit(self.arrays);
+        let missed = Missed {
+            by: odd,
+            scale: scale(bound, &[gr.sizes()[0], cr.sizes()[0]]),
+            rounding: gr.rounding[0] + cr.rounding[0],
+        };
+        Some(missed.check("gr_skew_is_cr0", "skew(Gr_k) = -(Cr0_k)~", code, meaning))
+    }
+
+    /// Ge against Cr1.
+    fn coriolis(&self) -> Option<AuditCheck> {
+        if !self.missing.none_of(&["Ge", "Cr1"]) {
+            return None;
+        }
+        let doubled = self.missed_of_ge(self.layout.ge.ge_doubled(self.arrays)).passes();
+        Some(self.missed_of_ge(self.layout.ge.ge_misfit(self.arrays)).check(
+            "ge_is_twice_cr1",
+            "Ge(k,l) = Cr1(k,l) - Cr1(l,k), which is 2 Cr1 of a solid",
+            Code::AuditIdentity,
+            if doubled {
+                "Ge is 2 Cr1 with its part that is symmetric in the modes, as FEMBS writes it: geometric stiffness for angular acceleration, which is in Cr1, is no Coriolis force"
+            } else {
+                "the Coriolis forces among modes do not belong to the coupling of rotation and modes that grows with q"
+            },
+        ))
+    }
+
+    fn missed_of_ge(&self, by: f64) -> Missed {
+        let (ge, cr) = (&self.arrays.ge, &self.arrays.cr);
+        let [.., bound] = self.arrays.bounds();
+        Missed {
+            by,
+            scale: scale(bound, &[ge.sizes()[0], cr.sizes()[1]]),
+            rounding: ge.rounding[0] + 2.0 * cr.rounding[1],
+        }
+    }
+
+    /// Gr and Ge in the order that the dialect has.
+    fn layouts(&self) -> Vec<AuditCheck> {
+        let (arrays, own) = (self.arrays, self.layout);
+        let (why, gr, ge) = match own.declared {
+            Some((name, gr, ge)) => (format!("the dialect is {name}"), gr, ge),
+            // No dialect has Gr by components and Ge by modes; with every other order there is one.
+            None if own.gr == Blocks::Component => ("Gr is component-blocked".to_owned(), own.gr, own.gr),
+            None => return Vec::new(),
+        };
+        let meaning = |array: &str, expected: Blocks, found: Blocks| {
+            format!("{why}, which has {array} {}, but the numbers are {}", expected.words(), found.words())
+        };
+        let [_, bound, _] = arrays.bounds();
+        let [even, odd] = gr.gr_misfit(arrays);
+        // Where neither order fits, that is another finding.
+        let gr_by = if gr == own.gr { 0.0 } else { even.max(odd) };
+        let ge_by = if ge == own.ge { 0.0 } else { ge.ge_misfit(arrays) };
+        let gr_scale = scale(bound, &[arrays.gr.sizes()[0]]);
+        vec![
+            Missed { by: gr_by, scale: gr_scale, rounding: arrays.gr.rounding[0] }.check(
+                "gr_layout",
+                "Gr in the order of columns of the dialect gives J1 and Cr0",
+                Code::AuditLayout,
+                meaning("Gr", gr, own.gr),
+            ),
+            self.missed_of_ge(ge_by).check(
+                "ge_layout",
+                "Ge in the order of columns of the dialect gives Cr1",
+                Code::AuditLayout,
+                meaning("Ge", ge, own.ge),
+            ),
+        ]
+    }
+
+    /// Oe0 against J1, and whether its last two columns are exchanged.
+    fn constant_centrifugal(&self) -> Vec<AuditCheck> {
+        if !self.missing.none_of(&["Oe0", "J1"]) {
+            return Vec::new();
+        }
+        let (oe, inertia) = (&self.arrays.oe, &self.arrays.inertia);
+        let [_, bound, _] = self.arrays.bounds();
+        let scale = scale(bound, &[oe.sizes()[0], inertia.sizes()[1]]);
+        let (own, other) = (self.oe0_misfit(false), self.oe0_misfit(true));
+        let rounding = oe.rounding[0] + inertia.rounding[1];
+        let missed = |by: f64| Missed { by, scale, rounding };
+        let exchanged = other < 0.1 * own && missed(other).passes();
+        let identity = missed(if exchanged { other } else { own }).check(
+            "oe0_is_j1",
+            "Oe0(k) = -[J1_11/2, J1_22/2, J1_33/2, J1_12, J1_23, J1_13]_k",
+            Code::AuditIdentity,
+            "the constant centrifugal load does not belong to the inertia that changes with the modes",
+        );
+        let order = missed(if exchanged { own } else { 0.0 }).check(
+            "oe_layout",
+            "Oe has its columns in the order 11, 22, 33, 12, 23, 13",
+            Code::AuditLayout,
+            "the last two columns of Oe are exchanged",
+        );
+        vec![identity, order]
+    }
+
+    /// max |Oe0 - what J1 makes it|, with the last two columns `exchanged` or as they are.
+    fn oe0_misfit(&self, exchanged: bool) -> f64 {
+        largest_entry(self.arrays.nq, 6, |k, column| {
+            let (a, b) = PAIRS[if exchanged && column > 3 { 9 - column } else { column }];
+            let part = if a == b { 0.5 } else { 1.0 };
+            self.arrays.oe.m0[(k, column)] + part * self.arrays.j1(k)[(a, b)]
+        })
+    }
+
+    /// Oe1: that it is symmetric, and against Me.
+    fn linear_centrifugal(&self) -> LinearCentrifugal {
+        let stiffened = self.declared.stiffened == Some(true);
+        let mut found = LinearCentrifugal { checks: Vec::new(), two_masses: false, spin_in_oe: stiffened };
+        if !self.missing.none_of(&["Oe1"]) {
+            return found;
+        }
+        let size = self.arrays.oe.sizes()[1];
+        let [.., bound] = self.arrays.bounds();
+        let scale = scale(bound, &[size]);
+        found.checks.push(symmetric_in_modes(
+            &self.arrays.oe,
+            scale,
+            "oe1_symmetric",
+            "Oe1(k,l) = Oe1(l,k)",
+            "centrifugal forces that grow with q are no gradient of an energy",
+        ));
+        if size > 0.0 {
+            let trace = trace(self.arrays, scale);
+            let general = self.declared.general;
+            found.spin_in_oe |= !(trace.passed() || general);
+            // Where the file says that there is more in Oe1, nothing has to fit.
+            if !(stiffened || general) {
+                found.two_masses = !trace.passed();
+                found.checks.push(trace);
+            }
+        }
+        found
+    }
+
+    /// Ct1, where there is such.
+    fn acceleration_stiffness(&self) -> Option<AuditCheck> {
+        let ct = &self.arrays.ct;
+        ct.m1.as_ref()?;
+        Some(symmetric_in_modes(
+            ct,
+            ct.sizes()[1],
+            "ct1_symmetric",
+            "Ct1(k,l) = Ct1(l,k)",
+            "the geometric stiffness for acceleration is no symmetric matrix",
+        ))
+    }
+
+    fn damping(&self) -> AuditCheck {
+        let (de, nq) = (&self.arrays.de.m0, self.arrays.nq);
+        let missed = Missed {
+            by: largest_entry(nq, nq, |i, j| de[(i, j)] - de[(j, i)]),
+            scale: largest(de),
+            rounding: 2.0 * self.arrays.de.rounding[0],
+        };
+        let meaning = "the damping matrix is not symmetric";
+        missed.check("de_symmetric", "De = De'", Code::AuditIdentity, meaning)
+    }
+}
+
+/// The size of what an identity compares: the bound that the mass sets, or what stands in the file where that
+/// is larger.
+fn scale(bound: f64, sizes: &[f64]) -> f64 {
+    sizes.iter().fold(bound.max(0.0), |most, size| most.max(*size))
+}
+
+/// M1 symmetric in its row and its mode.
+fn symmetric_in_modes(
+    array: &Array,
+    scale: f64,
+    name: &'static str,
+    formula: &'static str,
+    meaning: &'static str,
+) -> AuditCheck {
+    let nq = array.m0.nrows();
+    let missed_in_column =
+        |c: usize| largest_entry(nq, nq, |k, l| array.linear(l, k, c) - array.linear(k, l, c));
+    let by = (0..array.m0.ncols()).map(missed_in_column).fold(0.0, larger);
+    Missed { by, scale, rounding: 2.0 * array.rounding[1] }.check(name, formula, Code::AuditIdentity, meaning)
+}
+
+/// Oe1 against Me.
+fn trace(arrays: &Arrays, scale: f64) -> AuditCheck {
+    let nq = arrays.nq;
+    let sum = |k: usize, l: usize| (0..3).map(|c| arrays.oe.linear(l, k, c)).sum::<f64>();
+    let by = largest_entry(nq, nq, |k, l| sum(k, l) + 2.0 * arrays.me.m0[(k, l)]);
+    let ratio = |k: usize| -0.5 * sum(k, k) / arrays.me.m0[(k, k)];
+    let worst_mode = (0..nq).max_by(|&a, &b| (ratio(a) - 1.0).abs().total_cmp(&(ratio(b) - 1.0).abs()));
+    let facts = worst_mode.map_or_else(String::new, |k| {
+        format!(": of mode {} Oe1 has {:.4} of the modal mass", k + 1, ratio(k))
+    });
+    let rounding = 3.0 * arrays.oe.rounding[1] + 2.0 * arrays.me.rounding[0];
+    Missed { by, scale, rounding }.check(
+        "oe1_is_me",
+        "Oe1_11 + Oe1_22 + Oe1_33 = -2 Me",
+        Code::AuditLumped,
+        format!(
+            "centrifugal forces and modal mass come from different masses{facts}; lumped masses do that, rotational inertia of \
+             nodes that is left out, or geometric stiffness that the file does not declare"
+        ),
+    )
+}

@@ -1,0 +1,83 @@
+//! The lines of a file: keywords and assignments.
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use std::path::Path;
+
+/// One line that is not blank.
+pub(crate) struct Line<'t> {
+    /// Number from 1.
+    pub(crate) number: usize,
+    /// The line without blanks around.
+    pub(crate) text: &'t str,
+    /// What stands before the first `=`: lower case, words one blank apart.
+    pub(crate) key: String,
+    /// What stands after it, without blanks around.
+    pub(crate) value: Option<&'t str>,
+}
+
+/// The lines of a file one after the other.
+pub(crate) struct Lines<'t> {
+    path: &'t Path,
+    lines: std::iter::Enumerate<std::str::Lines<'t>>,
+    /// Number of the last line that was given.
+    last: usize,
+}
+
+impl<'t> Lines<'t> {
+    pub(crate) fn new(path: &'t Path, text: &'t str) -> Self {
+        Self { path, lines: text.lines().enumerate(), last: 0 }
+    }
+
+    /// FB730 at a line.
+    pub(crate) fn unreadable(&self, line: usize, message: impl Into<String>) -> Diagnostic {
+        Diagnostic::new(Code::ForeignUnreadable, message).in_file(self.path).at_line(line)
+    }
+
+    /// The next line; it is an error when the file ends inside of `inside`.
+    pub(crate) fn next(&mut self, inside: &str) -> Result<Line<'t>, Diagnostic> {
+        for (at, text) in self.lines.by_ref() {
+            if text.trim().is_empty() {
+                continue;
+            }
+            self.last = at + 1;
+            let (key, value) = match text.split_once('=') {
+                Some((key, value)) => (key, Some(value.trim())),
+                None => (text, None),
+            };
+            let words: Vec<&str> = key.split_whitespace().collect();
+            let key = words.join(" ").to_lowercase();
+            return Ok(Line { number: at + 1, text: text.trim(), key, value });
+        }
+        Err(self.unreadable(self.last.max(1), format!("the file ends inside of `{inside}`")))
+    }
+
+    /// The last line but blanks must be the end: what follows is told.
+    pub(crate) fn finish(mut self) -> Result<(), Diagnostic> {
+        match self.next("") {
+            Ok(line) => Err(self.unreadable(line.number, "text after `end part`")),
+            Err(_) => Ok(()),
+        }
+    }
+
+    /// A whole number that is not negative.
+    pub(crate) fn count(&self, line: &Line<'_>) -> Result<usize, Diagnostic> {
+        let value = line.value.unwrap_or("");
+        value.parse().map_err(|_| {
+            self.unreadable(line.number, format!("`{}` is `{value}`, expected a whole number", line.key))
+        })
+    }
+
+    /// A finite number with an exponent of either letter, and its text.
+    pub(crate) fn number(&self, line: &Line<'t>) -> Result<(f64, &'t str), Diagnostic> {
+        let value = line.value.unwrap_or("");
+        let wrong = || {
+            let message = format!("`{}` is `{value}`, expected a finite number", line.key);
+            self.unreadable(line.number, message)
+        };
+        if !value.bytes().all(|b| b.is_ascii_digit() || b"+-.eEdD".contains(&b)) {
+            return Err(wrong());
+        }
+        let number: f64 = value.replace(['D', 'd'], "e").parse().map_err(|_| wrong())?;
+        if number.is_finite() { Ok((number, value)) } else { Err(wrong()) }
+    }
+}

@@ -1,0 +1,214 @@
+//! SID_FEM as an export format: the file around its arrays, and what it cannot hold.
+
+use super::arrays::{StiffenedFrame, modal, places};
+use super::dialect::{DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES};
+use super::text::Text;
+use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, plane};
+use crate::export::{ExportFormat, ExportOptions, Exported};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::{FlexBody, Group};
+use flexbody_body::invariants::CauchySchwarz;
+use flexbody_model::{LoadKind, UnitLoad};
+
+/// SID_FEM text (Wallrapp, Standard Input Data of flexible members in multibody systems, 1993). The equations
+/// of SID have the inertia of a body to first order in q; the file has every number of the exact ones.
+pub(crate) struct Sid;
+
+impl ExportFormat for Sid {
+    fn name(&self) -> &'static str {
+        "sid"
+    }
+
+    fn reader(&self) -> &'static str {
+        "Simpack, Neweul-M2, EMBSlib (Modelica), matflex, FEMBeam"
+    }
+
+    fn dialects(&self) -> &'static [&'static str] {
+        &NAMES
+    }
+
+    fn has_points(&self) -> bool {
+        true
+    }
+
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        let places = places(body, &options.points);
+        let embs = *chosen(options) == EMBS;
+        let holds = |load: &UnitLoad| match &load.kind {
+            LoadKind::Acceleration | LoadKind::AngularAcceleration | LoadKind::Spin => true,
+            LoadKind::Named(_) => false,
+            kind => !embs && places.iter().any(|place| place.holds(kind)),
+        };
+        let coriolis = if embs { coriolis_of_frame(body) } else { None };
+        [plane(body), general_w0(body), coriolis, geometric_stiffness(body, holds), internal_rows(body)]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+
+    fn needs(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        let (dialect, places) = (chosen(options), places(body, &options.points));
+        let mut needs = Vec::new();
+        if are_counted(&places, dialect) {
+            needs.push(
+                "frames have the numbers of the rows of the table beside the file, not of nodes".to_owned(),
+            );
+        }
+        if *dialect == EMBS {
+            let (frames, modes) = (places.len(), body.n_modes());
+            needs.push(format!("EMBS_Body takes numNodes = {frames} and numModes = {modes}"));
+            needs.push(
+                "EMBS_Body needs a frame_ref whose origin is at rest: it counts omega x v of a moving one twice"
+                    .to_owned(),
+            );
+        }
+        needs
+    }
+
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        let dialect = chosen(options);
+        let places = places(body, &options.points);
+        let columns = 3 * body.n_modes();
+        if let Some(Limits { count, .. }) = dialect.limits
+            && places.len().max(columns) > count
+        {
+            let message = format!(
+                "sid cannot hold {} frames and {columns} columns of Gr in dialect {}: its reader takes {count} of each",
+                places.len(),
+                dialect.name
+            );
+            let help = "choose the frames that joints need with --points";
+            return Err(Diagnostic::new(Code::ExportLoses, message).with_help(help).into());
+        }
+        let mut exported = Exported::single(file(body, &places, dialect).into_bytes());
+        if are_counted(&places, dialect) {
+            exported.beside.push(("frames.csv".into(), frame_table(&places).into_bytes()));
+        }
+        Ok(exported)
+    }
+}
+
+/// Returns the dialect of an export. Names that are none are refused before.
+fn chosen(options: &ExportOptions) -> &'static Dialect {
+    let name = options.dialect.as_deref().unwrap_or(DIALECTS[0].name);
+    DIALECTS.iter().find(|dialect| dialect.name == name).unwrap_or(&DIALECTS[0])
+}
+
+/// The Coriolis force on the frame of modes that move the centre of mass, which EMBSlib leaves out.
+fn coriolis_of_frame(body: &FlexBody) -> Option<String> {
+    /// Share of a bound that is rounding.
+    const ROUNDING: f64 = 1e-9;
+    let bound = CauchySchwarz::of(body.invariants());
+    let c1 = body.invariants().c1();
+    let of_mode = |k: usize| (0..3).map(|a| c1[(a, k)].abs()).fold(0.0, f64::max) / bound.c1(k);
+    let share = (0..body.n_modes()).map(of_mode).fold(0.0, f64::max);
+    (share > ROUNDING).then(|| {
+        format!(
+            "the Coriolis force 2 omega x C1 qd on the frame: C1 is up to {share:.1e} of its Cauchy-Schwarz \
+             bound, EMBSlib leaves the force out"
+        )
+    })
+}
+
+/// True if frames have the numbers 1, 2, ... in place of those of nodes and reference points.
+fn are_counted(places: &[StiffenedFrame], dialect: &Dialect) -> bool {
+    let beyond = |largest: i64| places.iter().any(|place| !(1..=largest).contains(&place.frame.id));
+    dialect.largest_frame.is_some_and(beyond)
+}
+
+/// Returns the table of the frames: number in the file, number of the node, name of the interface, place.
+fn frame_table(places: &[StiffenedFrame]) -> String {
+    let row = |(i, place): (usize, &StiffenedFrame)| {
+        let [x, y, z] = place.frame.position;
+        let name = place.frame.name.as_deref().unwrap_or("").replace('"', "\"\"");
+        format!("{},{},\"{name}\",{x:e},{y:e},{z:e}\n", i + 1, place.frame.id)
+    };
+    let rows = places.iter().enumerate().map(row);
+    std::iter::once("frame,node,interface,x,y,z\n".to_owned()).chain(rows).collect()
+}
+
+fn file(body: &FlexBody, places: &[StiffenedFrame], dialect: &Dialect) -> String {
+    let nf = body.n_modes();
+    let mut text = Text::new(dialect, nf);
+    let mut head = format!("{:5}{nf:5}    :No. nodes, No. modes:{}", places.len(), comment(body, dialect));
+    if let Some(Limits { first_line, .. }) = dialect.limits {
+        // With the end of the line it fills the buffer of the reader.
+        let whole = |end: &usize| head.is_char_boundary(*end);
+        head.truncate((0..first_line.min(head.len() + 1)).rev().find(whole).unwrap_or(0));
+    }
+    text.line(0, &head);
+    text.line(1, "part");
+    match dialect.modal_name {
+        ModalName::Absent => text.line(6, "new modal"),
+        ModalName::OfBody => text.value(6, "new modal", word(&body.source().name)),
+        ModalName::Fixed(name) => text.value(6, "new modal", name),
+    }
+    refmod(body, &mut text);
+    text.line(11, "frame");
+    let counted = are_counted(places, dialect);
+    for (place, number) in places.iter().zip(1i64..) {
+        let number = if counted { number } else { place.frame.id };
+        text.value(16, "new node", format_args!("{number:6}"));
+        text.value(21, "rframe", "body ref");
+        place.objects().iter().for_each(|object| text.taylor(21, object));
+        text.line(16, "end node");
+    }
+    text.line(11, "end frame");
+    modal(body, dialect).iter().for_each(|object| text.taylor(11, object));
+    text.line(6, "end modal");
+    text.line(1, "end part");
+    text.out
+}
+
+/// A name as one word without a sign of equality, which readers take for the end of a key; none of a body
+/// without a name.
+fn word(name: &str) -> String {
+    let words = name.split(|c: char| c.is_whitespace() || c.is_control() || c == '=');
+    words.filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
+}
+
+/// What the rest of the file does not tell: dialect, units, what Oe1 holds beside W2, name.
+fn comment(body: &FlexBody, dialect: &Dialect) -> String {
+    let mut facts =
+        vec![concat!("flexbody ", env!("CARGO_PKG_VERSION")).to_owned(), format!("dialect {}", dialect.name)];
+    let units = body.units();
+    if units.stated {
+        let [length, mass, time] = [&units.length, &units.mass, &units.time].map(|unit| unit.name());
+        facts.push(format!("units {length} {mass} {time}"));
+    }
+    for kind in [LoadKind::Spin, LoadKind::AngularAcceleration] {
+        if body.stiffening_loads().iter().any(|load| load.kind == kind) {
+            facts.push(format!("geometric stiffness for {}", kind.name().replace('_', " ")));
+        }
+    }
+    if body.invariants().general().is_some() {
+        facts.push("general mass".to_owned());
+    }
+    let groups = body.groups();
+    let without: Vec<&str> = Group::ALL.iter().filter(|g| !groups.has(**g)).map(|g| g.name()).collect();
+    if !without.is_empty() {
+        facts.push(format!("without {}", without.join(" ")));
+    }
+    let name = &body.source().name;
+    if !name.is_empty() {
+        facts.push(format!("body {}", name.replace(char::is_control, " ")));
+    }
+    facts.join(", ")
+}
+
+fn refmod(body: &FlexBody, text: &mut Text<'_>) {
+    let time = &body.units().time;
+    let unit = if time.to_si() == 1.0 { "Hz".to_owned() } else { format!("1/{}", time.name()) };
+    text.line(11, "refmod");
+    let mass = text.number(body.invariants().mass());
+    text.value(16, "mass", mass);
+    text.value(16, "nelastq", format_args!("{:6}", body.n_modes()));
+    for (k, eigenvalue) in body.modes().eigenvalue.iter().enumerate() {
+        let frequency = eigenvalue.sqrt() / std::f64::consts::TAU;
+        let mode = k + 1;
+        let said = format!("Eigen Mode {mode:4} : {frequency:14.8e} {unit}");
+        text.value(16, &format!("ielastq ({mode:4})"), said);
+    }
+    text.line(11, "end refmod");
+}

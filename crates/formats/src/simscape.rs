@@ -1,0 +1,82 @@
+//! Simscape Multibody: what the block Reduced Order Flexible Solid takes, with the names of the example of
+//! its documentation ("Model an Excavator Dipper Arm as a Flexible Body"): `arm = load('body.mat')` gives
+//! `arm.P0`, `arm.K`, `arm.M`, `arm.C`.
+
+use super::export::hdf5_contents::{Hdf5Contents, hdf5_bytes};
+use super::export::interface_matrices::{InterfaceMatrices, matrix_losses};
+use super::export::mat5::{Mat5Value, mat5};
+use super::export::{ExportFormat, ExportOptions, Exported};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+
+/// The format.
+pub(crate) struct Simscape;
+
+const HDF5: &str = "hdf5";
+
+impl ExportFormat for Simscape {
+    fn name(&self) -> &'static str {
+        "simscape"
+    }
+
+    fn reader(&self) -> &'static str {
+        "Simscape Multibody, Reduced Order Flexible Solid"
+    }
+
+    fn dialects(&self) -> &'static [&'static str] {
+        &["mat5", HDF5]
+    }
+
+    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+        matrix_losses(body, options)
+    }
+
+    fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
+        let told = InterfaceMatrices::of(body, "simscape")?;
+        let names: Vec<&str> = told.frames.iter().map(|(name, _)| *name).collect();
+        let (pose, units) = (body.frame(), body.units());
+        let units = [units.length.name(), units.mass.name(), units.time.name()];
+        let small = [
+            ("P0", Mat::from_fn(told.frames.len(), 3, |i, k| told.frames[i].1[k])),
+            ("origin", Mat::from_fn(1, 3, |_, k| pose.origin[k])),
+            ("axes", Mat::from_fn(3, 3, |i, j| pose.axes[(i, j)])),
+        ];
+        let mut matrices = vec![("K", told.stiffness), ("M", told.mass)];
+        matrices.extend(told.damping.as_ref().map(|damping| ("C", damping)));
+        matrices.extend(small.iter().map(|(name, matrix)| (*name, matrix)));
+        if options.dialect.as_deref() == Some(HDF5) {
+            let mut root: Vec<_> =
+                matrices.iter().map(|(name, matrix)| Hdf5Contents::matrix(matrix).named(*name)).collect();
+            for (name, texts) in [("frames", names.as_slice()), ("units", &units)] {
+                let texts = ascii(&serde_json::to_string(texts).expect("strings are valid JSON"));
+                root.push(Hdf5Contents::Text(texts).named(name));
+            }
+            return hdf5_bytes(&root).map(Exported::single);
+        }
+        let mut variables: Vec<(&str, Mat5Value<'_>)> =
+            matrices.iter().map(|(name, matrix)| (*name, Mat5Value::Matrix(matrix))).collect();
+        variables.push(("frames", Mat5Value::Text(names)));
+        variables.push(("units", Mat5Value::Text(units.to_vec())));
+        let too_large = || {
+            let message = "simscape: a matrix has more than 4 GiB, which a MAT-file of version 5 cannot hold";
+            Diagnostic::new(Code::ExportLoses, message).with_help("--dialect hdf5 has no such limit").into()
+        };
+        mat5(&variables).map(Exported::single).ok_or_else(too_large)
+    }
+}
+
+/// JSON in ASCII, which Octave reads: other characters by their numbers.
+fn ascii(json: &str) -> String {
+    let mut out = String::with_capacity(json.len());
+    for c in json.chars() {
+        if c.is_ascii() {
+            out.push(c);
+        } else {
+            let mut units = [0; 2];
+            out.extend(c.encode_utf16(&mut units).iter().map(|unit| format!("\\u{unit:04x}")));
+        }
+    }
+    out
+}

@@ -1,0 +1,167 @@
+//! A mesh of VTK in XML: tags in front, numbers behind them as they lie in memory.
+//! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
+
+use crate::picture::{Drawn, printable};
+use std::collections::HashSet;
+use std::fmt::Write;
+
+/// Numbers of the kinds of cells.
+const VERTEX: u8 = 1;
+const LINE: u8 = 3;
+const TRIANGLE: u8 = 5;
+
+/// An unstructured grid that grows array by array.
+#[derive(Clone)]
+pub(super) struct Grid {
+    points: usize,
+    cells: usize,
+    /// Tags of the arrays that belong to the whole, to the points, and to the cells.
+    field: String,
+    point_data: String,
+    cell_tags: String,
+    /// Name of the first array of vectors.
+    vectors: Option<String>,
+    /// Names that were given to arrays at the points.
+    taken: HashSet<String>,
+    data: Appended,
+}
+
+/// Numbers that tags refer to: each array behind its length in bytes.
+#[derive(Clone, Default)]
+struct Appended(Vec<u8>);
+
+impl Grid {
+    /// Points with their numbers, the cells between them, and marks of the interfaces.
+    pub(super) fn new(drawn: &Drawn<'_>) -> Self {
+        let empty = String::new();
+        let mut grid = Self {
+            points: drawn.len(),
+            cells: 0,
+            field: empty.clone(),
+            point_data: empty.clone(),
+            cell_tags: empty,
+            vectors: None,
+            taken: HashSet::new(),
+            data: Appended::default(),
+        };
+        grid.put_cells(drawn);
+        let numbers = drawn.numbers();
+        grid.point_data += &grid.data.array("node", "Int64", 1, numbers.iter().map(|id| id.to_le_bytes()));
+        grid.taken.insert("node".to_owned());
+        for (name, marks) in drawn.interfaces() {
+            grid.put_marks(&format!("interface {name}"), &marks);
+        }
+        if let Some(marks) = drawn.references() {
+            grid.put_marks("reference point", &marks);
+        }
+        grid
+    }
+
+    /// Numbers of the body as a whole.
+    pub(super) fn put_field(&mut self, name: &str, values: &[f64]) {
+        let tag = self.data.array(name, "Float64", 1, values.iter().map(|value| value.to_le_bytes()));
+        let tuples = format!(" NumberOfTuples=\"{}\"/>", values.len());
+        self.field += &tag.replace("/>", &tuples);
+    }
+
+    /// A vector at every point.
+    pub(super) fn put_vectors(&mut self, name: &str, vectors: &[[f64; 3]]) {
+        let name = self.own_name(name);
+        self.point_data += &self.data.vectors(&name, vectors);
+        self.vectors.get_or_insert(name);
+    }
+
+    fn put_marks(&mut self, name: &str, marks: &[u8]) {
+        let name = self.own_name(name);
+        self.point_data += &self.data.array(&name, "UInt8", 1, marks.iter().map(|mark| [*mark]));
+    }
+
+    fn put_cells(&mut self, drawn: &Drawn<'_>) {
+        let (triangles, edges, loose) = (drawn.triangles(), drawn.edges(), drawn.loose());
+        let points = triangles.as_flattened().iter().chain(edges.as_flattened()).chain(&loose);
+        let connectivity: Vec<[u8; 8]> = points.map(|point| i64::from(*point).to_le_bytes()).collect();
+        let kinds = [(TRIANGLE, triangles.len(), 3), (LINE, edges.len(), 2), (VERTEX, loose.len(), 1)];
+        let (mut offsets, mut types, mut end) = (Vec::new(), Vec::new(), 0i64);
+        for (kind, count, corners) in kinds {
+            for _ in 0..count {
+                end += corners;
+                offsets.push(end.to_le_bytes());
+                types.push([kind]);
+            }
+        }
+        self.cells = types.len();
+        self.cell_tags = self.data.array("connectivity", "Int64", 1, connectivity.into_iter());
+        self.cell_tags += &self.data.array("offsets", "Int64", 1, offsets.into_iter());
+        self.cell_tags += &self.data.array("types", "UInt8", 1, types.into_iter());
+    }
+
+    /// A name that no other array at the points has: readers keep one array of each name.
+    fn own_name(&mut self, wanted: &str) -> String {
+        let wanted = printable(wanted);
+        let mut name = wanted.clone();
+        let mut number = 1;
+        while !self.taken.insert(name.clone()) {
+            number += 1;
+            name = format!("{wanted} #{number}");
+        }
+        name
+    }
+
+    /// The file, with the points where they are.
+    pub(super) fn file(mut self, positions: &[[f64; 3]]) -> Vec<u8> {
+        let points = self.data.vectors("Points", positions);
+        let vectors = self.vectors.as_deref().map(|name| format!(" Vectors=\"{}\"", escaped(name)));
+        let field = match self.field.as_str() {
+            "" => String::new(),
+            tags => format!("<FieldData>\n{tags}</FieldData>\n"),
+        };
+        let mut head = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+        let written = write!(
+            head,
+            "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n\
+             <UnstructuredGrid>\n{field}<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n\
+             <PointData GlobalIds=\"node\"{}>\n{}</PointData>\n<Points>\n{points}</Points>\n\
+             <Cells>\n{}</Cells>\n</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_",
+            self.points,
+            self.cells,
+            vectors.unwrap_or_default(),
+            self.point_data,
+            self.cell_tags,
+        );
+        written.expect("a text takes what is written to it");
+        let mut file = head.into_bytes();
+        file.append(&mut self.data.0);
+        file.extend(b"\n</AppendedData>\n</VTKFile>\n");
+        file
+    }
+}
+
+impl Appended {
+    fn vectors(&mut self, name: &str, vectors: &[[f64; 3]]) -> String {
+        self.array(name, "Float64", 3, vectors.as_flattened().iter().map(|value| value.to_le_bytes()))
+    }
+
+    /// Appends an array; answers the tag that refers to it.
+    fn array<const N: usize>(
+        &mut self,
+        name: &str,
+        kind: &str,
+        components: usize,
+        values: impl Iterator<Item = [u8; N]>,
+    ) -> String {
+        let offset = self.0.len();
+        self.0.extend([0; 8]);
+        self.0.extend(values.flatten());
+        let length = (self.0.len() - offset - 8) as u64;
+        self.0[offset..offset + 8].copy_from_slice(&length.to_le_bytes());
+        let name = escaped(name);
+        format!(
+            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>\n"
+        )
+    }
+}
+
+/// Text as the value of an attribute.
+pub(super) fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

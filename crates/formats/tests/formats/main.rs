@@ -1,0 +1,11 @@
+//! Files of other programs: exports, imports, round trips.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod export_arrays;
+mod export_embedded;
+mod export_mbs;
+mod export_sid;
+mod import_mbs;
+mod import_sid;
+mod round_trips;

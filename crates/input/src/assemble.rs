@@ -1,0 +1,535 @@
+//! From entries in file order to compressed columns, by counting: each task owns some columns and takes the
+//! entries that belong there in file order, so that the bits are the same for any number of tasks.
+
+use super::digits::significant_digits;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::memory::{left, or_go_without, refuse_beyond};
+use flexbody_linalg::{ColumnBlock, CscMatrix, split_columns};
+use flexbody_model::RawMatrix;
+use rayon::prelude::*;
+use std::ops::Range;
+use std::path::Path;
+
+/// One stored entry, indices from 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Entry {
+    pub row: u32,
+    pub col: u32,
+    pub value: f64,
+}
+
+/// What the entries of a file stand for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Storage {
+    /// All entries of the matrix.
+    Full,
+    /// One triangle of a symmetric matrix: every off-diagonal entry stands for two.
+    Triangle,
+}
+
+/// Whether entries lie below and above the diagonal.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Sides {
+    pub lower: bool,
+    pub upper: bool,
+}
+
+impl Storage {
+    /// Of a file that does not say it: entries on one side alone stand for both.
+    pub(super) fn of(sides: Sides) -> Self {
+        match sides {
+            Sides { lower: true, upper: true } => Self::Full,
+            _ => Self::Triangle,
+        }
+    }
+}
+
+/// Entries that a matrix may have for each of its places: contributions of many elements may be listed one by one. A
+/// larger number lets a compressed file unpack to more; all that was seen has less than 10.
+const ENTRIES_PER_PLACE: u128 = 64;
+
+/// Entries that a matrix of any size may have.
+const ALWAYS_ENTRIES: u64 = 1_000_000;
+
+/// Bytes that an entry takes while a matrix is assembled: as it was read, and in a compressed column.
+const BYTES_PER_ENTRY: f64 = (size_of::<Entry>() + size_of::<u32>() + size_of::<f64>()) as f64;
+
+/// Largest number of entries that a matrix of `n` rows may have.
+pub(super) fn most_entries_of(n: u64) -> u64 {
+    let places = u128::from(n) * u128::from(n);
+    u64::try_from(ENTRIES_PER_PLACE.saturating_mul(places)).unwrap_or(u64::MAX).max(ALWAYS_ENTRIES)
+}
+
+/// Refuses so many entries where they do not fit the memory that is left.
+///
+/// # Errors
+/// FB601.
+pub(super) fn refuse_beyond_memory(entries: u64) -> Result<(), Diagnostic> {
+    let what = format!("a matrix of {entries} entries");
+    let refused = refuse_beyond(left(), entries as f64 * BYTES_PER_ENTRY, &what, "use a larger machine");
+    refused.map_err(|error| error.first_error().clone())
+}
+
+/// Checks a declared size against the number of stored entries, before anything of that size is allocated.
+pub fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnostic> {
+    if rows != cols {
+        return Err(Diagnostic::new(
+            Code::MatrixNotSquare,
+            format!("matrix has {rows} rows and {cols} columns"),
+        ));
+    }
+    if rows > u64::from(u32::MAX) {
+        return Err(Diagnostic::new(Code::MatrixTooLarge, format!("matrix has {rows} rows")));
+    }
+    // Memory goes with the rows; a file must not be able to ask for it without entries to show.
+    if rows > 1_000_000 && rows / 100 > entries {
+        let message = format!("matrix declares {rows} rows but stores only {entries} entries");
+        return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"));
+    }
+    if entries > most_entries_of(rows) {
+        let message = format!("matrix of {rows} rows declares {entries} entries");
+        return Err(Diagnostic::new(Code::MatrixCount, message).with_help("write the matrix again"));
+    }
+    Ok(rows as usize)
+}
+
+/// FB307 for a matrix of which only one triangle is there although its file does not say so.
+pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> String) -> Option<Diagnostic> {
+    let stored = match sides {
+        Sides { lower: true, upper: false } => "lower",
+        Sides { lower: false, upper: true } => "upper",
+        _ => return None,
+    };
+    let message =
+        format!("only the {stored} triangle is stored, in a file that does not declare the matrix symmetric");
+    Some(Diagnostic::new(Code::MatrixAsymmetric, message).with_help(help(stored)))
+}
+
+/// Builds the matrix (both triangles) from `pieces` of entries in file order: zeros dropped, duplicates
+/// summed in file order. `written` is the largest number of digits as written, see [`significant_digits`].
+///
+/// # Errors
+/// FB306 when a sum of duplicates is not finite, FB312 when nothing but zeros is left.
+pub(super) fn assemble(
+    n: usize,
+    pieces: Vec<Vec<Entry>>,
+    storage: Storage,
+    written: u8,
+    path: &Path,
+) -> Result<RawMatrix, Diagnostic> {
+    let digits = digits_of(&pieces, written);
+    finish(n, Counted::of(n, pieces, storage).added_up(), digits, path)
+}
+
+/// [`assemble`] where no entry may be given twice; `twice` tells the first that is, by row and then column.
+/// Of a triangle it is named by its place below the diagonal.
+///
+/// # Errors
+/// What `twice` tells; FB312 when nothing but zeros is left.
+pub(super) fn assemble_distinct(
+    n: usize,
+    pieces: Vec<Vec<Entry>>,
+    storage: Storage,
+    written: u8,
+    path: &Path,
+    twice: impl FnOnce(u32, u32) -> Diagnostic,
+) -> Result<RawMatrix, Diagnostic> {
+    let digits = digits_of(&pieces, written);
+    match Counted::of(n, pieces, storage).distinct(storage) {
+        Ok(matrix) => finish(n, Ok(matrix), digits, path),
+        Err((row, col)) => Err(twice(row, col)),
+    }
+}
+
+/// [`assemble`] for columns that are complete: they become the matrix where they lie.
+///
+/// # Errors
+/// As [`assemble`].
+pub(super) fn assemble_columns(
+    columns: ColumnEntries,
+    written: u8,
+    path: &Path,
+) -> Result<RawMatrix, Diagnostic> {
+    let digits = significant_digits(columns.values.len(), written, |k| columns.values[k]);
+    finish(columns.counts.len() - 1, columns.compress(), digits, path)
+}
+
+/// A matrix that is complete.
+///
+/// # Errors
+/// As [`assemble`].
+#[cfg(feature = "hdf5")]
+pub(super) fn assembled(matrix: CscMatrix, written: u8, path: &Path) -> Result<RawMatrix, Diagnostic> {
+    let digits = significant_digits(matrix.nnz(), written, |k| matrix.values()[k]);
+    finish(matrix.n_cols(), Ok(matrix), digits, path)
+}
+
+fn finish(
+    n: usize,
+    matrix: Result<CscMatrix, (u32, u32)>,
+    digits: u8,
+    path: &Path,
+) -> Result<RawMatrix, Diagnostic> {
+    let matrix = matrix.map_err(|(row, col)| {
+        let message =
+            format!("duplicates of entry ({}, {}) add up to a value that is not finite", row + 1, col + 1);
+        Diagnostic::new(Code::MatrixNotFinite, message).in_file(path)
+    })?;
+    if matrix.nnz() == 0 {
+        let message = format!("all entries of the {n} x {n} matrix are zero or missing");
+        return Err(Diagnostic::new(Code::MatrixEmpty, message).in_file(path));
+    }
+    Ok(RawMatrix { matrix, digits, path: path.to_path_buf() })
+}
+
+fn digits_of(pieces: &[Vec<Entry>], written: u8) -> u8 {
+    let mut starts = Vec::with_capacity(pieces.len());
+    let mut count = 0;
+    for piece in pieces {
+        starts.push(count);
+        count += piece.len();
+    }
+    significant_digits(count, written, |k| {
+        let piece = starts.partition_point(|&start| start <= k) - 1;
+        pieces[piece][k - starts[piece]].value
+    })
+}
+
+/// Entries in compressed columns, each sorted by row; duplicates stand in file order.
+struct Counted {
+    col_ptr: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+    has_duplicates: bool,
+}
+
+impl Counted {
+    fn of(n: usize, pieces: Vec<Vec<Entry>>, storage: Storage) -> Self {
+        let list = List::new(pieces, storage);
+        let mut col_ptr = vec![0usize; n + 1];
+        let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
+        col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
+            let first = task * width;
+            list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
+        });
+        add_up(&mut col_ptr);
+        let entries = col_ptr[n];
+        let (mut row_idx, mut values) = (vec![0u32; entries], vec![0.0f64; entries]);
+        let fill = |block: ColumnBlock<'_>| {
+            let (first, end) = (block.columns.start, block.columns.end);
+            let start = col_ptr[first];
+            let mut next = col_ptr[first..end].to_vec();
+            list.visit(first..end, |row, col, value| {
+                let at = &mut next[col - first];
+                block.rows[*at - start] = row;
+                block.values[*at - start] = value;
+                *at += 1;
+            });
+            sort_columns(&col_ptr[first..=end], block.rows, block.values)
+        };
+        let blocks = split_columns(&col_ptr, &equal_shares(&col_ptr), &mut row_idx, &mut values);
+        let has_duplicates = blocks.into_par_iter().map(fill).reduce(|| false, |a, b| a | b);
+        Self { col_ptr, row_idx, values, has_duplicates }
+    }
+
+    /// `Err` holds the entry whose sum is not finite.
+    fn added_up(self) -> Result<CscMatrix, (u32, u32)> {
+        let Self { mut col_ptr, mut row_idx, mut values, has_duplicates } = self;
+        if has_duplicates {
+            merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
+        }
+        let n = col_ptr.len() - 1;
+        Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+    }
+
+    /// `Err` holds the first entry that is there twice, by row and then column.
+    fn distinct(self, storage: Storage) -> Result<CscMatrix, (u32, u32)> {
+        if !self.has_duplicates {
+            return self.added_up();
+        }
+        let twice = self.col_ptr.windows(2).zip(0u32..).flat_map(|(ends, col)| {
+            let rows = &self.row_idx[ends[0]..ends[1]];
+            rows.windows(2).filter(|pair| pair[0] == pair[1]).map(move |pair| (pair[0], col))
+        });
+        // Each of a triangle was put into both.
+        let twice = twice.filter(|(row, col)| storage == Storage::Full || row >= col);
+        Err(twice.min().expect("duplicates were found"))
+    }
+}
+
+/// Adds an entry to the last piece, or begins a new one: pieces that cover few columns are left out by most
+/// tasks.
+pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
+    const PIECE: usize = 1 << 15;
+    match pieces.last_mut() {
+        Some(piece) if piece.len() < PIECE => piece.push(entry),
+        _ => {
+            let mut piece = Vec::with_capacity(PIECE);
+            piece.push(entry);
+            pieces.push(piece);
+        }
+    }
+}
+
+/// Entries that come column by column, in any order within a column, without zeros.
+pub(super) struct ColumnEntries {
+    /// At j + 1: the number of entries of column j.
+    counts: Vec<usize>,
+    row_idx: Vec<u32>,
+    values: Vec<f64>,
+}
+
+impl ColumnEntries {
+    /// None yet, of `n` columns; about `entries` will come.
+    pub(super) fn with_room(n: usize, entries: usize) -> Self {
+        let (mut row_idx, mut values) = (Vec::new(), Vec::new());
+        // A number that a file states: where there is no such room the lists grow as far as they have to.
+        or_go_without(|| {
+            if row_idx.try_reserve_exact(entries).is_ok() {
+                let _ = values.try_reserve_exact(entries);
+            }
+        });
+        Self { counts: vec![0; n + 1], row_idx, values }
+    }
+
+    /// Of `n` columns; `lengths` has each column with entries and their number, in ascending order.
+    pub(super) fn new(n: usize, lengths: &[(u32, usize)], row_idx: Vec<u32>, values: Vec<f64>) -> Self {
+        let mut counts = vec![0; n + 1];
+        lengths.iter().for_each(|&(column, length)| counts[column as usize + 1] = length);
+        Self { counts, row_idx, values }
+    }
+
+    /// Adds an entry to its column; columns come in ascending order.
+    pub(super) fn push(&mut self, entry: Entry) {
+        self.counts[entry.col as usize + 1] += 1;
+        self.row_idx.push(entry.row);
+        self.values.push(entry.value);
+    }
+
+    /// The entries one by one.
+    #[cfg(feature = "hdf5")]
+    pub(super) fn into_entries(self) -> Vec<Vec<Entry>> {
+        let mut entries = Vec::new();
+        let mut at = 0;
+        for (col, &count) in self.counts[1..].iter().enumerate() {
+            for k in at..at + count {
+                let entry = Entry { row: self.row_idx[k], col: col as u32, value: self.values[k] };
+                push(&mut entries, entry);
+            }
+            at += count;
+        }
+        entries
+    }
+
+    fn compress(self) -> Result<CscMatrix, (u32, u32)> {
+        let Self { counts: mut col_ptr, mut row_idx, mut values } = self;
+        add_up(&mut col_ptr);
+        let n = col_ptr.len() - 1;
+        let cuts = equal_shares(&col_ptr);
+        let blocks = split_columns(&col_ptr, &cuts, &mut row_idx, &mut values);
+        let sort =
+            |b: ColumnBlock<'_>| sort_columns(&col_ptr[b.columns.start..=b.columns.end], b.rows, b.values);
+        if blocks.into_par_iter().map(sort).reduce(|| false, |a, b| a | b) {
+            merge_duplicates(&mut col_ptr, &mut row_idx, &mut values)?;
+        }
+        Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
+    }
+}
+
+/// From the number of entries of column j at j + 1 to column pointers.
+fn add_up(counts: &mut [usize]) {
+    for j in 1..counts.len() {
+        counts[j] += counts[j - 1];
+    }
+}
+
+/// Cuts the columns into several times as many parts as there are threads, with about equal numbers of
+/// entries.
+fn equal_shares(col_ptr: &[usize]) -> Vec<usize> {
+    let (n, parts) = (col_ptr.len() - 1, 4 * rayon::current_num_threads());
+    let cut = |part: usize| col_ptr.partition_point(|&p| p < col_ptr[n] / parts * part).min(n);
+    (0..parts).map(cut).chain([n]).collect()
+}
+
+/// All entries of a file.
+struct List {
+    pieces: Vec<Vec<Entry>>,
+    /// First and last column that each piece has entries for.
+    extents: Vec<(u32, u32)>,
+    mirror: bool,
+}
+
+impl List {
+    fn new(pieces: Vec<Vec<Entry>>, storage: Storage) -> Self {
+        let mirror = storage == Storage::Triangle;
+        let extent = |piece: &Vec<Entry>| {
+            piece.iter().fold((u32::MAX, 0), |(low, high): (u32, u32), e| {
+                let other = if mirror { e.row } else { e.col };
+                (low.min(e.col).min(other), high.max(e.col).max(other))
+            })
+        };
+        let extents = pieces.par_iter().map(extent).collect();
+        Self { pieces, extents, mirror }
+    }
+
+    /// Calls `take` with row, column and value of every nonzero entry of some columns, in file order.
+    fn visit(&self, columns: Range<usize>, mut take: impl FnMut(u32, usize, f64)) {
+        let (start, len) = (columns.start as u32, columns.len() as u32);
+        let here = |column: u32| column.wrapping_sub(start) < len;
+        for (piece, &(low, high)) in self.pieces.iter().zip(&self.extents) {
+            if high < start || low as usize >= columns.end {
+                continue;
+            }
+            for e in piece.iter().filter(|e| e.value != 0.0) {
+                if here(e.col) {
+                    take(e.row, e.col as usize, e.value);
+                }
+                if self.mirror && e.row != e.col && here(e.row) {
+                    take(e.col, e.row as usize, e.value);
+                }
+            }
+        }
+    }
+}
+
+/// Sorts every column by row, duplicates staying in file order; says whether there are any. `pointers` are
+/// those of the columns whose entries `rows` and `values` are.
+fn sort_columns(pointers: &[usize], rows: &mut [u32], values: &mut [f64]) -> bool {
+    let mut duplicates = false;
+    let mut scratch: Vec<(u32, f64)> = Vec::new();
+    for column in pointers.windows(2) {
+        let range = column[0] - pointers[0]..column[1] - pointers[0];
+        let (rows, values) = (&mut rows[range.clone()], &mut values[range]);
+        if rows.is_sorted_by(|a, b| a < b) {
+            continue;
+        }
+        scratch.clear();
+        scratch.extend(rows.iter().copied().zip(values.iter().copied()));
+        scratch.sort_by_key(|entry| entry.0); // stable
+        for (k, &(row, value)) in scratch.iter().enumerate() {
+            rows[k] = row;
+            values[k] = value;
+        }
+        duplicates |= rows.windows(2).any(|w| w[0] == w[1]);
+    }
+    duplicates
+}
+
+/// Sums runs of equal rows and drops sums that are zero, in place.
+fn merge_duplicates(
+    col_ptr: &mut [usize],
+    row_idx: &mut Vec<u32>,
+    values: &mut Vec<f64>,
+) -> Result<(), (u32, u32)> {
+    let (mut from, mut to) = (0, 0);
+    for j in 0..col_ptr.len() - 1 {
+        let end = col_ptr[j + 1];
+        while from < end {
+            let row = row_idx[from];
+            let mut sum = values[from];
+            from += 1;
+            while from < end && row_idx[from] == row {
+                sum += values[from];
+                from += 1;
+            }
+            if !sum.is_finite() {
+                return Err((row, j as u32));
+            }
+            if sum != 0.0 {
+                row_idx[to] = row;
+                values[to] = sum;
+                to += 1;
+            }
+        }
+        col_ptr[j + 1] = to;
+    }
+    row_idx.truncate(to);
+    values.truncate(to);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(list: &[(u32, u32, f64)]) -> Vec<Entry> {
+        list.iter().map(|&(row, col, value)| Entry { row, col, value }).collect()
+    }
+
+    #[test]
+    fn a_triangle_stands_for_both_and_duplicates_add_up_in_file_order() {
+        // 1e16 + 1 - 1e16 is 0 from the left, 1 in another order.
+        let pieces = vec![
+            entries(&[(2, 0, 1e16), (0, 0, 3.0), (1, 1, 0.0)]),
+            entries(&[(2, 0, 1.0), (2, 1, 5.0), (2, 0, -1e16), (2, 1, -2.0)]),
+        ];
+        let raw = assemble(3, pieces, Storage::Triangle, 17, Path::new("K.mtx")).unwrap();
+        let expected = CscMatrix::from_triplets(3, 3, &[(0, 0, 3.0), (2, 1, 3.0), (1, 2, 3.0)]);
+        assert_eq!(raw.matrix, expected);
+    }
+
+    /// Entries of a lower triangle in no order, with zeros and duplicates whose sums depend on their order.
+    fn disordered(n: u32, count: u32) -> Vec<Entry> {
+        let at = |k: u32| k.wrapping_mul(2_654_435_761) >> 7;
+        let place = |k: u32| (at(k) % n, at(k + count) % n);
+        let value = |k: u32| if k.is_multiple_of(11) { 0.0 } else { (f64::from(k) * 1e3).sin() };
+        (0..count)
+            .map(|k| {
+                let (a, b) = place(if k % 3 == 2 { k - 1 } else { k }); // every third is a duplicate
+                Entry { row: a.max(b), col: a.min(b), value: value(k) }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn entries_in_any_order_are_put_where_they_belong_and_summed_in_file_order() {
+        const N: u32 = 3000;
+        let list = disordered(N, 40_000);
+        let mut both = Vec::new();
+        for e in &list {
+            both.push((e.row, e.col, e.value));
+            if e.row != e.col {
+                both.push((e.col, e.row, e.value));
+            }
+        }
+        let n = N as usize;
+        let expected = CscMatrix::from_triplets(n, n, &both);
+        let pieces: Vec<Vec<Entry>> = list.chunks(777).map(<[Entry]>::to_vec).collect();
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let raw = pool.install(|| assemble(n, pieces.clone(), Storage::Triangle, 17, Path::new("K.mtx")));
+            assert_eq!(raw.unwrap().matrix, expected, "{threads} threads");
+        }
+        // The same column by column, as binary files have them.
+        let mut ordered: Vec<Entry> = list.into_iter().filter(|e| e.value != 0.0).collect();
+        ordered.sort_by_key(|e| e.col);
+        let columns = || {
+            let mut columns = ColumnEntries::with_room(n, ordered.len());
+            ordered.iter().for_each(|&e| columns.push(e));
+            columns
+        };
+        let lower: Vec<_> = ordered.iter().map(|e| (e.row, e.col, e.value)).collect();
+        let full = assemble_columns(columns(), 17, Path::new("K.h5")).unwrap();
+        assert_eq!(full.matrix, CscMatrix::from_triplets(n, n, &lower));
+        let mirrored = assemble(n, columns().into_entries(), Storage::Triangle, 17, Path::new("K.h5"));
+        assert_eq!(mirrored.unwrap().matrix, expected);
+    }
+
+    #[test]
+    fn sums_that_overflow_are_refused_by_name() {
+        let pieces = vec![entries(&[(1, 0, 1e308), (1, 0, 1e308)])];
+        let error = assemble(2, pieces, Storage::Full, 17, Path::new("K.mtx")).unwrap_err();
+        assert_eq!(error.code(), Code::MatrixNotFinite);
+        assert!(error.message().contains("(2, 1)"), "{error}");
+    }
+
+    #[test]
+    fn a_header_cannot_ask_for_memory() {
+        assert_eq!(check_size(4_000_000_000, 4_000_000_000, 3).unwrap_err().code(), Code::MatrixSyntax);
+        assert_eq!(check_size(1 << 40, 1 << 40, 1 << 50).unwrap_err().code(), Code::MatrixTooLarge);
+        assert_eq!(check_size(3, 4, 3).unwrap_err().code(), Code::MatrixNotSquare);
+        assert_eq!(check_size(1_000_000, 1_000_000, 1), Ok(1_000_000));
+        assert_eq!(check_size(12, 12, 1_000_001).unwrap_err().code(), Code::MatrixCount);
+        assert_eq!(check_size(1000, 1000, 64_000_000), Ok(1000));
+    }
+}

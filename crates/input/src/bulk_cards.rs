@@ -1,0 +1,540 @@
+//! Decks of Nastran: lines of case control, then bulk data cards in free, small and large fields, with
+//! continuations, comments and included files.
+
+mod apart;
+mod matrix_lines;
+mod replication;
+
+use super::coordinates::{excerpt, real};
+use apart::Apart;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+pub(super) use matrix_lines::MatrixLines;
+use replication::{Asked, Replication};
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Files that include one another deeper than this include themselves.
+const DEEPEST: usize = 20;
+/// A deck has no more files than these.
+const MOST_FILES: usize = 1000;
+
+/// What a deck is made of, in its order.
+pub(super) enum Item<'a> {
+    /// A line above the bulk data, without its comment.
+    Control(&'a str),
+    /// BEGIN BULK, BEGIN SUPER.
+    Begin(&'a Place<'a>),
+    Card(&'a Card, &'a Path),
+    /// DMIG cards that stand one below the other, not read yet.
+    Matrices(&'a MatrixLines<'a>),
+}
+
+/// Where something stands.
+pub(super) struct Place<'a> {
+    pub path: &'a Path,
+    pub line: usize,
+}
+
+/// A bulk data card: its name and its fields, eight to a line of small fields, four to one of large fields.
+#[derive(Clone, Default)]
+pub(super) struct Card {
+    /// In upper case, without asterisk.
+    pub name: String,
+    text: Vec<u8>,
+    /// Where each field ends in the text.
+    ends: Vec<usize>,
+    /// The first field of each line, and the number of the line.
+    lines: Vec<(usize, usize)>,
+    /// Name that the continuation has to have, in upper case, where one is given.
+    continuation: Vec<u8>,
+}
+
+impl Card {
+    /// A field, trimmed, from 0 for what follows the name; empty where the card has none.
+    pub(super) fn field(&self, k: usize) -> &[u8] {
+        let Some(&end) = self.ends.get(k) else { return b"" };
+        let start = if k == 0 { 0 } else { self.ends[k - 1] };
+        &self.text[start..end]
+    }
+
+    /// Number of fields, empty ones included.
+    pub(super) fn len(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// A whole number; zero where the field is empty.
+    pub(crate) fn integer(&self, k: usize) -> Option<i64> {
+        match self.field(k) {
+            b"" => Some(0),
+            field => whole(field),
+        }
+    }
+
+    /// A finite real number; zero where the field is empty.
+    pub(crate) fn real(&self, k: usize) -> Option<f64> {
+        match self.field(k) {
+            b"" => Some(0.0),
+            field => real(field).filter(|value| value.is_finite()),
+        }
+    }
+
+    /// The line that a field stands in.
+    pub(super) fn line_of(&self, k: usize) -> usize {
+        let at = self.lines.partition_point(|(first, _)| *first <= k);
+        self.lines.get(at.saturating_sub(1)).map_or(1, |(_, line)| *line)
+    }
+
+    /// The line that it begins in.
+    pub(super) fn line(&self) -> usize {
+        self.line_of(0)
+    }
+
+    fn begin(&mut self, name: String) {
+        self.name = name;
+        self.text.clear();
+        self.ends.clear();
+        self.lines.clear();
+        self.continuation.clear();
+    }
+
+    /// Its continuation has to have the name in this field.
+    fn continue_as(&mut self, field: &[u8]) {
+        self.continuation.clear();
+        self.continuation.extend(bare(field.trim_ascii()).iter().map(u8::to_ascii_uppercase));
+    }
+
+    fn push(&mut self, field: &[u8]) {
+        self.text.extend_from_slice(field.trim_ascii());
+        self.ends.push(self.text.len());
+    }
+}
+
+/// A whole number as cards have it.
+pub(super) fn whole(field: &[u8]) -> Option<i64> {
+    /// As many digits fit into the number, whichever they are.
+    const FIT: usize = 18;
+    let digits = match field {
+        [b'+' | b'-', digits @ ..] => digits,
+        digits => digits,
+    };
+    if digits.is_empty() || digits.len() > FIT {
+        return std::str::from_utf8(field).ok()?.parse().ok();
+    }
+    let mut number = 0;
+    for digit in digits {
+        number = 10 * number + i64::from(digit.is_ascii_digit().then(|| digit - b'0')?);
+    }
+    Some(if field[0] == b'-' { -number } else { number })
+}
+
+/// Components of a grid: digits from 0 to 6. Scalar points have 0 or none.
+pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
+    field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
+}
+
+/// True if a file that begins with `bytes` is a deck of Nastran or bulk data, by its first lines that say so.
+pub(super) fn is_bulk_data(bytes: &[u8]) -> bool {
+    bytes.split(|&b| b == b'\n').any(|line| {
+        let upper: Vec<u8> = line.iter().take(16).map(u8::to_ascii_uppercase).collect();
+        let is_card = |name: &[u8]| {
+            upper
+                .strip_prefix(name)
+                .is_some_and(|rest| matches!(rest.first(), Some(b' ' | b',' | b'*' | b'\t')))
+        };
+        is_begin(line) || upper.trim_ascii() == b"CEND" || is_card(b"GRID") || is_card(b"DMIG")
+    })
+}
+
+/// Whether a line begins bulk data.
+fn is_begin(line: &[u8]) -> bool {
+    let word = |text: &[u8], word: &[u8]| {
+        text.get(..word.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(word))
+    };
+    let line = line[..line.len().min(40)].trim_ascii_start();
+    word(line, b"BEGIN ") && {
+        let kind = line[6..].trim_ascii_start();
+        word(kind, b"BULK") || word(kind, b"SUPER")
+    }
+}
+
+/// Whether a line is of case control or executive control, or ends them.
+fn is_control(line: &[u8]) -> bool {
+    let line = &line[..line.len().min(40)];
+    // What most lines are not is told by one letter.
+    if !matches!(line.trim_ascii_start().first(), Some(b'b' | b'B' | b'c' | b'C' | b's' | b'S')) {
+        return false;
+    }
+    let begins = |word: &[u8]| line.get(..word.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(word));
+    line.trim_ascii().eq_ignore_ascii_case(b"CEND") || begins(b"SOL ") || is_begin(line)
+}
+
+type Taken = Result<(), Diagnostic>;
+
+/// Reads a deck with the files that it includes and gives what it is made of to `take`. The files, the main
+/// one first.
+///
+/// # Errors
+/// FB101, FB106 for files that cannot be read; FB110 for continuations without a card, fields beyond the
+/// line, and files that include themselves; FB301 for a matrix at the end of a file that has no line end;
+/// what `take` gives.
+pub(super) fn read_deck(
+    path: &Path,
+    take: &mut dyn FnMut(Item<'_>) -> Taken,
+) -> Result<Vec<SeenFile>, Diagnostic> {
+    let file = InputFile::open(path)?;
+    let has_control = Lines::of(file.bytes(), 0).any(|(_, range)| is_control(&file.bytes()[range]));
+    let mut reading = Reading::new(!has_control, take);
+    reading.file(path, &file, 0)?;
+    reading.flush()?;
+    Ok(reading.files)
+}
+
+/// Gives the cards of some whole lines of bulk data to `take`; `above` is the number of lines above them in
+/// their file.
+///
+/// # Errors
+/// FB110 for continuations without a card and fields beyond the line; what `take` gives.
+pub(super) fn read_cards(
+    text: &[u8],
+    path: &Path,
+    above: usize,
+    take: &mut dyn FnMut(&Card) -> Taken,
+) -> Taken {
+    let mut each = |item: Item<'_>| match item {
+        Item::Card(card, _) => take(card),
+        _ => Ok(()),
+    };
+    let mut reading = Reading::new(true, &mut each);
+    for (number, range) in Lines::of(text, 0) {
+        reading.line(&text[range], &Place { path, line: above + number })?;
+    }
+    reading.flush()
+}
+
+/// The lines of a text: their numbers, from 1, and their bytes without the line end.
+struct Lines<'a> {
+    text: &'a [u8],
+    at: usize,
+    number: usize,
+}
+
+impl<'a> Lines<'a> {
+    fn of(text: &'a [u8], at: usize) -> Self {
+        Self { text, at, number: 0 }
+    }
+}
+
+impl Iterator for Lines<'_> {
+    type Item = (usize, std::ops::Range<usize>);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let length = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
+        let range = self.at..self.at + length;
+        self.at = range.end + 1;
+        self.number += 1;
+        Some((self.number, range))
+    }
+}
+
+/// A deck while it is read.
+struct Reading<'t> {
+    files: Vec<SeenFile>,
+    in_bulk: bool,
+    /// ENDDATA has come.
+    ended: bool,
+    /// The card that was read last, and its file.
+    card: Card,
+    card_path: PathBuf,
+    /// Continuations may go on with that card: it was not given yet.
+    is_open: bool,
+    /// Continuations of the file that stand apart from their cards.
+    apart: Apart,
+    /// Changes from card to card by the last line of replication.
+    replication: Replication,
+    take: &'t mut dyn FnMut(Item<'_>) -> Taken,
+}
+
+impl<'t> Reading<'t> {
+    fn new(in_bulk: bool, take: &'t mut dyn FnMut(Item<'_>) -> Taken) -> Self {
+        let (files, card, card_path) = (Vec::new(), Card::default(), PathBuf::new());
+        let (apart, replication) = (Apart::default(), Replication::default());
+        Self { files, in_bulk, ended: false, card, card_path, is_open: false, apart, replication, take }
+    }
+
+    fn file(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
+        if depth > DEEPEST || self.files.len() >= MOST_FILES {
+            let message =
+                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
+            return Err(Diagnostic::new(Code::DeckSyntax, message)
+                .in_file(path)
+                .with_help("a file includes itself: take the INCLUDE out"));
+        }
+        self.files.push(file.seen()?);
+        let before = std::mem::replace(&mut self.apart, Apart::of(file));
+        self.lines_of(path, file, depth)?;
+        if !self.apart.is_empty() {
+            self.flush()?;
+            for (card, path) in self.apart.joined(path)? {
+                (self.take)(Item::Card(&card, &path))?;
+            }
+        }
+        self.apart = before;
+        Ok(())
+    }
+
+    fn lines_of(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
+        let mut lines = Lines::of(file.bytes(), 0);
+        while let Some((number, range)) = lines.next() {
+            if self.ended {
+                return Ok(());
+            }
+            let at = Place { path, line: number };
+            let line = &file.bytes()[range.clone()];
+            let bare = line.trim_ascii();
+            if bare.is_empty() || bare.starts_with(b"$") {
+                continue;
+            }
+            if self.in_bulk
+                && let Some(matrices) = MatrixLines::at(file, range.start, number - 1)
+            {
+                self.flush()?;
+                (lines.at, lines.number) = matrices.end();
+                (self.take)(Item::Matrices(&matrices))?;
+                if matrices.are_cut_off() {
+                    return Err(cut_off(path, lines.number));
+                }
+            } else if is_include(bare) {
+                let mut name = String::from_utf8_lossy(&bare[7..]).trim().to_owned();
+                // A name between quotes may go on in the next lines.
+                while unclosed(&name) {
+                    let Some((_, more)) = lines.next() else { break };
+                    name += String::from_utf8_lossy(&file.bytes()[more]).trim();
+                }
+                self.include(&name, &at, depth)?;
+            } else {
+                self.line(line, &at)?;
+            }
+        }
+        self.refuse_cut_off(path, file.bytes())
+    }
+
+    fn include(&mut self, name: &str, at: &Place<'_>, depth: usize) -> Result<(), Diagnostic> {
+        let name = name.split('$').next().filter(|_| !name.starts_with(['\'', '"'])).unwrap_or(name);
+        let name = name.trim().trim_matches(['\'', '"']);
+        let folder = at.path.parent().unwrap_or(Path::new(""));
+        let main = self.files.first().and_then(|file| file.path.parent()).unwrap_or(folder);
+        let beside = folder.join(name);
+        let path = if beside.exists() { beside } else { main.join(name) };
+        let file = InputFile::open(&path).map_err(|diagnostic| {
+            let message = format!("{} is included: {}", path.display(), diagnostic.message());
+            Diagnostic::new(diagnostic.code(), message).in_file(at.path).at_line(at.line)
+        })?;
+        self.flush()?;
+        self.file(&path, &file, depth + 1)
+    }
+
+    fn line(&mut self, line: &[u8], at: &Place<'_>) -> Taken {
+        let line = without_comment(line);
+        if line.is_empty() {
+            return Ok(());
+        }
+        if is_begin(line) {
+            self.flush()?;
+            self.in_bulk = true;
+            return (self.take)(Item::Begin(at));
+        } else if !self.in_bulk {
+            return (self.take)(Item::Control(&String::from_utf8_lossy(line)));
+        } else if line.get(..7).is_some_and(|begin| begin.eq_ignore_ascii_case(b"ENDDATA")) {
+            self.flush()?;
+            self.ended = true;
+        } else {
+            return self.bulk_line(line, at);
+        }
+        Ok(())
+    }
+
+    fn bulk_line(&mut self, line: &[u8], at: &Place<'_>) -> Taken {
+        let line = Line::of(line);
+        let head = line.head();
+        let here = |diagnostic: Diagnostic| diagnostic.in_file(at.path).at_line(at.line);
+        match Replication::asked(&line).map_err(here)? {
+            None => {}
+            Some(Asked::One(replication)) => {
+                self.replication = replication;
+                return self.replicate(1, at);
+            }
+            Some(Asked::Repeat(count)) => return self.replicate(count, at),
+        }
+        if matches!(head.first(), None | Some(b'+' | b'*')) {
+            let refused = |what: &str| {
+                let message = format!("`{}` continues {what}", excerpt(&line.text));
+                Diagnostic::new(Code::DeckSyntax, message).in_file(at.path).at_line(at.line)
+            };
+            let (name, card) = (bare(head).to_ascii_uppercase(), &self.card);
+            let is_below = self.is_open && !name.is_empty() && name == card.continuation;
+            if !is_below && self.apart.keep(&name, &line.text, at.line) {
+                return Ok(());
+            }
+            if !self.is_open {
+                return Err(refused("no card"));
+            }
+            if !name.is_empty() && !card.continuation.is_empty() && name != card.continuation {
+                let help = "write the lines of a card one after the other";
+                return Err(refused(&format!("another card than the {} above it", card.name)).with_help(help));
+            }
+        } else {
+            let name = String::from_utf8_lossy(head).trim_end_matches('*').trim().to_uppercase();
+            self.open(at)?;
+            self.card.begin(name);
+        }
+        card_fields(&mut self.card, &line, at.line).map_err(here)
+    }
+
+    /// Another card begins.
+    fn open(&mut self, at: &Place<'_>) -> Taken {
+        self.flush()?;
+        self.apart.close();
+        if self.card_path != at.path {
+            self.card_path = at.path.to_path_buf();
+        }
+        self.is_open = true;
+        Ok(())
+    }
+
+    /// Cards that follow from the last one by replication.
+    fn replicate(&mut self, count: i64, at: &Place<'_>) -> Taken {
+        for _ in 0..count {
+            let next = self.replication.next(&self.card);
+            let mut next = next.map_err(|diagnostic| diagnostic.in_file(at.path).at_line(at.line))?;
+            next.lines.push((0, at.line));
+            self.open(at)?;
+            self.card = next;
+        }
+        Ok(())
+    }
+
+    /// Gives the card that has been read.
+    fn flush(&mut self) -> Taken {
+        if !std::mem::take(&mut self.is_open) {
+            return Ok(());
+        }
+        if self.apart.contains(&self.card.continuation) {
+            self.apart.wait(self.card.clone(), self.card_path.clone());
+            return Ok(());
+        }
+        (self.take)(Item::Card(&self.card, &self.card_path))
+    }
+
+    /// FB301 where the last card is of a matrix and has no line end: digits may be missing.
+    fn refuse_cut_off(&mut self, path: &Path, bytes: &[u8]) -> Taken {
+        let is_matrix = self.is_open && self.card.name == "DMIG" && self.card_path == path;
+        if is_matrix && !bytes.ends_with(b"\n") {
+            return Err(cut_off(path, bytes.iter().filter(|&&b| b == b'\n').count() + 1));
+        }
+        Ok(())
+    }
+}
+
+fn cut_off(path: &Path, line: usize) -> Diagnostic {
+    let message = "the matrix ends in a line without a line end: the file may be cut off";
+    let diagnostic = Diagnostic::new(Code::MatrixSyntax, message).in_file(path).at_line(line);
+    diagnostic.with_help("write the file again; if it is whole, end the last line")
+}
+
+/// A line up to its comment.
+fn without_comment(line: &[u8]) -> &[u8] {
+    line[..memchr::memchr(b'$', line).unwrap_or(line.len())].trim_ascii_end()
+}
+
+/// A line of a card, without its comment.
+struct Line<'a> {
+    /// Fields lie between commas.
+    is_free: bool,
+    /// Without tabs where fields lie between columns.
+    text: Cow<'a, [u8]>,
+}
+
+impl<'a> Line<'a> {
+    fn of(line: &'a [u8]) -> Self {
+        let is_free = memchr::memchr(b',', line).is_some();
+        Self { is_free, text: if is_free { Cow::Borrowed(line) } else { without_tabs(line) } }
+    }
+
+    /// What stands before the fields: the name of the card, or a continuation.
+    fn head(&self) -> &[u8] {
+        let head = match self.is_free {
+            true => self.text.split(|&b| b == b',').next().unwrap_or_default(),
+            false => &self.text[..self.text.len().min(8)],
+        };
+        head.trim_ascii()
+    }
+}
+
+/// A continuation without the sign that it begins with.
+fn bare(field: &[u8]) -> &[u8] {
+    let first = field.iter().position(|b| !b"+*".contains(b)).unwrap_or(field.len());
+    field[first..].trim_ascii()
+}
+
+fn is_include(line: &[u8]) -> bool {
+    let next = line.get(7);
+    line.len() > 7
+        && line[..7].eq_ignore_ascii_case(b"INCLUDE")
+        && next.is_some_and(|b| matches!(b, b' ' | b'\t' | b'\'' | b'"'))
+}
+
+fn unclosed(name: &str) -> bool {
+    name.chars().next().is_some_and(|quote| matches!(quote, '\'' | '"') && !name[1..].contains(quote))
+}
+
+/// Tabs go on to the next column that is a multiple of eight.
+fn without_tabs(line: &[u8]) -> Cow<'_, [u8]> {
+    if memchr::memchr(b'\t', line).is_none() {
+        return Cow::Borrowed(line);
+    }
+    let mut wide = Vec::new();
+    for &b in line {
+        match b {
+            b'\t' => wide.resize((wide.len() / 8 + 1) * 8, b' '),
+            b => wide.push(b),
+        }
+    }
+    Cow::Owned(wide)
+}
+
+/// Adds the fields of a line to a card.
+fn card_fields(card: &mut Card, line: &Line<'_>, number: usize) -> Taken {
+    card.lines.push((card.ends.len(), number));
+    let head = line.head();
+    let is_large = head.starts_with(b"*") || head.ends_with(b"*") && !head.starts_with(b"+");
+    let fields = if is_large { 4 } else { 8 };
+    if line.is_free {
+        return free_fields(card, &line.text, fields);
+    }
+    fixed_fields(card, &line.text, fields);
+    Ok(())
+}
+
+fn fixed_fields(card: &mut Card, line: &[u8], fields: usize) {
+    let width = 64 / fields;
+    let part = |from: usize, to: usize| line.get(from..line.len().min(to)).unwrap_or_default();
+    for k in 0..fields {
+        card.push(part(8 + k * width, 8 + (k + 1) * width));
+    }
+    card.continue_as(part(72, 80));
+}
+
+fn free_fields(card: &mut Card, line: &[u8], fields: usize) -> Result<(), Diagnostic> {
+    let mut given = line.split(|&b| b == b',').skip(1);
+    for _ in 0..fields {
+        card.push(given.next().unwrap_or_default());
+    }
+    card.continue_as(given.next().unwrap_or_default());
+    if given.any(|field| !field.trim_ascii().is_empty()) {
+        let message = format!("the line has more than {fields} fields");
+        return Err(Diagnostic::new(Code::DeckSyntax, message).with_help("begin a continuation line"));
+    }
+    Ok(())
+}

@@ -1,0 +1,135 @@
+//! Continuations that do not stand below their card: their names tell which card they go on with.
+
+use super::{Card, Line, Lines, bare, card_fields, without_comment};
+use crate::coordinates::excerpt;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::InputFile;
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// A line of a continuation.
+struct OwnLine {
+    text: Vec<u8>,
+    number: usize,
+}
+
+/// Continuations of one file that stand apart from their cards, and these cards while the file is read.
+#[derive(Default)]
+pub(super) struct Apart {
+    /// Names of these continuations, in upper case.
+    names: HashSet<Vec<u8>>,
+    lines: HashMap<Vec<u8>, Vec<OwnLine>>,
+    /// The continuation that was read last, and the name that a line has to have that goes on with it.
+    last: Option<(Vec<u8>, Vec<u8>)>,
+    cards: Vec<(Card, PathBuf)>,
+}
+
+impl Apart {
+    /// Finds the names of continuations of a file that stand apart from the line that ends with their name.
+    pub(super) fn of(file: &InputFile) -> Self {
+        let mut names = HashSet::new();
+        let mut before: &[u8] = b"";
+        each_line(file, |line| {
+            if is_named(line) {
+                let name = bare(Line::of(line).head()).to_ascii_uppercase();
+                if !name.is_empty() && name != end_of(before) {
+                    names.insert(name);
+                }
+            }
+            before = line;
+        });
+        // Those that no line ends with go on with what stands above them.
+        if !names.is_empty() {
+            let mut ends = HashSet::new();
+            each_line(file, |line| {
+                ends.insert(end_of(line));
+            });
+            names.retain(|name| ends.contains(name));
+        }
+        Self { names, ..Self::default() }
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.names.is_empty()
+    }
+
+    pub(super) fn contains(&self, name: &[u8]) -> bool {
+        !self.names.is_empty() && self.names.contains(name)
+    }
+
+    /// Keeps a line of a continuation (with its name, in upper case) if it stands apart or goes on with one that
+    /// does.
+    pub(super) fn keep(&mut self, name: &[u8], line: &[u8], number: usize) -> bool {
+        let first = match &self.last {
+            Some((first, next)) if name.is_empty() || name == next.as_slice() => first.clone(),
+            _ if self.contains(name) => name.to_vec(),
+            _ => return false,
+        };
+        self.lines.entry(first.clone()).or_default().push(OwnLine { text: line.to_vec(), number });
+        self.last = Some((first, end_of(line)));
+        true
+    }
+
+    /// Another card begins.
+    pub(super) fn close(&mut self) {
+        self.last = None;
+    }
+
+    /// Keeps a card whose continuation stands apart.
+    pub(super) fn wait(&mut self, card: Card, path: PathBuf) {
+        self.cards.push((card, path));
+    }
+
+    /// The cards with their continuations, at the end of the file.
+    ///
+    /// # Errors
+    /// FB110 for lines that are no continuation, and for continuations without a card.
+    pub(super) fn joined(&mut self, path: &Path) -> Result<Vec<(Card, PathBuf)>, Diagnostic> {
+        let mut cards = std::mem::take(&mut self.cards);
+        for (card, path) in &mut cards {
+            while let Some(lines) = self.lines.remove(&card.continuation) {
+                for OwnLine { text, number } in lines {
+                    card_fields(card, &Line::of(&text), number)
+                        .map_err(|diagnostic| diagnostic.in_file(&*path).at_line(number))?;
+                }
+            }
+        }
+        let stray = self.lines.values().filter_map(|lines| lines.first()).min_by_key(|line| line.number);
+        match stray {
+            None => Ok(cards),
+            Some(line) => {
+                let message = format!("`{}` continues no card", excerpt(&line.text));
+                Err(Diagnostic::new(Code::DeckSyntax, message).in_file(path).at_line(line.number))
+            }
+        }
+    }
+}
+
+/// Gives the lines that are not empty, without comments.
+fn each_line<'f>(file: &'f InputFile, mut take: impl FnMut(&'f [u8])) {
+    for (_, range) in Lines::of(file.bytes(), 0) {
+        let line = without_comment(file.bytes()[range].trim_ascii_end());
+        if !line.is_empty() {
+            take(line);
+        }
+    }
+}
+
+/// True if a line is a continuation that may have a name: those of punch files have none.
+fn is_named(line: &[u8]) -> bool {
+    matches!(line[0], b'+' | b'*') && line.get(1).is_some_and(|b| !b.is_ascii_whitespace())
+}
+
+/// The name that the continuation of a line has to have, in upper case; empty where it gives none.
+fn end_of(line: &[u8]) -> Vec<u8> {
+    let line = Line::of(line);
+    let end = match line.is_free {
+        true => {
+            let is_large = line.head().ends_with(b"*") || line.head().starts_with(b"*");
+            let fields = if is_large { 4 } else { 8 };
+            line.text.split(|&b| b == b',').nth(fields + 1).unwrap_or_default()
+        }
+        false => line.text.get(72..line.text.len().min(80)).unwrap_or_default(),
+    };
+    bare(end.trim_ascii()).to_ascii_uppercase()
+}

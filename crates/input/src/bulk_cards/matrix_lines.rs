@@ -1,0 +1,99 @@
+//! DMIG cards that stand one below the other in a deck, cut into parts that can be read by themselves.
+
+use super::{Line, is_begin, is_include, without_comment};
+use flexbody_base::text::input_file::InputFile;
+use std::ops::Range;
+
+/// Bytes of cards that one thread reads before it takes others.
+const PART: usize = 1 << 20;
+
+/// The lines of these cards.
+pub(crate) struct MatrixLines<'a> {
+    pub file: &'a InputFile,
+    /// In the order of the file.
+    pub parts: Vec<Part>,
+    /// The line that the last card ends in, from 1.
+    last_line: usize,
+}
+
+/// Some whole cards: the header of a matrix, or columns.
+pub(crate) struct Part {
+    pub bytes: Range<usize>,
+    /// Number of lines above them.
+    pub above: usize,
+    pub is_header: bool,
+}
+
+impl<'a> MatrixLines<'a> {
+    /// Those from a byte of the file on that begins a line with so many lines `above`; `None` where that line
+    /// begins another card.
+    pub(super) fn at(file: &'a InputFile, start: usize, above: usize) -> Option<Self> {
+        let bytes = file.bytes();
+        let (mut parts, mut last_line): (Vec<Part>, usize) = (Vec::new(), above);
+        let mut at = start;
+        while at < bytes.len() {
+            let end = memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1);
+            let line = &bytes[at..end];
+            if begins_matrix(line) {
+                let is_header = is_header(line);
+                match parts.last_mut() {
+                    Some(part) if !is_header && !part.is_header && part.bytes.len() < PART => {
+                        part.bytes.end = end;
+                    }
+                    _ => parts.push(Part { bytes: at..end, above: last_line, is_header }),
+                }
+            } else {
+                match parts.last_mut() {
+                    Some(part) if goes_on(line) => part.bytes.end = end,
+                    _ => break,
+                }
+            }
+            at = end;
+            last_line += 1;
+        }
+        (!parts.is_empty()).then_some(Self { file, parts, last_line })
+    }
+
+    /// The byte after the last card, and the number of lines up to there.
+    pub(super) fn end(&self) -> (usize, usize) {
+        (self.parts.last().map_or(0, |part| part.bytes.end), self.last_line)
+    }
+
+    /// Whether the last card ends the file without a line end.
+    pub(super) fn are_cut_off(&self) -> bool {
+        let (end, _) = self.end();
+        end == self.file.bytes().len() && !self.file.bytes().ends_with(b"\n")
+    }
+}
+
+/// Whether a line begins a DMIG card.
+fn begins_matrix(line: &[u8]) -> bool {
+    line.get(..4).is_some_and(|name| name.eq_ignore_ascii_case(b"DMIG"))
+        && matches!(Line::of(without_comment(line)).head()[4..], [] | [b'*'])
+}
+
+/// Whether the card of a matrix is its header: the second field is 0.
+fn is_header(line: &[u8]) -> bool {
+    let line = Line::of(without_comment(line));
+    let field = match line.is_free {
+        true => line.text.split(|&b| b == b',').nth(2),
+        false => {
+            let columns = if line.head().ends_with(b"*") { 24..40 } else { 16..24 };
+            line.text.get(columns.start..line.text.len().min(columns.end))
+        }
+    };
+    field.is_some_and(|field| field.trim_ascii() == b"0")
+}
+
+/// Whether a line continues a card or says nothing.
+fn goes_on(line: &[u8]) -> bool {
+    if matches!(line.first(), Some(b'*' | b'+' | b'$')) {
+        return true;
+    }
+    let bare = line.trim_ascii();
+    if bare.is_empty() || bare.starts_with(b"$") {
+        return true;
+    }
+    let line = without_comment(line);
+    !is_include(bare) && !is_begin(line) && matches!(Line::of(line).head().first(), None | Some(b'*' | b'+'))
+}

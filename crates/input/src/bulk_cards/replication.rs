@@ -1,0 +1,111 @@
+//! Replication: `=` stands for the field of the card above, `*(x)` for that field and x more, `==` for all fields
+//! from there on; `=(n)` repeats the line above it n times.
+
+use super::{Card, Line, fixed_fields, free_fields, whole};
+use crate::coordinates::real;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+
+/// Cards that one line may stand for.
+const MOST_REPEATED: i64 = 1_000_000;
+
+/// Change of a field from card to card.
+#[derive(Clone)]
+enum Change {
+    Same,
+    /// Adds a number.
+    More(Vec<u8>),
+    /// Has this text.
+    Text(Vec<u8>),
+}
+
+/// Changes that a line of replication makes to the card above it.
+#[derive(Clone, Default)]
+pub(super) struct Replication {
+    changes: Vec<Change>,
+}
+
+/// Request of a line that begins with `=`.
+pub(super) enum Asked {
+    /// A card.
+    One(Replication),
+    /// Cards to make, each by the replication before.
+    Repeat(i64),
+}
+
+impl Replication {
+    /// Reads a line; `None` of one that does not begin with `=`.
+    ///
+    /// # Errors
+    /// FB110 for counts that are none, and fields beyond the line.
+    pub(super) fn asked(line: &Line<'_>) -> Result<Option<Asked>, Diagnostic> {
+        let Some(rest) = line.head().strip_prefix(b"=") else { return Ok(None) };
+        if !rest.is_empty() && rest != b"=" {
+            let count = whole(without_brackets(rest)).filter(|count| (1..=MOST_REPEATED).contains(count));
+            let message = "expected a number of repetitions, as in =(4)";
+            return count.map(|count| Some(Asked::Repeat(count))).ok_or_else(|| bad(message));
+        }
+        let mut given = Card::default();
+        match line.is_free {
+            true => free_fields(&mut given, &line.text, 8)?,
+            false => fixed_fields(&mut given, &line.text, 8),
+        }
+        let mut changes = Vec::new();
+        let mut all_same = rest == b"=";
+        for k in 0..8 {
+            let field = given.field(k);
+            all_same |= field == b"==";
+            changes.push(match field {
+                _ if all_same => Change::Same,
+                b"=" => Change::Same,
+                [b'*', more @ ..] => Change::More(without_brackets(more).to_vec()),
+                text => Change::Text(text.to_vec()),
+            });
+        }
+        Ok(Some(Asked::One(Self { changes })))
+    }
+
+    /// The card that follows `card`.
+    ///
+    /// # Errors
+    /// FB110 if there is no card of one line to follow, or a field is no number to add to.
+    pub(super) fn next(&self, card: &Card) -> Result<Card, Diagnostic> {
+        if card.name.is_empty() || self.changes.is_empty() {
+            return Err(bad("there is no card above to replicate"));
+        }
+        if card.lines.len() != 1 || card.name == "DMIG" {
+            let message = format!("replication of a {} with continuations is not read", card.name);
+            return Err(bad(&message).with_help("write the cards one by one"));
+        }
+        let mut next = Card::default();
+        next.begin(card.name.clone());
+        for (k, change) in self.changes.iter().enumerate() {
+            let field = match change {
+                Change::Same => card.field(k).to_vec(),
+                Change::Text(text) => text.clone(),
+                Change::More(more) => sum(card.field(k), more).ok_or_else(|| {
+                    bad(&format!("field {} of the {} is no number to add to", k + 1, card.name))
+                })?,
+            };
+            next.push(&field);
+        }
+        Ok(next)
+    }
+}
+
+/// Two numbers added, as a field has them.
+fn sum(field: &[u8], more: &[u8]) -> Option<Vec<u8>> {
+    let field: &[u8] = if field.is_empty() { b"0" } else { field };
+    if let (Some(a), Some(b)) = (whole(field), whole(more)) {
+        return Some(a.checked_add(b)?.to_string().into_bytes());
+    }
+    let sum = real(field)? + real(more)?;
+    sum.is_finite().then(|| format!("{sum:e}").into_bytes())
+}
+
+fn without_brackets(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"(").and_then(|text| text.strip_suffix(b")")).unwrap_or(text).trim_ascii()
+}
+
+fn bad(message: &str) -> Diagnostic {
+    Diagnostic::new(Code::DeckSyntax, message)
+}

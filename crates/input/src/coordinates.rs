@@ -1,0 +1,172 @@
+//! Lines `row column value`: the body of Matrix Market files, and all of what some FE programs write.
+//!
+//! The text is cut at line ends into pieces that are parsed in parallel; pieces keep the order of the file.
+
+use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
+use super::digits::{COUNTED, written_digits};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::text::compression::{Compression, broken};
+use rayon::prelude::*;
+use std::io::Read;
+use std::path::Path;
+
+mod line;
+mod text;
+
+use line::BadLine;
+pub(crate) use line::{Limits, real};
+pub(crate) use text::{Blocks, line_aligned, lines, most_entries};
+
+/// Number of bad lines that are reported one by one.
+const SHOWN: usize = 5;
+
+/// The entries of a file, and what is wrong with its lines.
+pub(super) struct Coordinates {
+    limits: Limits,
+    /// Number of entries that the file announces, if it does.
+    announced: Option<u64>,
+    /// The entries in file order.
+    pub pieces: Vec<Vec<Entry>>,
+    /// Data lines so far, bad ones included.
+    pub count: u64,
+    /// True if reading ended at an entry too many.
+    pub stopped: bool,
+    /// Lines of the file so far.
+    lines: usize,
+    bad: Vec<BadLine>,
+    bad_count: usize,
+    /// First line with an entry below the diagonal.
+    pub lower: Option<usize>,
+    /// First line with an entry above the diagonal.
+    pub upper: Option<usize>,
+    /// Largest number of significant digits of a value as written.
+    pub written: u8,
+}
+
+impl Coordinates {
+    /// Nothing yet, below so many `lines` of a header.
+    pub(super) fn new(limits: Limits, announced: Option<u64>, lines: usize) -> Self {
+        Self {
+            limits,
+            announced,
+            pieces: Vec::new(),
+            count: 0,
+            stopped: false,
+            lines,
+            bad: Vec::new(),
+            bad_count: 0,
+            lower: None,
+            upper: None,
+            written: 0,
+        }
+    }
+
+    /// Reads the rest of a file: what follows the first `skip` bytes of the block `first`, and all `blocks`
+    /// after it. Says whether the file ends with a line end.
+    ///
+    /// # Errors
+    /// FB103 for a compressed file that is damaged.
+    pub(super) fn read(
+        &mut self,
+        path: &Path,
+        mut blocks: Blocks<'_>,
+        first: Vec<u8>,
+        skip: usize,
+    ) -> Result<bool, Vec<Diagnostic>> {
+        let (mut block, mut skip) = (first, skip);
+        loop {
+            // The next block is read and unpacked while this one is parsed.
+            let (following, ()) = rayon::join(|| blocks.next(), || self.parse(&block[skip..]));
+            let following = following.map_err(|e| vec![broken(path, &e)]);
+            if self.is_too_much()? && !matches!(following, Ok(None)) {
+                self.stopped = true;
+                return Ok(true);
+            }
+            match following? {
+                Some(following) => blocks.take_back(std::mem::replace(&mut block, following)),
+                None => return Ok(blocks.ends_with_newline()),
+            }
+            skip = 0;
+        }
+    }
+
+    /// True if there are more entries than the file announces, or than any matrix of its rows has.
+    ///
+    /// # Errors
+    /// FB601 where the number of entries is not announced, and those that were read leave no memory for others.
+    fn is_too_much(&self) -> Result<bool, Vec<Diagnostic>> {
+        if let Some(announced) = self.announced {
+            return Ok(self.count > announced);
+        }
+        let (n, entries) = (u64::from(self.limits.n), self.count - self.bad_count as u64);
+        let fits = check_size(n, n, entries.max(n)).and_then(|_| refuse_beyond_memory(entries));
+        fits.map(|()| false).map_err(|diagnostic| vec![diagnostic])
+    }
+
+    fn parse(&mut self, block: &[u8]) {
+        let pieces: Vec<&[u8]> = line_aligned(block).collect();
+        let parsed: Vec<line::Piece> =
+            pieces.into_par_iter().map(|piece| line::parse(piece, self.limits)).collect();
+        for piece in parsed {
+            let before = self.lines;
+            self.count += (piece.entries.len() + piece.bad_count) as u64;
+            self.bad_count += piece.bad_count;
+            let room = SHOWN.saturating_sub(self.bad.len());
+            self.bad.extend(piece.bad.into_iter().take(room).map(|b| BadLine { line: b.line + before, ..b }));
+            self.lower = self.lower.or(piece.lower.map(|line| line + before));
+            self.upper = self.upper.or(piece.upper.map(|line| line + before));
+            self.written = self.written.max(piece.written);
+            self.lines += piece.lines;
+            // A compressed file may hold any number of lines: keep no more than the header announces.
+            if self.announced.is_none_or(|announced| self.count <= announced) {
+                let mut entries = piece.entries;
+                // Lines without an entry leave room that is not needed.
+                if entries.capacity() > 2 * entries.len() {
+                    entries.shrink_to_fit();
+                }
+                if !entries.is_empty() {
+                    self.pieces.push(entries);
+                }
+            } else {
+                self.pieces.clear();
+            }
+        }
+    }
+
+    /// On which sides of the diagonal entries lie.
+    pub(super) fn sides(&self) -> Sides {
+        Sides { lower: self.lower.is_some(), upper: self.upper.is_some() }
+    }
+
+    /// The bad lines, the first few one by one.
+    pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
+        let more = self.bad_count - self.bad.len();
+        let told = |(k, bad): (usize, &BadLine)| {
+            let mut message = bad.message.clone();
+            if bad.line == self.lines && !ends_with_newline {
+                message += "; it is the last line and has no line end: the file may be cut off";
+            }
+            if k + 1 == SHOWN && more > 0 {
+                message += &format!(" ({more} more lines are bad)");
+            }
+            let diagnostic = Diagnostic::new(bad.code, message).at_line(bad.line);
+            match bad.help {
+                Some(help) => diagnostic.with_help(help),
+                None => diagnostic,
+            }
+        };
+        self.bad.iter().enumerate().map(told).collect()
+    }
+}
+
+/// A line, or its begin, printable.
+pub(crate) fn excerpt(line: &[u8]) -> String {
+    const SHOWN: usize = 60;
+    match std::str::from_utf8(line) {
+        Ok(text) if text.len() <= SHOWN && !text.contains(|c: char| c.is_control() && c != '\t') => {
+            text.to_owned()
+        }
+        _ if line.len() <= SHOWN => line.escape_ascii().to_string(),
+        _ => format!("{}...", line[..SHOWN].escape_ascii()),
+    }
+}

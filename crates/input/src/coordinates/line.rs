@@ -1,0 +1,249 @@
+//! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect
+//! and says what is wrong.
+
+use super::{COUNTED, Entry, excerpt, most_entries, written_digits};
+use flexbody_base::diagnostic::Code;
+
+/// What the header says about every line.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Limits {
+    pub n: u32,
+    pub integer: bool,
+}
+
+/// A line that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct BadLine {
+    /// From 1, counted from the first line of the piece (later: of the file).
+    pub line: usize,
+    pub code: Code,
+    pub message: String,
+    pub help: Option<&'static str>,
+}
+
+/// A parsed piece of the file.
+#[derive(Debug, Default)]
+pub(super) struct Piece {
+    pub entries: Vec<Entry>,
+    pub lines: usize,
+    /// The first few bad lines, and how many there are.
+    pub bad: Vec<BadLine>,
+    pub bad_count: usize,
+    /// First line (from 1) with a nonzero entry below, above the diagonal.
+    pub lower: Option<usize>,
+    pub upper: Option<usize>,
+    /// Largest number of significant digits of a value as written, of the first entries of the piece.
+    pub written: u8,
+}
+
+/// Parses whole lines.
+pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
+    let mut piece = Piece { entries: Vec::with_capacity(most_entries(text)), ..Piece::default() };
+    let mut at = 0;
+    while at < text.len() {
+        piece.lines += 1;
+        at = skip_blanks(text, at);
+        if let Some((entry, number, next)) = fast(text, at, limits) {
+            piece.push(entry, number);
+            at = next;
+            continue;
+        }
+        let end = text[at..].iter().position(|&b| b == b'\n').map_or(text.len(), |length| at + length);
+        let line = text[at..end].trim_ascii();
+        if !line.is_empty() && line[0] != b'%' {
+            match slow(line, limits) {
+                Ok((entry, number)) => piece.push(entry, number),
+                Err((code, message, help)) => {
+                    piece.bad_count += 1;
+                    if piece.bad.len() < super::SHOWN {
+                        piece.bad.push(BadLine { line: piece.lines, code, message, help });
+                    }
+                }
+            }
+        }
+        at = end + 1;
+    }
+    piece
+}
+
+impl Piece {
+    fn push(&mut self, entry: Entry, number: &[u8]) {
+        if self.entries.len() < COUNTED && entry.value != 0.0 {
+            self.written = self.written.max(written_digits(number));
+        }
+        if entry.row != entry.col && entry.value != 0.0 {
+            let side = if entry.row > entry.col { &mut self.lower } else { &mut self.upper };
+            side.get_or_insert(self.lines);
+        }
+        self.entries.push(entry);
+    }
+}
+
+/// `row col value` with single-line blanks, plain exponents and a line end; else `None`. Also gives the
+/// number as written and where the next line begins.
+fn fast(text: &[u8], at: usize, limits: Limits) -> Option<(Entry, &[u8], usize)> {
+    let (row, at) = fast_index(text, at, limits.n)?;
+    let (col, at) = fast_index(text, at, limits.n)?;
+    let (value, length) = fast_float2::parse_partial::<f64, _>(&text[at..]).ok()?;
+    let end = skip_blanks(text, at + length);
+    if !value.is_finite()
+        || text.get(end).is_some_and(|&b| b != b'\n')
+        || (limits.integer && value.fract() != 0.0)
+    {
+        return None;
+    }
+    Some((Entry { row, col, value }, &text[at..at + length], end + 1))
+}
+
+/// An index from 1 to n with blanks after it, given from 0.
+fn fast_index(text: &[u8], start: usize, n: u32) -> Option<(u32, usize)> {
+    let (mut index, mut at) = (0u64, start);
+    while let Some(digit @ b'0'..=b'9') = text.get(at) {
+        index = index * 10 + u64::from(digit - b'0');
+        at += 1;
+        if at - start > 10 {
+            return None;
+        }
+    }
+    let next = skip_blanks(text, at);
+    (next > at && index >= 1 && index <= u64::from(n)).then(|| (index as u32 - 1, next))
+}
+
+fn skip_blanks(text: &[u8], mut at: usize) -> usize {
+    while matches!(text.get(at), Some(b' ' | b'\t' | b'\r')) {
+        at += 1;
+    }
+    at
+}
+
+type Bad = (Code, String, Option<&'static str>);
+
+/// A line with content, trimmed.
+fn slow(line: &[u8], limits: Limits) -> Result<(Entry, &[u8]), Bad> {
+    let content = line.split(|&b| b == b'%').next().unwrap_or(line); // a comment may follow the value
+    let fields: Vec<&[u8]> =
+        content.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty()).take(5).collect();
+    let &[row, col, number] = fields.as_slice() else {
+        let message = format!("expected row, column and value, found `{}`", excerpt(line));
+        return Err((Code::MatrixSyntax, message, None));
+    };
+    let (row, col) = (index(row, "row", limits.n)?, index(col, "column", limits.n)?);
+    let value = real(number).ok_or_else(|| {
+        let help = number.contains(&b',').then_some("write numbers with a decimal point");
+        (Code::MatrixSyntax, format!("value `{}` is not a number", excerpt(number)), help)
+    })?;
+    let place = format!("entry ({}, {})", row + 1, col + 1);
+    if !value.is_finite() {
+        return Err((Code::MatrixNotFinite, format!("{place} is `{}`", excerpt(number)), None));
+    }
+    if limits.integer && value.fract() != 0.0 {
+        let message = format!("{place} is `{}` in a matrix declared integer", excerpt(number));
+        return Err((
+            Code::MatrixSyntax,
+            message,
+            Some("write `real` instead of `integer` in the first line"),
+        ));
+    }
+    Ok((Entry { row, col, value }, number))
+}
+
+fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Bad> {
+    let text = std::str::from_utf8(field).ok();
+    match text.and_then(|t| t.parse::<i128>().ok()) {
+        Some(index) if index >= 1 && index <= i128::from(n) => Ok((index - 1) as u32),
+        Some(index) => {
+            Err((Code::MatrixIndex, format!("{which} {index} is out of range, expected 1 to {n}"), None))
+        }
+        None => {
+            Err((Code::MatrixSyntax, format!("{which} `{}` is not a whole number", excerpt(field)), None))
+        }
+    }
+}
+
+/// A number in the dialects of Fortran too: `1.0D+05`, `1.0Q5`, and `1.0-105` as three-digit exponents come
+/// out.
+pub(crate) fn real(field: &[u8]) -> Option<f64> {
+    // Nothing but the digits of the exponent stands behind its letter.
+    let letter = field.iter().rposition(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-'));
+    let letter = letter.filter(|&at| matches!(field[at], b'd' | b'D' | b'q' | b'Q'));
+    if letter.is_none()
+        && let Ok(value) = fast_float2::parse(field)
+    {
+        return Some(value);
+    }
+    let (mut short, mut long) = ([0; 64], Vec::new());
+    let text = match short.get_mut(..=field.len()) {
+        Some(text) => text,
+        None => {
+            long.resize(field.len() + 1, 0);
+            &mut long[..]
+        }
+    };
+    text[..field.len()].copy_from_slice(field);
+    if let Some(letter) = letter {
+        text[letter] = b'e';
+        return fast_float2::parse(&text[..field.len()]).ok();
+    }
+    let sign = (1..field.len()).find(|&k| matches!(field[k], b'+' | b'-'))?;
+    if !matches!(field[sign - 1], b'0'..=b'9' | b'.') {
+        return None;
+    }
+    text.copy_within(sign..field.len(), sign + 1);
+    text[sign] = b'e';
+    fast_float2::parse(&text[..]).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LIMITS: Limits = Limits { n: 9, integer: false };
+
+    #[test]
+    fn numbers_in_every_dialect() {
+        for (text, value) in [
+            ("1.0D+05", 1e5),
+            ("1.0d5", 1e5),
+            ("-1.5Q-3", -1.5e-3),
+            ("+2.5e+1", 25.0),
+            ("1.25-105", 1.25e-105),
+            ("-.5+003", -500.0),
+            (".5", 0.5),
+            ("5.", 5.0),
+        ] {
+            assert_eq!(real(text.as_bytes()), Some(value), "{text}");
+        }
+        for text in ["", "D", "1.0D", "1,5", "--1", "1e5e5", "0x10", "1_000", "+", "1-", "e5", "1.5-2-3"] {
+            assert_eq!(real(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn the_fast_and_the_slow_path_agree() {
+        for text in ["1 2 3.5", "9 9 -1e-3", "3 1 0", "4 4 +7", "5 6 1E300"] {
+            let (entry, number, next) = fast(text.as_bytes(), 0, LIMITS).expect(text);
+            assert_eq!(slow(text.as_bytes(), LIMITS).expect(text), (entry, number));
+            assert_eq!(next, text.len() + 1);
+        }
+    }
+
+    #[test]
+    fn the_fast_path_never_reads_into_the_next_line() {
+        for text in
+            ["1 2\n3 4 5\n", "1\n2 3 4\n", "1 2 3 4\n", "1 2 1e999\n", "0 1 1\n", "10 1 1\n", "1 2 nan\n"]
+        {
+            assert!(fast(text.as_bytes(), 0, LIMITS).is_none(), "{text:?}");
+        }
+    }
+
+    #[test]
+    fn bad_lines_are_numbered_and_counted() {
+        let piece =
+            parse(b"% c\n1 1 1\n\n1 2\nx 1 1\n2 2 nan\n1 0 1 % c\n3 3 1 %c\n1 1 1 1\n4 4 z\n", LIMITS);
+        assert_eq!(piece.entries.len(), 2);
+        assert_eq!((piece.lines, piece.bad_count, piece.bad.len()), (10, 6, 5));
+        assert_eq!(piece.bad.iter().map(|b| b.line).collect::<Vec<_>>(), [4, 5, 6, 7, 9]);
+        assert_eq!(piece.bad[2].code, Code::MatrixNotFinite);
+        assert_eq!(piece.bad[3].code, Code::MatrixIndex);
+    }
+}

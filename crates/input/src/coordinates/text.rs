@@ -1,0 +1,143 @@
+//! Text in blocks that end at line ends, so that no more of a file than two blocks need be in memory.
+
+use super::{Compression, Read};
+use flexbody_base::text::input_file::InputFile;
+
+/// Bytes per block. Larger blocks would be fresh pages each time.
+const BLOCK: usize = 8 << 20;
+
+/// Bytes that the first block has at the begin: it grows with what there is, for most files are small.
+const FIRST_BLOCK: usize = 1 << 16;
+
+/// Factor by which the first block grows. The allocator keeps the smaller blocks: doubling would leave as much as the
+/// largest once more.
+const GROWTH: usize = 16;
+
+/// Bytes per piece that one thread parses.
+const PIECE: usize = 1 << 20;
+
+/// Gives a text block by block.
+pub(crate) struct Blocks<'a> {
+    stream: Box<dyn Read + Send + 'a>,
+    /// Begin of the next line, which was read with the last block.
+    carry: Vec<u8>,
+    /// Memory of a block that is not needed any more.
+    spare: Vec<u8>,
+    newline: bool,
+}
+
+impl<'a> Blocks<'a> {
+    /// The unpacked text of a file.
+    pub(crate) fn of(file: &'a InputFile, compression: Compression) -> Self {
+        Self::new(compression.stream_of(file))
+    }
+
+    fn new(stream: Box<dyn Read + Send + 'a>) -> Self {
+        Self { stream, carry: Vec::new(), spare: Vec::new(), newline: true }
+    }
+
+    /// The next block: it ends at a line end, or at the end of the file, or (a line longer than a block)
+    /// anywhere.
+    pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
+        let mut block = std::mem::take(&mut self.spare);
+        let (mut filled, mut ends) = (self.carry.len(), false);
+        block.resize(block.len().clamp(FIRST_BLOCK.max(filled), BLOCK.max(filled)), 0);
+        block[..filled].copy_from_slice(&self.carry);
+        self.carry.clear();
+        while !ends && filled < BLOCK {
+            if filled == block.len() {
+                block.resize((GROWTH * filled).min(BLOCK), 0);
+            }
+            let count = self.stream.read(&mut block[filled..])?;
+            filled += count;
+            ends = count == 0;
+        }
+        let end = whole_lines(&block[..filled], ends);
+        self.carry.extend_from_slice(&block[end..filled]);
+        block.truncate(end);
+        let Some(&last) = block.last() else { return Ok(None) };
+        self.newline = last == b'\n';
+        Ok(Some(block))
+    }
+
+    /// Takes the memory of a block that is not needed any more.
+    pub(crate) fn take_back(&mut self, block: Vec<u8>) {
+        self.spare = block;
+    }
+
+    /// Whether what was given so far ends with a line end.
+    pub(crate) fn ends_with_newline(&self) -> bool {
+        self.newline
+    }
+}
+
+/// Length of the whole lines of a block; all of it when it ends the file or has no line end.
+fn whole_lines(block: &[u8], ends_file: bool) -> usize {
+    match block.iter().rposition(|&b| b == b'\n') {
+        Some(at) if !ends_file => at + 1,
+        _ => block.len(),
+    }
+}
+
+/// The lines of a text, trimmed.
+pub(crate) fn lines(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let mut rest = text;
+    std::iter::from_fn(move || {
+        let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |at| at + 1);
+        let (line, after) = rest.split_at(end);
+        rest = after;
+        (!line.is_empty()).then(|| line.trim_ascii())
+    })
+}
+
+/// The most entries that a text has: one in each line, of which `1 1 1` is the shortest. Entries are held until
+/// all are there, so that they have no more room than they need.
+pub(crate) fn most_entries(text: &[u8]) -> usize {
+    (memchr::memchr_iter(b'\n', text).count() + 1).min(text.len() / 6 + 1)
+}
+
+/// Cuts a block at line ends into pieces of about [`PIECE`] bytes.
+pub(crate) fn line_aligned(block: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let mut rest = block;
+    std::iter::from_fn(move || {
+        if rest.is_empty() {
+            return None;
+        }
+        let target = PIECE.min(rest.len());
+        let end = rest[target..].iter().position(|&b| b == b'\n').map_or(rest.len(), |at| target + at + 1);
+        let (piece, after) = rest.split_at(end);
+        rest = after;
+        Some(piece)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_and_blocks_put_together_are_the_text_and_end_at_lines() {
+        let mut text = String::new();
+        for k in 0..3_000_000u32 {
+            text += &format!("{k} {k} {k}.5\n");
+        }
+        text += "no line end";
+        assert!(text.len() > 2 * BLOCK, "more than two blocks");
+        let packed =
+            ruzstd::encoding::compress_to_vec(text.as_bytes(), ruzstd::encoding::CompressionLevel::Fastest);
+        for (compression, bytes) in [(Compression::None, text.as_bytes()), (Compression::Zstd, &packed)] {
+            let mut blocks = Blocks::new(compression.stream(bytes));
+            let mut at = 0;
+            while let Some(block) = blocks.next().unwrap() {
+                for piece in line_aligned(&block) {
+                    assert!(text.as_bytes()[at..].starts_with(piece));
+                    at += piece.len();
+                    assert!(piece.ends_with(b"\n") || at == text.len());
+                }
+                blocks.take_back(block);
+            }
+            assert_eq!(at, text.len());
+            assert!(!blocks.ends_with_newline());
+        }
+    }
+}

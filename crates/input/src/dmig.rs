@@ -1,0 +1,434 @@
+//! DMIG cards of Nastran: matrices whose entries name the grids and components of their rows and columns.
+
+mod columns;
+
+use super::assemble::{Entry, Sides, Storage, assemble_distinct, check_size, push, undeclared_triangle};
+use super::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
+use super::nastran_names::choose;
+use super::reader::{MatrixSource, Reader};
+use columns::{Columns, Heads};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result as Outcome};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::SeenFile;
+use flexbody_model::{DofLabel, RawMatrix};
+use rayon::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+pub(super) use columns::Point;
+
+/// Bad cards that are told one by one.
+const SHOWN: usize = 5;
+
+/// Form of rectangular matrices, such as loads.
+const RECTANGULAR: i64 = 9;
+
+/// All matrices of a deck.
+#[derive(Default)]
+pub(super) struct Dmigs {
+    matrices: Vec<Dmig>,
+    points: Vec<Point>,
+    numbers: HashMap<Point, u32>,
+    bad: Vec<Diagnostic>,
+    /// Files that were read for these matrices alone, without those that they include.
+    pub files: Vec<SeenFile>,
+}
+
+struct Dmig {
+    name: String,
+    form: i64,
+    /// 1, 2: real numbers; complex ones are passed over.
+    kind: i64,
+    path: PathBuf,
+    line: usize,
+    /// In the order of the deck. Row and column are numbers of points.
+    pieces: Vec<Vec<Entry>>,
+    written: u8,
+}
+
+impl Dmig {
+    fn is_real(&self) -> bool {
+        matches!(self.kind, 1 | 2)
+    }
+
+    fn count(&self) -> u64 {
+        self.pieces.iter().map(|piece| piece.len() as u64).sum()
+    }
+}
+
+impl Dmigs {
+    /// Those of some files.
+    ///
+    /// # Errors
+    /// FB101, FB106, FB110, FB301, FB302, as many as are found.
+    pub(super) fn of(paths: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
+        let mut all = Self::default();
+        for path in paths {
+            let read = read_deck(path, &mut |item| match item {
+                Item::Card(card, path) if card.name == "DMIG" => {
+                    all.card(card, path);
+                    Ok(())
+                }
+                Item::Matrices(lines) => all.cards(lines),
+                _ => Ok(()),
+            });
+            all.files.extend(read.map_err(|diagnostic| vec![diagnostic])?.into_iter().take(1));
+        }
+        let bad = all.take_bad();
+        if bad.is_empty() { Ok(all) } else { Err(bad) }
+    }
+
+    /// Takes a DMIG card.
+    pub(super) fn card(&mut self, card: &Card, path: &Path) {
+        match card.field(1) {
+            b"0" => {
+                let bad = self.header(card, path).err();
+                self.complain(bad);
+            }
+            _ => {
+                let heads = self.heads();
+                let mut columns = Columns::of(0);
+                columns.card(card, path, &heads);
+                self.take(vec![columns]);
+            }
+        }
+    }
+
+    /// Takes DMIG cards that stand one below the other. Those of columns are read in parallel, some at a
+    /// time, and put together in the order of the file.
+    ///
+    /// # Errors
+    /// FB110.
+    pub(super) fn cards(&mut self, lines: &MatrixLines<'_>) -> Result<(), Diagnostic> {
+        let (bytes, path) = (lines.file.bytes(), lines.file.path());
+        let at_once = 8 * rayon::current_num_threads();
+        for parts in lines.parts.chunk_by(|a, b| a.is_header == b.is_header).flat_map(|p| p.chunks(at_once)) {
+            if parts[0].is_header {
+                for part in parts {
+                    read_cards(&bytes[part.bytes.clone()], path, part.above, &mut |card| {
+                        self.card(card, path);
+                        Ok(())
+                    })?;
+                }
+                continue;
+            }
+            let heads = self.heads();
+            let read = parts.par_iter().map(|part| {
+                let mut columns = Columns::of(part.bytes.len());
+                read_cards(&bytes[part.bytes.clone()], path, part.above, &mut |card| {
+                    columns.card(card, path, &heads);
+                    Ok(())
+                })?;
+                Ok(columns)
+            });
+            let read: Vec<Result<Columns, Diagnostic>> = read.collect();
+            self.take(read.into_iter().collect::<Result<_, _>>()?);
+        }
+        Ok(())
+    }
+
+    /// What columns have to know of the headers above them.
+    fn heads(&self) -> Heads {
+        self.matrices.iter().map(|matrix| (matrix.name.clone(), matrix.is_real())).collect()
+    }
+
+    /// Takes columns that follow those that were taken.
+    fn take(&mut self, all: Vec<Columns>) {
+        let places: Vec<Vec<u32>> = all
+            .iter()
+            .map(|columns| columns.points.iter().map(|point| self.number(*point)).collect())
+            .collect();
+        let numbered = all.into_par_iter().zip(places).map(|(columns, place)| columns.numbered(&place));
+        let numbered: Vec<Columns> = numbered.collect();
+        for columns in numbered {
+            for (matrix, entries, written) in columns.runs {
+                let own = &mut self.matrices[matrix];
+                own.written = own.written.max(written);
+                match entries.as_slice() {
+                    // Columns that come one by one.
+                    few if few.len() < 1 << 10 => few.iter().for_each(|entry| push(&mut own.pieces, *entry)),
+                    _ => own.pieces.push(entries),
+                }
+            }
+            columns.bad.into_iter().for_each(|bad| self.complain(Some(bad)));
+        }
+    }
+
+    fn complain(&mut self, bad: Option<Diagnostic>) {
+        self.bad.extend(bad.filter(|_| self.bad.len() < SHOWN));
+    }
+
+    /// The number of a point.
+    fn number(&mut self, point: Point) -> u32 {
+        let next = self.points.len() as u32;
+        *self.numbers.entry(point).or_insert_with(|| {
+            self.points.push(point);
+            next
+        })
+    }
+
+    /// What is wrong with the cards.
+    pub(super) fn take_bad(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.bad)
+    }
+
+    /// Names of the matrices, in the order of the deck.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.matrices.iter().map(|matrix| matrix.name.clone()).collect()
+    }
+
+    /// The matrices that may be K or M: square ones with entries; all if there are none.
+    pub(super) fn candidates(&self) -> Vec<usize> {
+        // Entries of complex matrices are not kept.
+        let has_entries = |own: &Dmig| own.count() > 0 || !own.is_real();
+        let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && has_entries(&self.matrices[*k]);
+        let some: Vec<usize> = (0..self.matrices.len()).filter(is_one).collect();
+        if some.is_empty() { (0..self.matrices.len()).collect() } else { some }
+    }
+
+    /// The points that entries of some matrices which are not zero name, ascending.
+    pub(super) fn points(&self, of: &[usize]) -> Vec<Point> {
+        let mut named = vec![false; self.points.len()];
+        for entry in of.iter().flat_map(|&k| &self.matrices[k].pieces).flatten() {
+            if entry.value != 0.0 {
+                named[entry.row as usize] = true;
+                named[entry.col as usize] = true;
+            }
+        }
+        let mut points: Vec<Point> =
+            self.points.iter().zip(named).filter(|(_, named)| *named).map(|(point, _)| *point).collect();
+        points.sort_unstable();
+        points
+    }
+
+    /// A matrix with its rows in the order of `points`, which ascend and hold all that its entries name. Its
+    /// entries are taken out: it can be had once.
+    ///
+    /// # Errors
+    /// FB302 for matrices that are not square, FB307 for a triangle that is not declared, FB309 for entries
+    /// that are given twice, FB301, FB306, FB312.
+    pub(super) fn take_matrix(&mut self, k: usize, points: &[Point]) -> Result<RawMatrix, Diagnostic> {
+        let own = &mut self.matrices[k];
+        let (count, pieces) = (own.count(), std::mem::take(&mut own.pieces));
+        let own = &self.matrices[k];
+        let about = |diagnostic: Diagnostic| {
+            diagnostic.about(format!("DMIG {}", own.name)).in_file(&own.path).at_line(own.line)
+        };
+        if !own.is_real() {
+            let message = format!("type {} is complex", own.kind);
+            let help = "write real matrices, without structural damping";
+            return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help(help)));
+        }
+        let storage = match own.form {
+            1 | 2 | 9 => Storage::Full,
+            6 => Storage::Triangle,
+            other => {
+                let message = format!("form {other} is none of a symmetric matrix");
+                return Err(about(
+                    Diagnostic::new(Code::MatrixKind, message).with_help("forms are 1, 2, 6, 9"),
+                ));
+            }
+        };
+        let (pieces, sides) = self.in_rows(pieces, points);
+        let n = points.len() as u64;
+        if storage == Storage::Full
+            && let Some(triangle) = undeclared_triangle(sides, |_| "declare form 6 in the DMIG header".into())
+        {
+            return Err(about(triangle));
+        }
+        let n = check_size(n, n, count).map_err(about)?;
+        assemble_distinct(n, pieces, storage, own.written, &own.path, |row, column| {
+            let [row, column] = [row, column].map(|row| named(points[row as usize]));
+            let message = format!("the entry of {row} and {column} is given twice");
+            let help = "form 6 has one triangle; write the matrix again";
+            about(Diagnostic::new(Code::MatrixTriangles, message).with_help(help))
+        })
+    }
+
+    /// Entries without zeros whose rows and columns are places in `points` instead of numbers, and their
+    /// sides.
+    fn in_rows(&self, mut pieces: Vec<Vec<Entry>>, points: &[Point]) -> (Vec<Vec<Entry>>, Sides) {
+        let row_of = |point| points.binary_search(point).map_or(u32::MAX, |row| row as u32);
+        let row_of: Vec<u32> = self.points.par_iter().map(row_of).collect();
+        let place = |piece: &mut Vec<Entry>| {
+            let mut sides = Sides::default();
+            piece.retain_mut(|entry| {
+                (entry.row, entry.col) = (row_of[entry.row as usize], row_of[entry.col as usize]);
+                let is_kept = entry.value != 0.0 && entry.row != u32::MAX && entry.col != u32::MAX;
+                sides.lower |= is_kept && entry.row > entry.col;
+                sides.upper |= is_kept && entry.row < entry.col;
+                is_kept
+            });
+            sides
+        };
+        let either = |a: Sides, b: Sides| Sides { lower: a.lower | b.lower, upper: a.upper | b.upper };
+        let sides = pieces.par_iter_mut().map(place).reduce(Sides::default, either);
+        (pieces, sides)
+    }
+
+    fn header(&mut self, card: &Card, path: &Path) -> Result<(), Diagnostic> {
+        let name = columns::upper(card.field(0));
+        let syntax = |expected: &str| columns::bad_card(card, 0, path, format!("DMIG {name}: {expected}"));
+        let (Some(form), Some(kind)) = (card.integer(2), card.integer(3)) else {
+            return Err(syntax("expected 0, form, type of the input"));
+        };
+        if name.is_empty() {
+            return Err(syntax("the matrix has no name"));
+        }
+        if self.matrices.iter().any(|known| known.name == name) {
+            return Err(syntax("the matrix is given twice"));
+        }
+        let line = card.line();
+        self.matrices.push(Dmig {
+            name,
+            form,
+            kind,
+            path: path.to_path_buf(),
+            line,
+            pieces: Vec::new(),
+            written: 0,
+        });
+        Ok(())
+    }
+}
+
+/// Label of a row. Scalar points have one direction.
+pub(super) fn label((node, component): Point) -> DofLabel {
+    DofLabel { node, direction: component.max(1) }
+}
+
+fn named((id, component): Point) -> String {
+    match component {
+        0 => format!("scalar point {id}"),
+        _ => format!("grid {id} component {component}"),
+    }
+}
+
+/// The reader of matrices in punch files.
+pub(super) struct DmigPunch;
+
+impl Reader for DmigPunch {
+    fn name(&self) -> &'static str {
+        "DMIG punch"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["pch", "bdf"]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        is_bulk_data(head)
+    }
+
+    fn reads_by_itself(&self) -> bool {
+        true
+    }
+
+    /// Rows are the points that any matrix of the file names which may be one of K and M, ascending: not the
+    /// numbers of loads and other rectangular matrices.
+    fn read(&self, source: &MatrixSource<'_>) -> Outcome<RawMatrix> {
+        let path = source.file.path();
+        if source.compression != Compression::None {
+            let message = "file of Nastran is compressed as a whole";
+            let diagnostic = Diagnostic::new(Code::FileFormatUnknown, message).in_file(path);
+            return Err(diagnostic.with_help("unpack it").into());
+        }
+        let mut all = Dmigs::of(&[path.to_path_buf()]).map_err(Error::new)?;
+        let at = choose(&all.names(), source.role, source.group).map_err(|d| d.in_file(path))?;
+        let mut every = all.candidates();
+        every.push(at);
+        let points = all.points(&every);
+        Ok(all.take_matrix(at, &points)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write;
+
+    const NODES: i64 = 3000;
+    const BAND: i64 = 6;
+
+    /// Two matrices of chains in large fields, K and M one below the other.
+    fn punch() -> String {
+        let mut text = String::from("$ a comment\n");
+        for (name, scale) in [("KAAX", 1e9), ("MAAX", 1e-3)] {
+            writeln!(text, "DMIG    {name:8}{:8}{:8}{:8}", 0, 6, 2).expect("memory");
+            for node in 1..=NODES {
+                writeln!(text, "DMIG*   {name:16}{:16}{:16}", 7 * node, 1).expect("memory");
+                for other in node..=(node + BAND).min(NODES) {
+                    let value = format!("{:.9E}", scale * (node * other) as f64).replace('E', "D");
+                    writeln!(text, "*       {:16}{:16}{value:>16}", 7 * other, 1).expect("memory");
+                }
+            }
+        }
+        text
+    }
+
+    fn read(text: &str, threads: usize) -> Result<Vec<RawMatrix>, Vec<Diagnostic>> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("job.pch");
+        std::fs::write(&path, text).expect("written");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let mut all = Dmigs::of(&[path])?;
+            let points = all.points(&[0, 1]);
+            assert_eq!(points.len(), NODES as usize);
+            (0..2).map(|k| all.take_matrix(k, &points).map_err(|found| vec![found])).collect()
+        })
+    }
+
+    #[test]
+    fn matrices_of_many_parts_are_the_same_on_any_number_of_threads() {
+        let text = punch();
+        assert!(text.len() > 2 << 20, "more than two parts");
+        let [one, three] = [1, 3].map(|threads| read(&text, threads).expect("read"));
+        for ((one, three), scale) in one.iter().zip(&three).zip([1e9, 1e-3]) {
+            assert_eq!((&one.matrix, one.digits), (&three.matrix, three.digits));
+            assert!(one.matrix.is_symmetric());
+            for node in 1..=NODES {
+                for other in node..=(node + BAND).min(NODES) {
+                    let expected: f64 =
+                        format!("{:.9E}", scale * (node * other) as f64).parse().expect("a number");
+                    assert_eq!(one.matrix.get(other as usize - 1, node as usize - 1), expected);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bad_cards_are_told_with_their_lines_in_the_whole_file() {
+        let text = punch();
+        let mut lines: Vec<&str> = text.lines().collect();
+        let count = lines.len();
+        let first_entry =
+            |at: usize| (at..count).find(|k| lines[k - 1].starts_with("DMIG*")).expect("a card");
+        let bad = [3, count / 3, count / 2, 2 * count / 3, count - 20, count - 1].map(first_entry);
+        let line = format!("*       {:16}{:16}{:>16}", 7, 9, 1.0);
+        bad.iter().for_each(|at| lines[*at] = &line);
+        for threads in [1, 3] {
+            let found = read(&(lines.join("\n") + "\n"), threads).expect_err("refused");
+            let at: Vec<_> = found.iter().map(Diagnostic::line).collect();
+            // The first five.
+            assert_eq!(at, [0, 1, 2, 3, 4].map(|k| Some(bad[k] + 1)), "{found:?}");
+        }
+        let cut_off = read(text.trim_end(), 2).expect_err("refused");
+        assert_eq!((cut_off.len(), cut_off[0].line()), (1, Some(text.lines().count())), "{cut_off:?}");
+    }
+
+    #[test]
+    fn continuations_of_another_card_are_told_with_their_lines() {
+        let text = punch();
+        let lines: Vec<&str> = text.lines().collect();
+        let (above, last) = (lines[lines.len() - 2], lines[lines.len() - 1]);
+        let with = |name: &str| {
+            let end = format!("{above:<72}*C1     \n{name:<8}{}\n", &last[8..]);
+            read(&(lines[..lines.len() - 2].join("\n") + "\n" + &end), 2)
+        };
+        assert_eq!(with("*C1").expect("read").len(), 2);
+        let found = with("*C2").expect_err("refused");
+        assert_eq!((found[0].code(), found[0].line()), (Code::DeckSyntax, Some(lines.len())), "{found:?}");
+    }
+}

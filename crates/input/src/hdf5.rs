@@ -1,0 +1,153 @@
+//! Sparse matrices in HDF5 files: opening, and finding the group that holds the matrix.
+
+use super::named_matrices::NamedMatrices;
+use super::reader::{MatrixRole, MatrixSource, Reader};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::hdf5_file::{by_utf8_name, without_plugins};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::{InputFile, is_hdf5};
+use flexbody_model::RawMatrix;
+use hdf5_metno::{File, Group};
+
+mod array;
+mod exodus;
+mod group;
+mod members;
+mod values;
+
+pub(super) use array::read_array;
+pub(super) use exodus::read_exodus;
+use members::Members;
+use values::Found;
+
+/// The HDF5 reader.
+pub(super) struct Hdf5;
+
+const NAMES: NamedMatrices = NamedMatrices { holder: "group", file: "FILE.h5", matrices: "sparse matrices" };
+
+/// Groups that are searched at most, and how deep: a file must not keep us busy.
+const GROUPS: usize = 1000;
+const DEPTH: usize = 6;
+
+impl Reader for Hdf5 {
+    fn name(&self) -> &'static str {
+        "HDF5"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["h5", "hdf5", "hdf", "h5ad"]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        is_hdf5(head)
+    }
+
+    fn reads_by_itself(&self) -> bool {
+        true
+    }
+
+    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+        let path = source.file.path();
+        let read = || {
+            if source.compression != Compression::None {
+                let message = "HDF5 file is compressed as a whole";
+                let help = "unpack it: HDF5 compresses inside the file";
+                return Err(vec![Diagnostic::new(Code::FileFormatUnknown, message).with_help(help)]);
+            }
+            let file = opened(source.file)?;
+            let (name, group) = match source.group {
+                Some(name) => (name.to_owned(), named(&file, name)?),
+                None => search(&file, source.role)?,
+            };
+            group::read(&group, &name, source)
+        };
+        read().map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))
+    }
+}
+
+/// Opens a file by the HDF5 library, which loads no plugins.
+fn opened(file: &InputFile) -> Found<File> {
+    without_plugins();
+    by_utf8_name(file.path(), |path| File::open(path)).map_err(|e| {
+        let message = format!("HDF5 file cannot be opened: {e}");
+        vec![Diagnostic::new(Code::FileUnreadable, message).with_help("transfer or write the file again")]
+    })
+}
+
+/// The group that the user named.
+fn named(file: &File, name: &str) -> Found<Group> {
+    let mut group = file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])?;
+    for part in name.split('/').filter(|part| !part.is_empty()) {
+        if Members::of(&group).is_elsewhere(part) {
+            let message =
+                format!("`{part}` of group `{name}` is a soft or external link, which is not followed");
+            return Err(vec![
+                layout(message).with_help("name the group that it leads to, in the file that holds it"),
+            ]);
+        }
+        group = group.group(part).map_err(|_| {
+            let what =
+                if group.dataset(part).is_ok() { "is a dataset, not a group" } else { "is not in the file" };
+            vec![layout(format!("group `{name}`: `{part}` {what}")).with_help(listing(&matrices(file)))]
+        })?;
+    }
+    if Members::of(&group).look_like_a_matrix() {
+        return Ok(group);
+    }
+    let message = format!("group `{name}` holds no sparse matrix");
+    Err(vec![layout(message).with_help(listing(&matrices(file)))])
+}
+
+/// The only matrix of the file, or the only one named after its role.
+fn search(file: &File, role: MatrixRole) -> Found<(String, Group)> {
+    let mut found = matrices(file);
+    if found.is_empty() {
+        return Err(vec![layout("file holds no sparse matrix".into())]);
+    }
+    let chosen = NAMES.choose(&names(&found), role).map_err(|diagnostic| vec![diagnostic])?;
+    Ok(found.swap_remove(chosen))
+}
+
+/// Names and groups of all sparse matrices of the file, breadth first.
+fn matrices(file: &File) -> Vec<(String, Group)> {
+    let mut found = Vec::new();
+    let mut level: Vec<(String, Group)> =
+        file.group("/").map(|root| (String::new(), root)).into_iter().collect();
+    let mut visited = 0;
+    for _ in 0..DEPTH {
+        let mut next = Vec::new();
+        for (name, group) in level {
+            let members = Members::of(&group);
+            if members.look_like_a_matrix() {
+                let name = if name.is_empty() { "/".to_owned() } else { name };
+                found.push((name, group));
+                continue;
+            }
+            // MATLAB keeps its own things in groups that begin with `#`.
+            for child in members.hard_links().filter(|child| !child.starts_with('#')) {
+                visited += 1;
+                if visited > GROUPS {
+                    return found;
+                }
+                if let Ok(inner) = group.group(child) {
+                    next.push((format!("{name}/{child}"), inner));
+                }
+            }
+        }
+        level = next;
+    }
+    found
+}
+
+fn names(found: &[(String, Group)]) -> Vec<&str> {
+    found.iter().map(|(name, _)| name.as_str()).collect()
+}
+
+fn listing(found: &[(String, Group)]) -> String {
+    if found.is_empty() { Code::Hdf5Layout.help().to_owned() } else { NAMES.listing(&names(found)) }
+}
+
+fn layout(message: String) -> Diagnostic {
+    Diagnostic::new(Code::Hdf5Layout, message)
+}

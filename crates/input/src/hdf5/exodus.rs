@@ -1,0 +1,174 @@
+//! Nodes, node sets and elements of Exodus II meshes in netCDF-4: `coordx`, `coordy`, `coordz` (or `coord`),
+//! `node_num_map`, `node_ns1`, ... and their names `ns_names`, or numbers `ns_prop1`, `connect1`, ....
+
+use super::members::Members;
+use super::opened;
+use super::values::{Found, Heaps, Numbers, Vector, names_of, refuse_beyond_memory, text_of};
+use crate::upright_order::in_order_of_shape;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::InputFile;
+use flexbody_model::{ElementShape, Elements, Nodes};
+use hdf5_metno::Group;
+
+const HELP: &str = "give an Exodus mesh in netCDF-4, or a table with the columns node, x, y, z";
+
+/// Sets of node numbers by name.
+type NamedSets = Vec<(String, Vec<i64>)>;
+
+/// Reads the nodes. They have the numbers of `node_num_map`, without it 1, 2, ....
+///
+/// # Errors
+/// FB101 for a file that cannot be opened, FB115 for what is no such mesh.
+pub(crate) fn read_exodus(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)> {
+    let opened = opened(file)?;
+    let root = opened.group("/").map_err(|e| wrong(format!("file cannot be read: {e}")))?;
+    let mesh = Mesh { members: Members::of(&root), root, heaps: Heaps::of(file) };
+    // What is wrong with a dataset is said of nodes here, not of matrices.
+    mesh.read().map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
+}
+
+fn wrong(message: String) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::NodeFileSyntax, message).with_help(HELP)]
+}
+
+struct Mesh<'f> {
+    root: Group,
+    members: Members,
+    heaps: Heaps<'f>,
+}
+
+impl Mesh<'_> {
+    fn read(&self) -> Found<(Nodes, NamedSets, Elements)> {
+        let positions = self.positions()?;
+        let ids = match self.has("node_num_map") {
+            true => self.whole_numbers("node_num_map")?,
+            false => (1..=positions.len() as i64).collect(),
+        };
+        if ids.len() != positions.len() {
+            let message = format!("`node_num_map` has {} numbers for {} nodes", ids.len(), positions.len());
+            return Err(wrong(message));
+        }
+        let sets = self.sets(&ids)?;
+        let elements = self.elements(&ids)?;
+        Ok((Nodes { ids, positions }, sets, elements))
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.members.link(name).is_some()
+    }
+
+    fn vector(&self, name: &str) -> Found<Vector> {
+        Vector::open(&self.root, &self.members, "", name)
+    }
+
+    fn whole_numbers(&self, name: &str) -> Found<Vec<i64>> {
+        let vector = self.vector(name)?;
+        vector.integers(0..vector.len)
+    }
+
+    fn positions(&self) -> Found<Vec<[f64; 3]>> {
+        let axes: Vec<Vec<f64>> = if self.has("coordx") {
+            let names = ["coordx", "coordy", "coordz"].into_iter().filter(|name| self.has(name));
+            let axis = |name| self.vector(name).and_then(|vector| vector.floats(0..vector.len));
+            names.map(axis).collect::<Found<_>>()?
+        } else if self.has("coord") {
+            self.rows_of("coord")?
+        } else {
+            return Err(wrong("file has neither `coordx` nor `coord`: it is no Exodus mesh".to_owned()));
+        };
+        let count = axes.first().map_or(0, Vec::len);
+        if axes.len() > 3 || axes.iter().any(|axis| axis.len() != count) {
+            return Err(wrong("the coordinates along the axes differ in number".to_owned()));
+        }
+        let along = |axis: usize, node: usize| axes.get(axis).map_or(0.0, |values| values[node]);
+        Ok((0..count).map(|node| [0, 1, 2].map(|axis| along(axis, node))).collect())
+    }
+
+    /// The rows of a dataset with two extents.
+    fn rows_of(&self, name: &str) -> Found<Vec<Vec<f64>>> {
+        let numbers = Numbers::open(&self.root, &self.members, "", name)?;
+        let &[_, columns] = numbers.dataset.shape().as_slice() else {
+            return Err(wrong(format!("dataset {} does not have one row for each axis", numbers.name)));
+        };
+        refuse_beyond_memory(numbers.dataset.size(), &numbers.name)?;
+        let values = numbers.dataset.read_raw::<f64>();
+        let values = values.map_err(|e| wrong(format!("dataset {} cannot be read: {e}", numbers.name)))?;
+        Ok(values.chunks(columns.max(1)).map(<[f64]>::to_vec).collect())
+    }
+
+    /// The elements of all blocks, which list places from 1.
+    fn elements(&self, ids: &[i64]) -> Found<Elements> {
+        let mut elements = Elements::default();
+        for dataset in (1..).map(|k| format!("connect{k}")).take_while(|dataset| self.has(dataset)) {
+            let opened = Numbers::open(&self.root, &self.members, "", &dataset)?;
+            let kind = opened.dataset.attr("elem_type").ok();
+            let kind = kind.and_then(|kind| text_of(&kind, &self.heaps)).unwrap_or_default();
+            for places in self.rows_of(&dataset)? {
+                let whole = |place: &f64| (place.fract() == 0.0).then_some(*place as i64);
+                let nodes = nodes_at(&dataset, ids, places.iter().map(whole))?;
+                add_element(&mut elements, &kind, &nodes);
+            }
+        }
+        Ok(elements)
+    }
+
+    /// Node sets list places from 1. Without a name, or without names, a set is called by its number.
+    fn sets(&self, ids: &[i64]) -> Found<NamedSets> {
+        let names = match self.has("ns_names") {
+            true => names_of(&self.root, &self.members, "ns_names")?,
+            false => Vec::new(),
+        };
+        let numbers = if self.has("ns_prop1") { self.whole_numbers("ns_prop1")? } else { Vec::new() };
+        let mut sets = Vec::new();
+        for k in 0.. {
+            let dataset = format!("node_ns{}", k + 1);
+            if !self.has(&dataset) {
+                // A set without nodes has no list.
+                if k < names.len().max(numbers.len()) { continue } else { break }
+            }
+            let places = self.whole_numbers(&dataset)?;
+            let nodes = nodes_at(&dataset, ids, places.iter().map(|place| Some(*place)))?;
+            let number = numbers.get(k).copied().unwrap_or(k as i64 + 1);
+            let name = names.get(k).filter(|name| !name.is_empty()).cloned();
+            sets.push((name.unwrap_or_else(|| number.to_string()), nodes));
+        }
+        Ok(sets)
+    }
+}
+
+/// Numbers of the nodes at `places`, from 1, that a dataset lists; `None` is no place.
+fn nodes_at(dataset: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) -> Found<Vec<i64>> {
+    let node = |place: Option<i64>| {
+        let at = usize::try_from(place?.checked_sub(1)?).ok()?;
+        ids.get(at).copied()
+    };
+    let nodes: Option<Vec<i64>> = places.map(node).collect();
+    nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))
+}
+
+/// Adds an element of a type as Exodus names it (`HEX8`, `TETRA`, `SHELL4`); points are not drawn.
+fn add_element(elements: &mut Elements, kind: &str, nodes: &[i64]) {
+    let name = kind.to_ascii_uppercase();
+    let begins = |heads: &[&str]| heads.iter().any(|head| name.starts_with(head));
+    let shape = if begins(&["HEX"]) {
+        ElementShape::Hexahedron
+    } else if begins(&["TET"]) {
+        ElementShape::Tetrahedron
+    } else if begins(&["WEDGE", "PENTA"]) {
+        ElementShape::Wedge
+    } else if begins(&["PYR"]) {
+        ElementShape::Pyramid
+    } else if begins(&["TRI"]) || begins(&["SHELL"]) && [3, 6, 7].contains(&nodes.len()) {
+        ElementShape::Triangle
+    } else if begins(&["QUAD", "SHELL"]) {
+        ElementShape::Quadrilateral
+    } else if begins(&["BAR", "BEAM", "TRUSS", "EDGE"]) {
+        ElementShape::Line
+    } else {
+        if !begins(&["SPHERE", "CIRCLE"]) {
+            elements.leave_out(kind, 1);
+        }
+        return;
+    };
+    elements.add(kind, shape, &in_order_of_shape(shape, nodes));
+}

@@ -1,0 +1,339 @@
+//! One sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of
+//! scipy, anndata, MATLAB and PETSc (`docs/input.md`).
+
+use super::super::assemble::{
+    ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, assembled, check_size, push,
+    refuse_beyond_memory, undeclared_triangle,
+};
+use super::members::{Members, POINTERS};
+use super::values::{Found, Heaps, Vector, integers_of, text_of, truth_of};
+use crate::lent::KeptColumns;
+use crate::reader::MatrixSource;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::InputFile;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::RawMatrix;
+use hdf5_metno::Group;
+use std::path::Path;
+
+/// Entries read at a time.
+const PIECE: usize = 1 << 20;
+
+/// Reads the matrix in `group`, called `name` in messages.
+pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
+    let MatrixSource { file, keep_in, .. } = *source;
+    let reader = GroupReader { file, group, name, members: Members::of(group), keep_in };
+    let declared = reader.declared_symmetry().map_err(|d| vec![d])?;
+    let parsed = match reader.members.compressed() {
+        Some(names) => reader.compressed(names)?,
+        None => match reader.members.coordinates() {
+            Some(names) => reader.coordinates(names)?,
+            None => return Err(vec![reader.layout("holds no sparse matrix")]),
+        },
+    };
+    let sides = parsed.sides;
+    let storage = match declared {
+        Declared::Triangle if sides == (Sides { lower: true, upper: true }) => {
+            let message = format!(
+                "group `{name}` declares one triangle, but has entries on both sides of the diagonal"
+            );
+            return Err(vec![Diagnostic::new(Code::MatrixTriangles, message)]);
+        }
+        Declared::Triangle | Declared::Symmetric if sides.lower != sides.upper => Storage::Triangle,
+        Declared::No => {
+            let help = |stored: &str| {
+                format!("store both triangles, or set the attribute symmetric = \"{stored}\" of group {name}")
+            };
+            match undeclared_triangle(sides, help) {
+                Some(diagnostic) => return Err(vec![diagnostic]),
+                None => Storage::Full,
+            }
+        }
+        _ => Storage::Full,
+    };
+    let made = match (parsed.entries, storage) {
+        (Entries::Kept(matrix), _) => assembled(matrix, 17, file.path()),
+        (Entries::Columns(columns), Storage::Full) => assemble_columns(columns, 17, file.path()),
+        (Entries::Columns(columns), Storage::Triangle) => {
+            assemble(parsed.n, columns.into_entries(), storage, 17, file.path())
+        }
+        (Entries::Listed(pieces), _) => assemble(parsed.n, pieces, storage, 17, file.path()),
+    };
+    let mut raw = made.map_err(|d| vec![d])?;
+    if parsed.single_precision {
+        raw.digits = raw.digits.min(7);
+    }
+    Ok(raw)
+}
+
+/// What the attribute `symmetric` of the group says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Declared {
+    /// Nothing: the matrix is stored in full.
+    No,
+    /// Symmetric, stored in full or by one triangle.
+    Symmetric,
+    /// Stored by one triangle.
+    Triangle,
+}
+
+/// A parsed group.
+struct Parsed {
+    n: usize,
+    entries: Entries,
+    sides: Sides,
+    single_precision: bool,
+}
+
+/// The entries of a matrix, in the order in which its group stores them.
+enum Entries {
+    /// Sorted columns of both triangles, in files.
+    Kept(CscMatrix),
+    Columns(ColumnEntries),
+    Listed(Vec<Vec<Entry>>),
+}
+
+/// Row and column of entry k from its index, where entries come in the order of the columns.
+fn by_major(pointers: &[i64]) -> impl FnMut(usize, [i64; 1]) -> (i64, i64) {
+    let mut major = 0;
+    move |k, [index]| {
+        while pointers[major + 1] <= k as i64 {
+            major += 1;
+        }
+        (index, major as i64)
+    }
+}
+
+struct GroupReader<'a> {
+    file: &'a InputFile,
+    group: &'a Group,
+    name: &'a str,
+    members: Members,
+    /// The folder for a matrix that is not to be held in memory.
+    keep_in: Option<&'a Path>,
+}
+
+impl GroupReader<'_> {
+    fn layout(&self, what: &str) -> Diagnostic {
+        Diagnostic::new(Code::Hdf5Layout, format!("group `{}` {what}", self.name))
+    }
+
+    fn vector(&self, dataset: &str) -> Found<Vector> {
+        Vector::open(self.group, &self.members, self.name, dataset)
+    }
+
+    fn compressed(&self, (values, indices, pointers): (&str, &str, &str)) -> Found<Parsed> {
+        let values = self.vector(values)?;
+        let indices = self.vector(indices)?;
+        let pointers = self.vector(pointers)?;
+        let Some(majors) = pointers.len.checked_sub(1) else {
+            return Err(vec![self.layout(&format!("has an empty {}", pointers.name))]);
+        };
+        let (rows, cols) = self.shape()?.unwrap_or((majors as u64, majors as u64));
+        let entries = self.same_length(&values, &indices)?;
+        let n = check_size(rows, cols, entries as u64).map_err(|d| vec![d])?;
+        if majors != n {
+            let message =
+                format!("{} has {} values, expected {} for {n} columns", pointers.name, pointers.len, n + 1);
+            return Err(vec![Diagnostic::new(Code::MatrixCount, message)]);
+        }
+        let one = |diagnostic| vec![diagnostic];
+        refuse_beyond_memory(if self.keep_in.is_some() { 0 } else { entries as u64 }).map_err(one)?;
+        let pointer_values = pointers.integers(0..pointers.len)?;
+        let ascending = pointer_values.is_sorted() && pointer_values[0] == 0;
+        if !ascending || pointer_values[n] != entries as i64 {
+            let message =
+                format!("{} does not rise from 0 to {entries}, the number of values", pointers.name);
+            return Err(vec![
+                Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"),
+            ]);
+        }
+        if let Some(folder) = self.keep_in
+            && let Some(parsed) = self.kept(folder, (&values, &indices, &pointer_values), n)?
+        {
+            return Ok(parsed);
+        }
+        // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to
+        // say.
+        let mut columns = ColumnEntries::with_room(n, entries);
+        let place = by_major(&pointer_values);
+        let sides = self.visit(&values, &[&indices], n, place, |entry| columns.push(entry))?;
+        let single_precision = values.is_single_precision();
+        Ok(Parsed { n, entries: Entries::Columns(columns), sides, single_precision })
+    }
+
+    /// The matrix in files of `folder`; `None` where its columns are not sorted or one triangle is missing.
+    fn kept(
+        &self,
+        folder: &Path,
+        (values, indices, pointers): (&Vector, &Vector, &[i64]),
+        n: usize,
+    ) -> Found<Option<Parsed>> {
+        let mut columns = KeptColumns::new(folder, n).map_err(|d| vec![d])?;
+        let mut wrong = None;
+        let sides = self.visit(values, &[indices], n, by_major(pointers), |entry| {
+            if wrong.is_none() {
+                wrong = columns.push(entry).err();
+            }
+        })?;
+        if let Some(diagnostic) = wrong {
+            return Err(vec![diagnostic]);
+        }
+        if sides.lower != sides.upper {
+            return Ok(None);
+        }
+        let matrix = columns.compress().map_err(|d| vec![d])?;
+        let single_precision = values.is_single_precision();
+        Ok(matrix.map(|matrix| Parsed { n, entries: Entries::Kept(matrix), sides, single_precision }))
+    }
+
+    fn coordinates(&self, (values, rows, columns): (&str, &str, &str)) -> Found<Parsed> {
+        let values = self.vector(values)?;
+        let row_indices = self.vector(rows)?;
+        let column_indices = self.vector(columns)?;
+        let (rows, cols) = self.shape()?.ok_or_else(|| {
+            vec![self.layout("has coordinates but no `shape`").with_help("store shape = [rows, columns]")]
+        })?;
+        let entries = self.same_length(&values, &row_indices)?;
+        self.same_length(&values, &column_indices)?;
+        let n = check_size(rows, cols, entries as u64).map_err(|d| vec![d])?;
+        refuse_beyond_memory(entries as u64).map_err(|d| vec![d])?;
+        let mut pieces = Vec::new();
+        let both = [&row_indices, &column_indices];
+        let sides =
+            self.visit(&values, &both, n, |_, [row, col]| (row, col), |entry| push(&mut pieces, entry))?;
+        let single_precision = values.is_single_precision();
+        Ok(Parsed { n, entries: Entries::Listed(pieces), sides, single_precision })
+    }
+
+    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices,
+    /// `keep` takes the entries that are not zero.
+    fn visit<const N: usize>(
+        &self,
+        values: &Vector,
+        indices: &[&Vector; N],
+        n: usize,
+        mut place: impl FnMut(usize, [i64; N]) -> (i64, i64),
+        mut keep: impl FnMut(Entry),
+    ) -> Found<Sides> {
+        // Whole chunks, so that none is unpacked twice.
+        let step = indices.iter().map(|v| v.chunk).fold(PIECE.max(values.chunk), usize::max);
+        let mut sides = Sides::default();
+        let mut bad = Bad { n, shown: Vec::new(), count: 0 };
+        for start in (0..values.len).step_by(step) {
+            let range = start..values.len.min(start.saturating_add(step));
+            let numbers = values.floats(range.clone())?;
+            let mut lists: [Vec<i64>; N] = std::array::from_fn(|_| Vec::new());
+            for (list, vector) in lists.iter_mut().zip(indices) {
+                *list = vector.integers(range.clone())?;
+            }
+            for (offset, &value) in numbers.iter().enumerate() {
+                let (row, col) = place(start + offset, std::array::from_fn(|which| lists[which][offset]));
+                if let Some(entry) = bad.check(row, col, value, start + offset) {
+                    sides.lower |= entry.row > entry.col;
+                    sides.upper |= entry.row < entry.col;
+                    if bad.count == 0 {
+                        keep(entry);
+                    }
+                }
+            }
+        }
+        if bad.count == 0 { Ok(sides) } else { Err(bad.finish(self.name)) }
+    }
+
+    fn same_length(&self, values: &Vector, indices: &Vector) -> Found<usize> {
+        if values.len == indices.len {
+            return Ok(values.len);
+        }
+        let message =
+            format!("{} has {} values, {} has {}", values.name, values.len, indices.name, indices.len);
+        let help = "both have one value per entry: write the matrix again";
+        Err(vec![Diagnostic::new(Code::MatrixCount, message).with_help(help)])
+    }
+
+    /// Rows and columns, from the attribute or dataset `shape` or from MATLAB's attribute.
+    fn shape(&self) -> Found<Option<(u64, u64)>> {
+        let attribute = ["shape", "h5sparse_shape"].iter().find_map(|name| self.group.attr(name).ok());
+        let numbers = if let Some(attribute) = attribute {
+            integers_of(&attribute)
+        } else if self.members.link("shape").is_some() {
+            let vector = self.vector("shape")?;
+            // Only two numbers are wanted; reading one more tells that there are too many.
+            Some(vector.integers(0..vector.len.min(3))?)
+        } else if let Ok(rows) = self.group.attr("MATLAB_sparse") {
+            // The number of columns is that of the pointers.
+            let columns = self.members.first(POINTERS).map(|name| self.vector(name)).transpose()?;
+            let columns = columns.map(|pointers| pointers.len as i64 - 1);
+            integers_of(&rows).map(|rows| rows.into_iter().chain(columns).collect())
+        } else {
+            return Ok(None);
+        };
+        match numbers.as_deref() {
+            Some(&[rows, cols]) if rows >= 0 && cols >= 0 => Ok(Some((rows as u64, cols as u64))),
+            _ => Err(vec![self.layout("has a `shape` that is not two whole numbers")]),
+        }
+    }
+
+    fn declared_symmetry(&self) -> Result<Declared, Diagnostic> {
+        let Ok(attribute) = self.group.attr("symmetric") else {
+            return Ok(Declared::No);
+        };
+        let word = match truth_of(&attribute) {
+            Some(true) => return Ok(Declared::Symmetric),
+            Some(false) => return Ok(Declared::No),
+            None => text_of(&attribute, &Heaps::of(self.file)),
+        };
+        let help = "it may be true, false, \"lower\" or \"upper\"";
+        let refuse = |what: String| {
+            let message = format!("attribute `symmetric` of group `{}` {what}", self.name);
+            Diagnostic::new(Code::MatrixKind, message).with_help(help)
+        };
+        let word = word.ok_or_else(|| refuse("cannot be read as text, number or boolean".into()))?;
+        match word.to_lowercase().as_str() {
+            "lower" | "upper" | "l" | "u" => Ok(Declared::Triangle),
+            "true" | "yes" | "symmetric" => Ok(Declared::Symmetric),
+            "false" | "no" | "general" => Ok(Declared::No),
+            _ => Err(refuse(format!("is `{}`", word.escape_debug()))),
+        }
+    }
+}
+
+/// Entries that cannot be used: the first few, and how many.
+struct Bad {
+    n: usize,
+    shown: Vec<Diagnostic>,
+    count: usize,
+}
+
+impl Bad {
+    fn check(&mut self, row: i64, col: i64, value: f64, k: usize) -> Option<Entry> {
+        let inside = |index: i64| (0..self.n as i64).contains(&index);
+        let (code, message) = if !inside(row) || !inside(col) {
+            (
+                Code::MatrixIndex,
+                format!(
+                    "entry {k} (from 0) is at ({row}, {col}), the matrix has indices 0 to {}",
+                    self.n as i64 - 1
+                ),
+            )
+        } else if !value.is_finite() {
+            (Code::MatrixNotFinite, format!("entry {k} (from 0) at ({row}, {col}) is {value}"))
+        } else {
+            return (value != 0.0).then_some(Entry { row: row as u32, col: col as u32, value });
+        };
+        self.count += 1;
+        if self.shown.len() < 5 {
+            self.shown.push(Diagnostic::new(code, message));
+        }
+        None
+    }
+
+    fn finish(mut self, group: &str) -> Vec<Diagnostic> {
+        let more = self.count - self.shown.len();
+        if more > 0 {
+            let message = format!("{more} more entries of group `{group}` are bad");
+            self.shown.push(Diagnostic::new(Code::MatrixIndex, message));
+        }
+        self.shown
+    }
+}

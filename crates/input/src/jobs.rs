@@ -1,0 +1,250 @@
+//! Models as FE programs write them: one file names the job, its other files stand beside it. One file per
+//! program behind [`JobReader`] and [`JOBS`].
+
+mod abaqus;
+mod abaqus_rows;
+mod abaqus_substructure;
+mod calculix;
+mod coordinate_files;
+mod deck;
+mod deck_mesh;
+mod deck_sets;
+mod deck_surfaces;
+mod distributing_couplings;
+mod element_kinds;
+mod expanded;
+mod labelled_lines;
+mod nastran;
+mod rotation_nodes;
+
+use super::node_file::{NodeFile, NodeSets, Unresolved};
+use abaqus::Abaqus;
+use calculix::Calculix;
+use deck::Deck;
+pub(super) use deck::comparable;
+use deck_mesh::DeckMesh;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::compression::refuse_packed;
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
+use nastran::Nastran;
+pub(super) use nastran::nodes_of_bulk;
+use std::path::{Path, PathBuf};
+
+/// A job of an FE program: its main file, and the program where the user said which.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct JobFile {
+    /// Input deck of the job, or the file that the program's reader asks for.
+    pub path: PathBuf,
+    /// Name of the program; `None`: by the content of the file and what stands beside it.
+    pub program: Option<String>,
+    /// Names of the stiffness and the mass matrix, where the job has several pairs and the user said which.
+    pub matrices: Option<[String; 2]>,
+}
+
+impl JobFile {
+    /// The main file, the files beside it that have its name, and that of the substructure which it names: a
+    /// run must not replace them.
+    pub(super) fn family(&self) -> Vec<PathBuf> {
+        const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx", ".pch", ".op4"];
+        let is_matrix = |rest: &str| MATRICES.iter().any(|extension| rest.ends_with(extension));
+        let matrices = siblings(&self.path).filter(|(rest, _)| is_matrix(rest)).map(|(_, path)| path);
+        let is_complete = Calculix.recognises(&self.path);
+        let substructure = if is_complete { None } else { abaqus::substructure_of(&self.path) };
+        let others = matrices.chain(substructure);
+        let mut family: Vec<PathBuf> = std::iter::once(self.path.clone()).chain(others).collect();
+        family.sort();
+        family
+    }
+}
+
+/// What a job says of its model.
+pub(super) struct JobModel {
+    pub stiffness: RawMatrix,
+    pub mass: RawMatrix,
+    pub nodes: Nodes,
+    /// Label of every matrix row.
+    pub dofs: Vec<DofLabel>,
+    /// Maps from the rows of the files to the rows here.
+    pub given_rows: GivenRows,
+    /// Names are compared without regard to case.
+    pub sets: NodeSets,
+    /// Sets of which nobody knows the nodes.
+    pub unresolved: Unresolved,
+    /// What the part is drawn by.
+    pub elements: Elements,
+    /// Every file that was read, with its role.
+    pub files: Vec<(&'static str, SeenFile)>,
+    /// Warnings and notes.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// A matrix and the file that it was read from.
+type FromFile = (RawMatrix, SeenFile);
+
+/// All that is wrong with a job.
+pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// Reads the jobs of one FE program.
+pub(super) trait JobReader: Sync {
+    /// Name of the program, as `--format` and the manifest take it.
+    fn name(&self) -> &'static str;
+
+    /// What the reader needs, in words: the main file and what stands beside it.
+    fn needs(&self) -> &'static str;
+
+    /// Whether the file at `path` is the main file of such a job.
+    fn recognises(&self, path: &Path) -> bool;
+
+    /// Reads matrices, nodes, labels and sets.
+    ///
+    /// # Errors
+    /// FB101 to FB112, FB2xx and FB3xx, as many as are found.
+    fn read(&self, job: &JobFile) -> Found<JobModel>;
+
+    /// True if the matrices of a job have names by which a user may choose.
+    fn names_matrices(&self) -> bool {
+        false
+    }
+}
+
+/// Every FE program whose jobs are read; the first that recognises a file takes it.
+const JOBS: &[&dyn JobReader] = &[&Calculix, &Abaqus, &Nastran];
+
+/// Names of the FE programs whose jobs are read.
+pub fn job_programs() -> impl Iterator<Item = &'static str> {
+    JOBS.iter().map(|reader| reader.name())
+}
+
+/// Whether a path is that of a job: a keyword deck by its name, or what a reader recognises.
+pub fn is_job(path: &Path) -> bool {
+    is_deck(path) || JOBS.iter().any(|reader| reader.recognises(path))
+}
+
+/// Reads a job.
+///
+/// # Errors
+/// FB102 for a compressed file, FB108 when no reader knows the file, and those of [`JobReader::read`].
+pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
+    let reader = match &job.program {
+        Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
+        None => {
+            let file = InputFile::open(&job.path);
+            file.and_then(|file| refuse_packed(&file, "file")).map_err(|diagnostic| vec![diagnostic])?;
+            JOBS.iter().find(|reader| reader.recognises(&job.path))
+        }
+    };
+    match reader {
+        Some(reader) if job.matrices.is_some() && !reader.names_matrices() => {
+            let message = format!("the matrices of a job of {} have no names to choose by", reader.name());
+            Err(vec![
+                Diagnostic::new(Code::Usage, message).in_file(&job.path).with_help("leave the names out"),
+            ])
+        }
+        Some(reader) => reader.read(job),
+        None => Err(vec![unknown(job)]),
+    }
+}
+
+fn unknown(job: &JobFile) -> Diagnostic {
+    let needed: Vec<String> =
+        JOBS.iter().map(|reader| format!("{}: {}", reader.name(), reader.needs())).collect();
+    let message = match &job.program {
+        Some(program) => format!("`{program}` is no program whose jobs are read"),
+        None => "neither a manifest nor the job of an FE program with its matrices beside it".to_owned(),
+    };
+    Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
+}
+
+/// The nodes, node sets and elements of a keyword deck.
+///
+/// # Errors
+/// FB101, FB106, FB110, FB111.
+pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
+    let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
+    let elements = mesh.drawn();
+    let (ids, positions) = mesh.nodes.into_iter().unzip();
+    let DeckMesh { sets, unresolved, .. } = mesh;
+    Ok(NodeFile { nodes: Nodes { ids, positions }, sets, unresolved, elements, ..NodeFile::default() })
+}
+
+/// Whether a path is that of a keyword deck, by its name.
+fn is_deck(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"))
+}
+
+/// Files beside the main file of a job that are named like it, in any case: its stem, then a dot, an underscore
+/// or the like, or what Abaqus calls matrices. What follows the stem, in lower case, and the path.
+fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
+    let own = beginning_alike(main).into_iter().filter(|file| file.is_own);
+    own.map(|Beside { rest, path, .. }| (rest, path))
+}
+
+/// A file beside the main file of a job whose name begins with the stem of the job.
+struct Beside {
+    /// The rest of its name, in lower case.
+    rest: String,
+    path: PathBuf,
+    /// False for files of other decks, whose names go on (`job_2.op4` beside `job_2.bdf`), and those that a letter
+    /// or a number tells from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
+    is_own: bool,
+}
+
+/// Files beside the main file of a job whose names begin with its stem, in any case.
+fn beginning_alike(main: &Path) -> Vec<Beside> {
+    let Some(stem) = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()) else {
+        return Vec::new();
+    };
+    let folder = match main.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let listed = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let rest_of = |name: std::ffi::OsString| {
+        let lower = name.to_string_lossy().to_lowercase();
+        Some((lower.strip_prefix(&stem)?.to_owned(), main.with_file_name(name)))
+    };
+    let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
+    let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
+    let goes_on = |rest: &str, deck: &String| {
+        rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
+    };
+    let is_own = |rest: &str| {
+        let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
+        let version = name.strip_prefix('v').unwrap_or(name);
+        let is_of_abaqus = ["stif", "mass"].iter().any(|kind| rest.starts_with(kind));
+        (is_of_abaqus || !rest.starts_with(char::is_alphanumeric))
+            && !version.starts_with(|c: char| c.is_ascii_digit())
+            && !decks.iter().any(|deck| goes_on(rest, deck))
+    };
+    let beside = |(rest, path): (String, PathBuf)| Beside { is_own: is_own(&rest), rest, path };
+    all.into_iter().map(beside).collect()
+}
+
+/// Returns the part of the stem of another deck behind the stem of the job; `rest` is that part of its file name.
+fn stem_of_deck(rest: &str) -> Option<String> {
+    const DECKS: &[&str] = &[".inp", ".bdf", ".dat", ".nas"];
+    let stem = DECKS.iter().find_map(|extension| rest.strip_suffix(extension))?;
+    (!stem.is_empty()).then(|| stem.to_owned())
+}
+
+/// Both of two, or all that is wrong with them.
+fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
+    match (a, b) {
+        (Ok(a), Ok(b)) => Ok((a, b)),
+        (a, b) => Err([a.err(), b.err()].into_iter().flatten().flatten().collect()),
+    }
+}
+
+/// FB119: what is exact of a body whose matrices are condensed to some of its nodes.
+fn condensed(nodes: usize, stiffness: &Path) -> Diagnostic {
+    let message = format!(
+        "the matrices are condensed to {nodes} nodes: mass, I0, C1, C2 and frequencies are those of the condensed model, W0 to W3 know only how these nodes move"
+    );
+    Diagnostic::new(Code::JobCondensed, message).in_file(stiffness)
+}
+
+/// FB109: a part of a job is missing.
+fn missing(path: &Path, what: &str, help: &str) -> Diagnostic {
+    Diagnostic::new(Code::JobIncomplete, format!("{what} is missing")).in_file(path).with_help(help)
+}

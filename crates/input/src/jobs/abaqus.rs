@@ -1,0 +1,198 @@
+//! Jobs of Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` and `*MATRIX OUTPUT` write `job_STIF1.mtx` and
+//! `job_MASS1.mtx` beside the deck `job.inp`, as `row column value` (FORMAT=COORDINATE) or with the node and
+//! the direction of row and column (FORMAT=MATRIX INPUT, LABELS). Instead of them the matrices may be those of a
+//! substructure.
+
+use super::abaqus_rows::{labels, other_rows};
+use super::abaqus_substructure::{self, Substructure};
+use super::coordinate_files::CoordinateFile;
+use super::deck::Deck;
+use super::deck_mesh::DeckMesh;
+use super::labelled_lines::{has_labels, labelled};
+use super::{Found, FromFile, JobFile, JobModel, JobReader, both, condensed, is_deck, missing, siblings};
+use crate::reader::MatrixRole;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::SeenFile;
+use flexbody_base::text::table::integer;
+use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// The reader of Abaqus jobs.
+pub(super) struct Abaqus;
+
+const HELP: &str =
+    "write them with *MATRIX GENERATE, STIFFNESS, MASS and *MATRIX OUTPUT, STIFFNESS, MASS in a step";
+
+impl JobReader for Abaqus {
+    fn name(&self) -> &'static str {
+        "abaqus"
+    }
+
+    fn needs(&self) -> &'static str {
+        "job.inp with job_STIF1.mtx and job_MASS1.mtx beside it, or with the file of its substructure"
+    }
+
+    fn recognises(&self, path: &Path) -> bool {
+        is_deck(path) && (Matrices::beside(path).is_ok() || substructure_of(path).is_some())
+    }
+
+    fn read(&self, job: &JobFile) -> Found<JobModel> {
+        let path = job.path.as_path();
+        let matrices = Matrices::beside(path);
+        let deck = Deck::read(path)?;
+        let mesh = DeckMesh::of(&deck)?;
+        let (rows, note) = match (matrices, abaqus_substructure::file_of(&deck, path)) {
+            (Ok(matrices), _) => (Rows::of_model(&matrices, &mesh, path)?, matrices.note),
+            (Err(_), Some((file, note))) => (Rows::of_substructure(&file, &deck, &mesh)?, note),
+            (Err(missing), None) => return Err(missing),
+        };
+        let (ids, positions) = mesh.nodes.iter().map(|(id, x)| (*id, *x)).unzip();
+        let deck_files = deck.seen()?.into_iter();
+        Ok(JobModel {
+            stiffness: rows.stiffness,
+            mass: rows.mass,
+            nodes: Nodes { ids, positions },
+            dofs: rows.labels,
+            given_rows: GivenRows::default(),
+            // Condensed matrices leave no element all of its nodes.
+            elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
+            sets: mesh.sets,
+            unresolved: mesh.unresolved,
+            files: deck_files.chain(rows.files).collect(),
+            diagnostics: mesh.notes.into_iter().chain(note).chain(rows.condensed).collect(),
+        })
+    }
+}
+
+/// The file of the substructure that a deck names, which is read where the matrices of the whole model are not
+/// there.
+pub(super) fn substructure_of(path: &Path) -> Option<PathBuf> {
+    if !is_deck(path) || Matrices::beside(path).is_ok() {
+        return None;
+    }
+    let deck = Deck::read(path).ok()?;
+    abaqus_substructure::file_of(&deck, path).map(|(file, _)| file)
+}
+
+/// Matrices and what their rows stand for.
+struct Rows {
+    labels: Vec<DofLabel>,
+    stiffness: RawMatrix,
+    mass: RawMatrix,
+    /// The files with their roles.
+    files: Vec<(&'static str, SeenFile)>,
+    /// FB119, of matrices that are condensed.
+    condensed: Option<Diagnostic>,
+}
+
+impl Rows {
+    fn of_model(files: &Matrices, mesh: &DeckMesh, deck: &Path) -> Found<Self> {
+        let Matrices { stiffness, mass, .. } = files;
+        let (labels, matrices) = if has_labels(stiffness)? {
+            labelled([stiffness, mass])?
+        } else {
+            numbered(mesh, deck, [stiffness, mass])?
+        };
+        let [(stiffness, stiffness_file), (mass, mass_file)] = matrices;
+        let files = vec![("stiffness", stiffness_file), ("mass", mass_file)];
+        Ok(Self { labels, stiffness, mass, files, condensed: None })
+    }
+
+    /// FB111 for rows whose nodes are not in the deck, or stand along the axes of a `*TRANSFORM`.
+    fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Found<Self> {
+        let Substructure { labels, stiffness, mass, seen } = Substructure::read(file)?;
+        let nodes: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
+        if let Some(node) = nodes.iter().find(|node| !mesh.nodes.contains_key(node)) {
+            let message = format!(
+                "node {node} of the substructure is not in the deck: the shape of a retained mode is not in the matrices"
+            );
+            let help =
+                "leave *SELECT EIGENMODES out, or give K and M of all nodes with --basis craig-bampton";
+            let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(file);
+            return Err(vec![diagnostic.with_help(help)]);
+        }
+        if let Some(refused) = turned(deck, mesh, &nodes) {
+            return Err(vec![refused]);
+        }
+        let condensed = Some(condensed(nodes.len(), file));
+        Ok(Self { labels, stiffness, mass, files: vec![("matrices", seen)], condensed })
+    }
+}
+
+/// FB111 for retained nodes whose rows stand along axes of their own.
+fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diagnostic> {
+    let members = |name: &str| -> Vec<i64> {
+        mesh.set(name).map_or_else(|| integer(name.as_bytes()).into_iter().collect(), <[i64]>::to_vec)
+    };
+    let transforms = deck.cards().iter().filter(|card| card.keyword == "TRANSFORM");
+    transforms.filter_map(|card| Some((card, card.parameter("NSET")?))).find_map(|(card, set)| {
+        let node = members(set).into_iter().find(|node| retained.contains(node))?;
+        let message = format!("*TRANSFORM turns the rows of node {node}, which is retained");
+        let help = "take *TRANSFORM off the retained nodes";
+        Some(deck.about(card, Code::DeckUnsupported, message).with_help(help))
+    })
+}
+
+/// The files of the two matrices.
+struct Matrices {
+    stiffness: PathBuf,
+    mass: PathBuf,
+    /// Which of several were taken.
+    note: Option<Diagnostic>,
+}
+
+impl Matrices {
+    /// Files whose names are that of the deck with STIF and MASS and the number of a step: those of the last step
+    /// that has both; else the last of each.
+    fn beside(deck: &Path) -> Found<Self> {
+        let mut found: [BTreeMap<u32, PathBuf>; 2] = Default::default();
+        for (rest, path) in siblings(deck) {
+            let rest = rest.trim_start_matches('_');
+            let number = |kind: &str| rest.strip_prefix(kind)?.strip_suffix(".mtx")?.parse::<u32>().ok();
+            for (k, kind) in ["stif", "mass"].iter().enumerate() {
+                found[k].extend(number(kind).map(|number| (number, path.clone())));
+            }
+        }
+        let [stiffness, mass] = &found;
+        let shared = stiffness.keys().rev().find(|number| mass.contains_key(number));
+        let last = || stiffness.keys().next_back().zip(mass.keys().next_back());
+        let Some((k, m)) = shared.map(|number| (number, number)).or_else(last) else {
+            let what = match (stiffness.is_empty(), mass.is_empty()) {
+                (false, true) => "the mass matrix (job_MASS1.mtx)",
+                (true, false) => "the stiffness matrix (job_STIF1.mtx)",
+                _ => "a pair of matrices (job_STIF1.mtx, job_MASS1.mtx)",
+            };
+            return Err(vec![missing(deck, &format!("beside the deck {what}"), HELP)]);
+        };
+        let message = match (k == m, stiffness.len()) {
+            (true, 1) => None,
+            (true, steps) => Some(format!("of {steps} steps with matrices the last one, {k}, is taken")),
+            (false, _) => Some(format!(
+                "no step has both matrices: the stiffness of step {k} and the mass of step {m} are taken"
+            )),
+        };
+        let note = message.map(|message| Diagnostic::new(Code::JobStep, message).in_file(&stiffness[k]));
+        Ok(Self { stiffness: stiffness[k].clone(), mass: mass[m].clone(), note })
+    }
+}
+
+/// Matrices whose rows are numbered, with the labels that the deck gives them.
+fn numbered(
+    mesh: &DeckMesh,
+    deck: &Path,
+    [stiffness, mass]: [&PathBuf; 2],
+) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
+    let labels = labels(mesh, deck)?;
+    let n = labels.len();
+    let read = |path: &Path, role| {
+        let file = CoordinateFile::read(path, u32::MAX)?;
+        // Rows without mass at the end of the matrix are not written.
+        let fits = if role == MatrixRole::Mass { file.rows() <= n } else { file.rows() == n };
+        if fits { file.into_matrix(n) } else { Err(vec![other_rows(mesh, n, file.rows(), path)]) }
+    };
+    // One after the other: each is read by all threads, and the entries of only one are held.
+    let k = read(stiffness, MatrixRole::Stiffness);
+    let (k, m) = both(k, read(mass, MatrixRole::Mass))?;
+    Ok((labels, [k, m]))
+}

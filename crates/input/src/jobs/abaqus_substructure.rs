@@ -1,0 +1,252 @@
+//! Substructures of Abaqus. `*SUBSTRUCTURE MATRIX OUTPUT, OUTPUT FILE=USER DEFINED, FILE NAME=part` writes
+//! `part.mtx` in the form of a linear `*USER ELEMENT`: the retained nodes in comments, their directions, and the
+//! lower triangles of the condensed matrices, row by row.
+
+use super::deck::{Card, Deck, fields};
+use super::{Found, both, missing};
+use crate::assemble::{Entry, Storage, assemble, check_size};
+use crate::coordinates::{excerpt, line_aligned, lines, real};
+use crate::digits::{COUNTED, written_digits};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::SeenFile;
+use flexbody_base::text::table::integer;
+use flexbody_model::{DofLabel, RawMatrix};
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+const HELP: &str = "write it with *SUBSTRUCTURE MATRIX OUTPUT, STIFFNESS=YES, MASS=YES, OUTPUT FILE=USER DEFINED, FILE NAME=part (without .mtx)";
+
+/// A model condensed to some of its nodes.
+pub(super) struct Substructure {
+    pub labels: Vec<DofLabel>,
+    pub stiffness: RawMatrix,
+    pub mass: RawMatrix,
+    /// The file that has them.
+    pub seen: SeenFile,
+}
+
+/// The file that the last request of a deck for the matrices of a substructure names, and which of several it
+/// is.
+pub(super) fn file_of(deck: &Deck, path: &Path) -> Option<(PathBuf, Option<Diagnostic>)> {
+    let requests = || {
+        deck.cards()
+            .iter()
+            .filter(|card| card.keyword == "SUBSTRUCTUREMATRIXOUTPUT")
+            .filter_map(|card| card.parameter("FILENAME"))
+    };
+    let name = requests().next_back()?;
+    let file = path.with_file_name(format!("{name}.mtx"));
+    let note = (requests().count() > 1).then(|| {
+        let message = format!("of {} substructures the last one, {name}, is taken", requests().count());
+        Diagnostic::new(Code::JobStep, message).in_file(&file)
+    });
+    Some((file, note))
+}
+
+impl Substructure {
+    /// Reads the file of a substructure.
+    ///
+    /// # Errors
+    /// FB101, FB106; FB109 where one of the matrices is not there; FB110 for what cannot be read; FB111 for
+    /// degrees of freedom other than displacements and rotations; FB301, FB303, FB312.
+    pub(super) fn read(path: &Path) -> Found<Self> {
+        let deck = Deck::read(path)?;
+        let mut elements = deck.cards().iter().filter(|card| card.keyword == "USERELEMENT");
+        let (Some(element), None) = (elements.next(), elements.next()) else {
+            let message = "expected one *USER ELEMENT, as a substructure is written";
+            return Err(vec![Diagnostic::new(Code::DeckSyntax, message).in_file(path).with_help(HELP)]);
+        };
+        let file = SubstructureFile { deck: &deck, element, path };
+        let labels = file.labels().map_err(|diagnostic| vec![diagnostic])?;
+        let storage = if element.parameter("UNSYM").is_some() { Storage::Full } else { Storage::Triangle };
+        let stiffness = file.matrix("STIFFNESS", labels.len(), storage);
+        let (stiffness, mass) = both(stiffness, file.matrix("MASS", labels.len(), Storage::Triangle))?;
+        let (_, seen) = deck.seen()?.swap_remove(0);
+        Ok(Self { labels, stiffness, mass, seen })
+    }
+}
+
+struct SubstructureFile<'d> {
+    deck: &'d Deck,
+    element: &'d Card,
+    path: &'d Path,
+}
+
+impl SubstructureFile<'_> {
+    /// Node and direction of every row.
+    fn labels(&self) -> Result<Vec<DofLabel>, Diagnostic> {
+        let nodes = self.nodes()?;
+        let changes = self.changes(nodes.len())?;
+        let directions_at = |position: usize| {
+            let known = changes.partition_point(|(from, _)| *from <= position);
+            &changes[known - 1].1
+        };
+        let of_node = |(k, &node): (usize, &i64)| {
+            directions_at(k + 1).iter().map(move |&direction| DofLabel { node, direction })
+        };
+        Ok(nodes.iter().enumerate().flat_map(of_node).collect())
+    }
+
+    /// The retained nodes, which stand in comments.
+    fn nodes(&self) -> Result<Vec<i64>, Diagnostic> {
+        let count = self.element.parameter("NODES").and_then(|count| count.parse::<usize>().ok());
+        let (_, text) = self.deck.text(self.element);
+        let lines = text.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
+        let listed = lines.skip_while(|line| !line.ends_with(b"ELEMENT NODES")).skip(1);
+        let listed = listed.map_while(|line| line.strip_prefix(b"**")).map(<[u8]>::trim_ascii);
+        let nodes: Option<Vec<i64>> = listed.flat_map(fields).map(integer).collect();
+        match nodes {
+            Some(nodes) if !nodes.is_empty() && Some(nodes.len()) == count => Ok(nodes),
+            _ => {
+                let message = "*USER ELEMENT: expected NODES=n and below `** ELEMENT NODES` so many node numbers in comments";
+                Err(self.deck.about(self.element, Code::DeckSyntax, message).with_help(HELP))
+            }
+        }
+    }
+
+    /// Directions of the nodes from a position on, from 1: those of the first node, and where they change.
+    fn changes(&self, nodes: usize) -> Result<Vec<(usize, Vec<u8>)>, Diagnostic> {
+        let mut changes: Vec<(usize, Vec<u8>)> = Vec::new();
+        for (line, text) in self.deck.data(self.element) {
+            let numbers: Option<Vec<i64>> = fields(text).map(integer).collect();
+            let numbers = numbers.filter(|numbers| numbers.len() > usize::from(!changes.is_empty()));
+            let (position, directions) = match (&numbers, changes.last()) {
+                (Some(numbers), None) => (Some(1), numbers.as_slice()),
+                (Some(numbers), Some((before, _))) => {
+                    let position = usize::try_from(numbers[0]).ok();
+                    (position.filter(|at| (before + 1..=nodes).contains(at)), &numbers[1..])
+                }
+                (None, _) => (None, [].as_slice()),
+            };
+            let Some(position) = position else {
+                let message = format!(
+                    "expected the directions of the first node, or the position of a later node and its directions, found `{}`",
+                    excerpt(text)
+                );
+                return Err(self.deck.at(self.element, line, Code::DeckSyntax, message).with_help(HELP));
+            };
+            changes.push((position, self.directions(line, directions)?));
+        }
+        if changes.is_empty() {
+            let message = "*USER ELEMENT: the directions of its nodes are missing";
+            return Err(self.deck.about(self.element, Code::DeckSyntax, message).with_help(HELP));
+        }
+        Ok(changes)
+    }
+
+    fn directions(&self, line: usize, numbers: &[i64]) -> Result<Vec<u8>, Diagnostic> {
+        let direction = |&number: &i64| match number {
+            1..=6 => Ok(number as u8),
+            other => {
+                let message = format!("degree of freedom {other} is no displacement or rotation");
+                let help = "retain displacements and rotations alone (*RETAINED NODAL DOFS, 1 to 6)";
+                Err(self.deck.at(self.element, line, Code::DeckUnsupported, message).with_help(help))
+            }
+        };
+        numbers.iter().map(direction).collect()
+    }
+
+    /// The matrix of a type with `n` rows.
+    fn matrix(&self, kind: &str, n: usize, storage: Storage) -> Found<RawMatrix> {
+        let is_meant =
+            |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|own| own == kind);
+        let Some(card) = self.deck.cards().iter().find(is_meant) else {
+            return Err(vec![missing(self.path, &format!("*MATRIX, TYPE={kind}"), HELP)]);
+        };
+        let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(self.path)];
+        let pieces = self.values(card)?;
+        let count: usize = pieces.iter().map(|piece| piece.values.len()).sum();
+        let expected = match storage {
+            Storage::Full => n * n,
+            Storage::Triangle => n * (n + 1) / 2,
+        };
+        if count != expected {
+            let message =
+                format!("*MATRIX, TYPE={kind}: expected {expected} values for {n} rows, found {count}");
+            let help = "write the file again; it may be cut off";
+            return Err(vec![self.deck.about(card, Code::DeckSyntax, message).with_help(help)]);
+        }
+        check_size(n as u64, n as u64, count as u64).map_err(in_file)?;
+        let written = pieces.iter().map(|piece| piece.written).max().unwrap_or(0);
+        let mut end = 0;
+        let starts: Vec<usize> = pieces
+            .iter()
+            .map(|piece| {
+                end += piece.values.len();
+                end - piece.values.len()
+            })
+            .collect();
+        let entries = pieces.into_par_iter().zip(starts);
+        let entries = entries.map(|(piece, start)| in_rows(&piece.values, start, n, storage)).collect();
+        assemble(n, entries, storage, written, self.path).map_err(|diagnostic| vec![diagnostic])
+    }
+
+    /// The numbers below a card.
+    fn values(&self, card: &Card) -> Found<Vec<Piece>> {
+        let (first, text) = self.deck.text(card);
+        let texts: Vec<&[u8]> = line_aligned(text).collect();
+        let pieces: Vec<Piece> = texts.into_par_iter().map(Piece::parse).collect();
+        let mut above = first;
+        for piece in &pieces {
+            if let Some((line, text)) = &piece.bad {
+                let message = format!("expected numbers, found `{text}`");
+                return Err(vec![
+                    self.deck.at(card, above + line, Code::DeckSyntax, message).with_help(HELP),
+                ]);
+            }
+            above += piece.lines;
+        }
+        Ok(pieces)
+    }
+}
+
+/// Numbers of some lines.
+#[derive(Default)]
+struct Piece {
+    values: Vec<f64>,
+    written: u8,
+    lines: usize,
+    /// The first line with something else: number within the piece, from 0, and text.
+    bad: Option<(usize, String)>,
+}
+
+impl Piece {
+    fn parse(text: &[u8]) -> Self {
+        let mut piece = Self { values: Vec::with_capacity(text.len() / 20), ..Self::default() };
+        for line in lines(text) {
+            if !(line.is_empty() || line.starts_with(b"**")) {
+                let before = piece.values.len();
+                for field in fields(line) {
+                    match real(field).filter(|value| value.is_finite()) {
+                        Some(value) => piece.values.push(value),
+                        None => _ = piece.bad.get_or_insert_with(|| (piece.lines, excerpt(line))),
+                    }
+                }
+                if before < COUNTED {
+                    piece.written = fields(line).map(written_digits).fold(piece.written, u8::max);
+                }
+            }
+            piece.lines += 1;
+        }
+        piece
+    }
+}
+
+/// Values of which the first is the one of place `start`, counted row by row.
+fn in_rows(values: &[f64], start: usize, n: usize, storage: Storage) -> Vec<Entry> {
+    let length = |row: usize| if storage == Storage::Full { n } else { row + 1 };
+    let (mut row, mut col) = (0, start);
+    while col >= length(row) {
+        col -= length(row);
+        row += 1;
+    }
+    let next = |&value: &f64| {
+        let entry = Entry { row: row as u32, col: col as u32, value };
+        col += 1;
+        if col == length(row) {
+            (row, col) = (row + 1, 0);
+        }
+        entry
+    };
+    values.iter().map(next).collect()
+}

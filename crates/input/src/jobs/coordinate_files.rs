@@ -1,0 +1,74 @@
+//! Matrices as lines `row column value` without a header, as CalculiX and Abaqus write them.
+
+use super::{Found, FromFile};
+use crate::assemble::{Entry, Sides, Storage, assemble, check_size};
+use crate::coordinates::{Blocks, Coordinates, Limits};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// The entries of a file, in its order.
+pub(super) struct CoordinateFile {
+    seen: SeenFile,
+    pieces: Vec<Vec<Entry>>,
+    count: u64,
+    written: u8,
+    /// On which sides of the diagonal they lie.
+    pub sides: Sides,
+}
+
+impl CoordinateFile {
+    /// Reads a file whose indices are at most `n`.
+    ///
+    /// # Errors
+    /// FB101, FB103, FB106, FB132, and FB301, FB303, FB306 for its lines.
+    pub(super) fn read(path: &Path, n: u32) -> Found<Self> {
+        let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
+        let read = Self::read_opened(&file, n);
+        // What is wrong with a file that changed meanwhile may be wrong for this reason.
+        file.refuse_changed().map_err(|diagnostic| vec![diagnostic])?;
+        read
+    }
+
+    fn read_opened(file: &InputFile, n: u32) -> Found<Self> {
+        let path = file.path();
+        let compression = Compression::of(file.bytes());
+        let in_file = |found: Vec<Diagnostic>| found.into_iter().map(|d| d.in_file(path)).collect::<Vec<_>>();
+        let mut blocks = Blocks::of(file, compression);
+        let mut body = Coordinates::new(Limits { n, integer: false }, None, 0);
+        let first = blocks.next().map_err(|e| vec![flexbody_base::text::compression::broken(path, &e)])?;
+        let Some(first) = first else {
+            return Err(vec![
+                Diagnostic::new(Code::FileEmpty, "compressed file holds no bytes").in_file(path),
+            ]);
+        };
+        let newline = body.read(path, blocks, first, 0).map_err(in_file)?;
+        let found = body.bad_lines(newline);
+        if !found.is_empty() {
+            return Err(in_file(found));
+        }
+        let (sides, count) = (body.sides(), body.count);
+        let seen = file.seen().map_err(|diagnostic| vec![diagnostic])?;
+        Ok(Self { seen, pieces: body.pieces, count, written: body.written, sides })
+    }
+
+    /// Number of rows that its indices ask for.
+    pub(super) fn rows(&self) -> usize {
+        let largest = |piece: &Vec<Entry>| piece.iter().map(|e| e.row.max(e.col) as usize + 1).max();
+        self.pieces.par_iter().filter_map(largest).max().unwrap_or(0)
+    }
+
+    /// The matrix of `n` rows: one triangle stands for both.
+    ///
+    /// # Errors
+    /// FB301 for more rows than entries can fill, FB306, FB312.
+    pub(super) fn into_matrix(self, n: usize) -> Found<FromFile> {
+        let path = &self.seen.path;
+        let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];
+        check_size(n as u64, n as u64, self.count).map_err(in_file)?;
+        let raw = assemble(n, self.pieces, Storage::of(self.sides), self.written, path);
+        Ok((raw.map_err(|diagnostic| vec![diagnostic])?, self.seen))
+    }
+}

@@ -1,0 +1,320 @@
+//! Keyword decks (`.inp`) of Abaqus and CalculiX: cards `*KEYWORD, PARAMETER=VALUE`, each with lines of data.
+
+use super::Found;
+use crate::coordinates::excerpt;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Files that include one another deeper than this include themselves.
+const DEEPEST: usize = 20;
+
+/// Files that a deck may include, each counted as often as it is included.
+const MOST_FILES: usize = 1000;
+
+/// A deck with everything that it includes.
+pub(super) struct Deck {
+    files: Vec<InputFile>,
+    cards: Vec<Card>,
+}
+
+/// A keyword line and the lines of data below it.
+#[derive(Debug, Clone)]
+pub(super) struct Card {
+    /// In upper case, without the asterisk and without blanks, which do not count.
+    pub keyword: String,
+    /// Keyword as it is written, in upper case, words one blank apart.
+    pub title: String,
+    /// Names in upper case, and values; a parameter without a value has an empty one.
+    parameters: Vec<(String, String)>,
+    file: usize,
+    /// Line of the keyword, from 1.
+    line: usize,
+    data: Range<usize>,
+    /// Line of the first byte of the data.
+    first: usize,
+}
+
+impl Card {
+    /// The value of a parameter, without quotes; empty where it has none.
+    pub(super) fn parameter(&self, name: &str) -> Option<&str> {
+        self.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
+    }
+
+    /// Returns the value of a parameter in the form that names are compared in.
+    pub(super) fn name(&self, parameter: &str) -> Option<String> {
+        self.parameter(parameter).map(comparable)
+    }
+}
+
+impl Deck {
+    /// Reads a deck and the files that it includes.
+    ///
+    /// # Errors
+    /// FB101, FB106 for files that cannot be read; FB110 for lines of data before the first keyword, and for
+    /// files that include themselves.
+    pub(super) fn read(path: &Path) -> Found<Self> {
+        let mut deck = Self { files: Vec::new(), cards: Vec::new() };
+        deck.include(path, 0).map_err(|diagnostic| vec![diagnostic])?;
+        Ok(deck)
+    }
+
+    /// The cards in the order of the deck. Data that an included file, or the deck after it, goes on with has
+    /// a card of its own with the keyword that it belongs to.
+    pub(super) fn cards(&self) -> &[Card] {
+        &self.cards
+    }
+
+    /// Path of the main file.
+    pub(super) fn path(&self) -> Option<&Path> {
+        self.files.first().map(InputFile::path)
+    }
+
+    /// The files of the deck, the main one first.
+    ///
+    /// # Errors
+    /// FB132.
+    pub(super) fn seen(&self) -> Found<Vec<(&'static str, SeenFile)>> {
+        let seen = |file: &InputFile| Ok(("deck", file.seen()?));
+        self.files.iter().map(seen).collect::<Result<_, Diagnostic>>().map_err(|diagnostic| vec![diagnostic])
+    }
+
+    /// What stands below a card as it is written, comments included, and the number of its first line.
+    pub(super) fn text(&self, card: &Card) -> (usize, &[u8]) {
+        (card.first, &self.files[card.file].bytes()[card.data.clone()])
+    }
+
+    /// Lines of data of a card with their numbers, without comments and blank lines.
+    pub(super) fn data<'d>(&'d self, card: &Card) -> impl Iterator<Item = (usize, &'d [u8])> + use<'d> {
+        let (first, bytes) = self.text(card);
+        let lines = bytes.split(|&b| b == b'\n').enumerate();
+        lines
+            .map(move |(k, line)| (first + k, line.trim_ascii()))
+            .filter(|(_, line)| !line.is_empty() && !line.starts_with(b"**"))
+    }
+
+    /// A diagnostic about a line of the file that a card stands in.
+    pub(super) fn at(&self, card: &Card, line: usize, code: Code, message: impl Into<String>) -> Diagnostic {
+        Diagnostic::new(code, message).in_file(self.files[card.file].path()).at_line(line)
+    }
+
+    /// A diagnostic about a card.
+    pub(super) fn about(&self, card: &Card, code: Code, message: impl Into<String>) -> Diagnostic {
+        self.at(card, card.line, code, message)
+    }
+
+    fn include(&mut self, path: &Path, depth: usize) -> Result<(), Diagnostic> {
+        let file = InputFile::open(path)?;
+        if depth > DEEPEST || self.files.len() >= MOST_FILES {
+            let message =
+                format!("files include one another more than {DEEPEST} levels deep, or {MOST_FILES} times");
+            return Err(Diagnostic::new(Code::DeckSyntax, message)
+                .in_file(path)
+                .with_help("a file includes itself: take the *INCLUDE out"));
+        }
+        let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let at = self.files.len();
+        self.files.push(file);
+        let mut position = 0;
+        let mut line = 1;
+        while position < self.files[at].bytes().len() {
+            let (card, end, after) = self.next_card(at, position, line)?;
+            (position, line) = (end, after);
+            let Some(card) = card else { continue };
+            let more = self.more(&card, &folder);
+            if card.keyword != "INCLUDE" {
+                let mut card = card.clone();
+                // Data of the file that it names go on with it, and name no file.
+                card.parameters.retain(|(name, _)| more.is_none() || name != "INPUT");
+                self.cards.push(card);
+            }
+            if let Some(path) = more {
+                let path = path?;
+                self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
+                    // A missing file is looked for where it is included.
+                    Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
+                        &card,
+                        Code::FileUnreadable,
+                        format!("{} is included: {}", path.display(), diagnostic.message()),
+                    ),
+                    _ => diagnostic,
+                })?;
+                if card.keyword == "INCLUDE" {
+                    let rest = self.continued(&card);
+                    self.cards.extend(rest);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The file that a card names for more of the deck (*INCLUDE) or of its own data; `None` of one that has all.
+    fn more(&self, card: &Card, folder: &Path) -> Option<Result<PathBuf, Diagnostic>> {
+        match (card.keyword.as_str(), card.parameter("INPUT")) {
+            ("INCLUDE" | "NODE" | "ELEMENT" | "NSET" | "ELSET", Some(name)) if !name.is_empty() => {
+                Some(Ok(self.place_of(name, folder)))
+            }
+            ("INCLUDE", _) => Some(Err(self
+                .about(card, Code::DeckSyntax, "*INCLUDE names no file")
+                .with_help("write *INCLUDE, INPUT=FILE"))),
+            _ => None,
+        }
+    }
+
+    /// A file that a card names: from the folder of the job, in which programs run, else from that of the file
+    /// that names it.
+    fn place_of(&self, name: &str, folder: &Path) -> PathBuf {
+        let main = self.files.first().and_then(|file| file.path().parent()).unwrap_or(folder);
+        let upright = name.replace('\\', "/");
+        let places = [main.join(name), folder.join(name), main.join(&upright), folder.join(&upright)];
+        places.iter().find(|path| path.is_file()).unwrap_or(&places[0]).clone()
+    }
+
+    /// The data below an *INCLUDE, if there is any: it goes on with the last card of the included file.
+    fn continued(&self, include: &Card) -> Option<Card> {
+        self.data(include).next()?;
+        let Card { file, line, ref data, first, .. } = *include;
+        Some(Card { file, line, data: data.clone(), first, ..self.cards.last()?.clone() })
+    }
+
+    /// The card that begins at a byte of a file, `None` where only comments stand, and where the next begins.
+    fn next_card(
+        &self,
+        at: usize,
+        position: usize,
+        line: usize,
+    ) -> Result<(Option<Card>, usize, usize), Diagnostic> {
+        let bytes = self.files[at].bytes();
+        let (mut head, mut end, mut number) = (String::new(), position, line);
+        if is_keyword(&bytes[position..]) {
+            // A keyword line that ends with a comma goes on.
+            loop {
+                let stop = line_end(bytes, end);
+                let text = String::from_utf8_lossy(&bytes[end..stop]);
+                head.push_str(text.trim());
+                (end, number) = (stop.min(bytes.len()), number + 1);
+                let goes_on = head.ends_with(',') && end < bytes.len() && !is_keyword(&bytes[end..]);
+                if !goes_on {
+                    break;
+                }
+            }
+        }
+        let (data, first) = (end, number);
+        while end < bytes.len() && !is_keyword(&bytes[end..]) {
+            end = line_end(bytes, end);
+            number += 1;
+        }
+        let card = |title: String, parameters| {
+            let keyword = comparable(&title);
+            Card { keyword, title, parameters, file: at, line, data: data..end, first }
+        };
+        if !head.is_empty() {
+            let (title, parameters) = keyword(&head);
+            return Ok((Some(card(title, parameters)), end, number));
+        }
+        let loose = card(String::new(), Vec::new());
+        let stray = self.data(&loose).next();
+        match (stray, self.cards.last()) {
+            (None, _) => Ok((None, end, number)),
+            // The first lines of an included file go on with what stood above its *INCLUDE.
+            (Some(_), Some(before)) if position == 0 => {
+                Ok((Some(Card { file: at, line, data: data..end, first, ..before.clone() }), end, number))
+            }
+            (Some((line, text)), _) => Err(Diagnostic::new(
+                Code::DeckSyntax,
+                format!("`{}` stands before the first keyword", excerpt(text)),
+            )
+            .in_file(self.files[at].path())
+            .at_line(line)
+            .with_help("a deck begins with a keyword line such as *NODE")),
+        }
+    }
+}
+
+/// A name as names are compared: in upper case, without blanks.
+pub(crate) fn comparable(name: &str) -> String {
+    name.split_whitespace().collect::<String>().to_uppercase()
+}
+
+/// True if a line is a keyword line: an asterisk that is not doubled; blanks before it do not count.
+fn is_keyword(line: &[u8]) -> bool {
+    let start = line.iter().position(|b| !matches!(b, b' ' | b'\t')).unwrap_or(line.len());
+    line.get(start) == Some(&b'*') && line.get(start + 1) != Some(&b'*')
+}
+
+/// Where the next line begins.
+fn line_end(bytes: &[u8], at: usize) -> usize {
+    memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1)
+}
+
+/// Keyword and parameters of a keyword line.
+fn keyword(line: &str) -> (String, Vec<(String, String)>) {
+    let mut fields = line.trim_start_matches('*').split(',').map(str::trim);
+    let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase();
+    let title = words(fields.next().unwrap_or_default());
+    let parameters = fields.filter(|field| !field.is_empty()).map(|field| {
+        let (name, value) = field.split_once('=').unwrap_or((field, ""));
+        (comparable(name), value.trim().trim_matches('"').to_owned())
+    });
+    (title, parameters.collect())
+}
+
+/// Fields of a line of data, trimmed; a comma at its end begins no field.
+pub(super) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.strip_suffix(b",").unwrap_or(line).split(|&b| b == b',').map(<[u8]>::trim_ascii)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn texts(deck: &Deck, card: &Card) -> Vec<(usize, String)> {
+        deck.data(card).map(|(line, text)| (line, String::from_utf8_lossy(text).into_owned())).collect()
+    }
+
+    #[test]
+    fn cards_have_their_parameters_and_data_and_included_files_go_on_with_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("more.inp"), "3, 1, 0, 0\n** end\n*elset, elset=E\n7\n")
+            .expect("written");
+        let text = "** head\n*Heading\n a title\n*Solid  Section,\n elset = \"All of it\" , Material=STEEL\n,\n\
+            *NODE\n1, 0, 0, 0\n*INCLUDE, INPUT=more.inp\n8\n*End Step\n";
+        let path = folder.path().join("job.inp");
+        fs::write(&path, text).expect("written");
+        let deck = Deck::read(&path).expect("a deck");
+        let keywords: Vec<&str> = deck.cards().iter().map(|card| card.keyword.as_str()).collect();
+        assert_eq!(
+            keywords,
+            ["HEADING", "SOLIDSECTION", "NODE", "NODE", "ELSET", "ELSET", "ENDSTEP"],
+            "data of the included file, and after it"
+        );
+        let [_, section, node, more, elset, rest, _] = deck.cards() else { panic!("seven cards") };
+        assert_eq!(section.parameter("ELSET"), Some("All of it"));
+        assert_eq!(section.name("MATERIAL").as_deref(), Some("STEEL"));
+        assert_eq!(texts(&deck, node), [(8, "1, 0, 0, 0".to_owned())]);
+        assert_eq!(texts(&deck, more), [(1, "3, 1, 0, 0".to_owned())]);
+        assert_eq!(texts(&deck, elset), [(4, "7".to_owned())]);
+        // What stands below *INCLUDE goes on with the last card of the included file.
+        assert_eq!(texts(&deck, rest), [(10, "8".to_owned())]);
+    }
+
+    #[test]
+    fn decks_that_make_no_sense_are_refused_where_they_do_not() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("job.inp");
+        for (text, line, part) in [
+            ("1, 2, 3\n*NODE\n", 1, "before the first keyword"),
+            ("*INCLUDE\n", 1, "names no file"),
+            ("*NODE\n1,0,0,0\n*INCLUDE, INPUT=not_there.inp\n", 3, "not_there.inp is included"),
+        ] {
+            fs::write(&path, text).expect("written");
+            let found = Deck::read(&path).err().expect("refused");
+            assert_eq!(found[0].line(), Some(line), "{text}");
+            assert!(found[0].message().contains(part), "{}", found[0].message());
+        }
+        fs::write(&path, "*INCLUDE, INPUT=job.inp\n").expect("written");
+        assert!(Deck::read(&path).err().expect("refused")[0].message().contains("levels deep"));
+    }
+}

@@ -1,0 +1,480 @@
+//! Nodes, elements and sets of a keyword deck, parts and instances of Abaqus included.
+
+use super::deck::{Card, Deck, comparable, fields};
+use super::deck_sets::{Elements, Found as Resolved, Instances, Member, Scope};
+use super::element_kinds::{Drawing, drawing};
+use super::{Found, NodeSets, Unresolved};
+use crate::coordinates::excerpt;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::table::integer;
+use nalgebra::{Rotation3, Unit, Vector3};
+use std::collections::{BTreeMap, HashMap};
+
+/// Number of bad lines of a deck that are reported one by one.
+const SHOWN: usize = 5;
+
+/// Members that a line of a generated set stands for at the most.
+const MOST_GENERATED: i64 = 100_000_000;
+
+/// Numbers of nodes that are renumbered are below this.
+const LARGEST: i64 = 1_000_000_000_000;
+
+/// Nodes, elements and node sets in the numbering of the whole model.
+#[derive(Debug, Default)]
+pub(super) struct DeckMesh {
+    /// Ascending by number.
+    pub nodes: BTreeMap<i64, [f64; 3]>,
+    pub elements: Vec<Elements>,
+    /// Node sets by name as the deck has it, in the order of the deck.
+    pub sets: NodeSets,
+    /// Node sets that cannot be resolved, and why.
+    pub unresolved: Unresolved,
+    /// Element sets by name as names are compared. Those of parts and instances are not among them.
+    pub element_sets: HashMap<String, Vec<i64>>,
+    /// Notes about the numbering.
+    pub notes: Vec<Diagnostic>,
+}
+
+impl DeckMesh {
+    /// Everything that `deck` says of nodes, elements and node sets.
+    ///
+    /// # Errors
+    /// FB110 for lines that cannot be read, FB111 for cards that make nodes in ways that are not read.
+    pub(super) fn of(deck: &Deck) -> Found<Self> {
+        let mut reading = Reading { deck, bad: Vec::new(), bad_count: 0 };
+        let mut scopes = Scopes::default();
+        for card in deck.cards() {
+            reading.card(card, &mut scopes);
+        }
+        let found = reading.finish();
+        if found.is_empty() { scopes.assembled() } else { Err(found) }
+    }
+
+    /// The elements as they are drawn.
+    pub(super) fn drawn(&self) -> flexbody_model::Elements {
+        let mut drawn = flexbody_model::Elements::default();
+        for Elements { kind, members } in &self.elements {
+            for (_, nodes) in members {
+                match drawing(kind, nodes) {
+                    Drawing::Shape(shape, nodes) => drawn.add(kind, shape, &nodes),
+                    Drawing::Nothing => {}
+                    Drawing::Unknown => drawn.leave_out(kind, 1),
+                }
+            }
+        }
+        drawn
+    }
+}
+
+/// A part at a place of the assembly.
+#[derive(Debug, Clone)]
+struct Instance {
+    name: String,
+    /// Nodes, elements and sets of the part, and those that are defined within the instance.
+    own: Scope,
+    moved: Placement,
+}
+
+/// A turn about an axis, after a displacement.
+#[derive(Debug, Clone, Default)]
+struct Placement {
+    displacement: [f64; 3],
+    /// Two points of the axis, and the angle in degrees.
+    turn: Option<[f64; 7]>,
+}
+
+impl Placement {
+    fn of(&self, x: [f64; 3]) -> [f64; 3] {
+        let mut x = Vector3::from(x) + Vector3::from(self.displacement);
+        if let Some([a, b, c, d, e, f, degrees]) = self.turn {
+            let (from, to) = (Vector3::new(a, b, c), Vector3::new(d, e, f));
+            let turn = Rotation3::from_axis_angle(&Unit::new_normalize(to - from), degrees.to_radians());
+            x = from + turn * (x - from);
+        }
+        x.into()
+    }
+}
+
+/// Where the cards of a deck belong.
+#[derive(Debug, Default)]
+struct Scopes {
+    /// Of a deck without parts, and of the assembly.
+    top: Scope,
+    parts: HashMap<String, Scope>,
+    instances: Vec<Instance>,
+    part: Option<String>,
+    in_instance: bool,
+}
+
+impl Scopes {
+    /// Instances with their sets, for sets of the assembly; none within a part or an instance.
+    fn instances(&self) -> Instances<'_> {
+        let is_assembly = self.part.is_none() && !self.in_instance;
+        let some = if is_assembly { self.instances.as_slice() } else { &[] };
+        Instances::new(some.iter().map(|own| (own.name.as_str(), &own.own)).collect())
+    }
+
+    /// The scope that cards belong to; `None` of a part that has nothing yet.
+    fn open(&self) -> Option<&Scope> {
+        match (&self.part, self.in_instance) {
+            (Some(part), _) => self.parts.get(part),
+            (None, true) => self.instances.last().map(|instance| &instance.own),
+            _ => Some(&self.top),
+        }
+    }
+
+    fn current(&mut self) -> &mut Scope {
+        match (&self.part, self.in_instance) {
+            (Some(part), _) => self.parts.entry(part.clone()).or_default(),
+            (None, true) => &mut self.instances.last_mut().expect("an instance is open").own,
+            _ => &mut self.top,
+        }
+    }
+
+    /// The model of all instances. Numbers stay as they are where no two instances have the same; else every
+    /// instance has numbers of its own.
+    fn assembled(self) -> Found<DeckMesh> {
+        let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.own)).collect();
+        let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
+        let unique = placed.iter().all(|(_, scope)| scope.nodes.keys().all(|id| taken.insert(*id)));
+        let keys = placed.iter().map(|(_, scope)| &scope.nodes).chain([&self.top.nodes]);
+        let highest = keys.filter_map(|nodes| nodes.keys().next_back().copied()).max().unwrap_or(0);
+        if !unique && highest > LARGEST / placed.len() as i64 {
+            let message =
+                format!("instances share node numbers, which are too large ({highest}) to be changed");
+            return Err(vec![Diagnostic::new(Code::DeckUnsupported, message)]);
+        }
+        let stride = if unique { 0 } else { power_of_ten_above(highest) };
+        // Nodes of the assembly keep their numbers.
+        let first = i64::from(!self.top.nodes.is_empty());
+        let mut mesh = DeckMesh {
+            nodes: self.top.nodes.clone(),
+            elements: self.top.elements.clone(),
+            element_sets: self.top.element_sets.clone(),
+            ..DeckMesh::default()
+        };
+        let mut shifts = Vec::new();
+        for (k, (instance, scope)) in placed.iter().enumerate() {
+            let shift = stride * (k as i64 + first);
+            if shift > 0 {
+                let message = format!(
+                    "nodes of the instance `{}` are numbered from {}: instances share numbers",
+                    instance.name,
+                    shift + 1
+                );
+                mesh.notes.push(Diagnostic::new(Code::DeckRenumbered, message));
+            }
+            mesh.add(scope, shift, instance);
+            shifts.push((instance.name.as_str(), *scope, shift));
+        }
+        (mesh.sets, mesh.unresolved) = self.top.sets.of_model(&shifts);
+        Ok(mesh)
+    }
+}
+
+impl DeckMesh {
+    fn add(&mut self, scope: &Scope, shift: i64, instance: &Instance) {
+        self.nodes.extend(scope.nodes.iter().map(|(id, x)| (id + shift, instance.moved.of(*x))));
+        for elements in &scope.elements {
+            let member =
+                |(id, nodes): &(i64, Vec<i64>)| (id + shift, nodes.iter().map(|id| id + shift).collect());
+            let members = elements.members.iter().map(member).collect();
+            self.elements.push(Elements { kind: elements.kind.clone(), members });
+        }
+    }
+
+    /// The nodes of a set.
+    pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
+        let name = comparable(name);
+        self.sets.iter().find(|(own, _)| comparable(own) == name).map(|(_, nodes)| nodes.as_slice())
+    }
+}
+
+/// The least power of ten that no number reaches.
+fn power_of_ten_above(number: i64) -> i64 {
+    let mut power = 10i64;
+    while power <= number && power < i64::MAX / 10 {
+        power *= 10;
+    }
+    power
+}
+
+/// A deck while it is read.
+struct Reading<'d> {
+    deck: &'d Deck,
+    bad: Vec<Diagnostic>,
+    bad_count: usize,
+}
+
+impl Reading<'_> {
+    fn card(&mut self, card: &Card, scopes: &mut Scopes) {
+        match card.keyword.as_str() {
+            "PART" => scopes.part = Some(card.name("NAME").unwrap_or_default()),
+            "ENDPART" => scopes.part = None,
+            "INSTANCE" => {
+                let moved = self.placement(card);
+                let name = card.parameter("NAME").unwrap_or_default().to_owned();
+                let part = card.name("PART").unwrap_or_default();
+                let own = scopes.parts.get(&part).cloned().unwrap_or_default();
+                scopes.instances.push(Instance { name, own, moved });
+                scopes.in_instance = true;
+            }
+            "ENDINSTANCE" => scopes.in_instance = false,
+            "NODE" => self.nodes(card, scopes.current()),
+            "ELEMENT" => self.elements(card, scopes.current()),
+            "NSET" => self.set(card, scopes),
+            "ELSET" => self.element_set(card, scopes.current()),
+            "NGEN" | "NFILL" | "NCOPY" | "NMAP" | "ELGEN" | "ELCOPY" | "SYSTEM" => {
+                let message = format!("*{} is not read", card.title);
+                let help = "write the nodes and elements one by one, as preprocessors do";
+                self.complain(self.deck.about(card, Code::DeckUnsupported, message).with_help(help));
+            }
+            _ => {}
+        }
+    }
+
+    fn complain(&mut self, diagnostic: Diagnostic) {
+        self.bad_count += 1;
+        if self.bad.len() < SHOWN {
+            self.bad.push(diagnostic);
+        }
+    }
+
+    fn finish(mut self) -> Vec<Diagnostic> {
+        if self.bad_count > self.bad.len() {
+            let message = format!("{} more lines are bad", self.bad_count - self.bad.len());
+            self.bad.extend(
+                self.deck.path().map(|path| Diagnostic::new(Code::DeckSyntax, message).in_file(path)),
+            );
+        }
+        self.bad
+    }
+
+    fn syntax(&mut self, card: &Card, line: usize, expected: &str, text: &[u8]) {
+        let message = format!("*{}: expected {expected}, found `{}`", card.title, excerpt(text));
+        self.complain(self.deck.at(card, line, Code::DeckSyntax, message).with_help("correct the line"));
+    }
+
+    fn numbers(&mut self, card: &Card, most: usize) -> Option<Vec<Vec<f64>>> {
+        let mut rows = Vec::new();
+        for (line, text) in self.deck.data(card) {
+            let row: Option<Vec<f64>> = fields(text).map(real).collect();
+            match row {
+                Some(row) if row.len() <= most => rows.push(row),
+                _ => {
+                    self.syntax(card, line, &format!("up to {most} numbers"), text);
+                    return None;
+                }
+            }
+        }
+        Some(rows)
+    }
+
+    fn placement(&mut self, card: &Card) -> Placement {
+        let rows = self.numbers(card, 7).unwrap_or_default();
+        let mut placement = Placement::default();
+        if let Some(row) = rows.first() {
+            for (k, value) in row.iter().take(3).enumerate() {
+                placement.displacement[k] = *value;
+            }
+        }
+        if let Some(row) = rows.get(1) {
+            let turn: Option<[f64; 7]> = row.as_slice().try_into().ok();
+            placement.turn = turn.filter(|[a, b, c, d, e, f, _]| [a, b, c] != [d, e, f]);
+            if placement.turn.is_none() {
+                let message = "*INSTANCE: expected two points of an axis and an angle";
+                self.complain(self.deck.about(card, Code::DeckSyntax, message).with_help("correct the line"));
+            }
+        }
+        placement
+    }
+
+    fn nodes(&mut self, card: &Card, scope: &mut Scope) {
+        let system = card.name("SYSTEM").unwrap_or_default();
+        let mut ids = Vec::new();
+        for (line, text) in self.deck.data(card) {
+            let mut given = fields(text);
+            let id = given.next().and_then(integer);
+            let mut x = [0.0; 3];
+            let mut read = true;
+            for coordinate in &mut x {
+                let Some(field) = given.next() else { break };
+                match real(field) {
+                    Some(value) => *coordinate = value,
+                    None => read = false,
+                }
+            }
+            match id {
+                Some(id) if read && x.iter().all(|value| value.is_finite()) => {
+                    scope.nodes.insert(id, in_cartesian(&system, x));
+                    ids.push(id);
+                }
+                _ => self.syntax(card, line, "a node number and its coordinates", text),
+            }
+        }
+        if let Some(name) = card.parameter("NSET") {
+            scope.sets.extend(name, Ok(ids.into_iter().map(Member::own).collect()));
+        }
+    }
+
+    fn elements(&mut self, card: &Card, scope: &mut Scope) {
+        let Some(kind) = card.name("TYPE") else {
+            let diagnostic = self.deck.about(card, Code::DeckSyntax, "*ELEMENT has no TYPE");
+            return self.complain(diagnostic.with_help("write *ELEMENT, TYPE=C3D20, for example"));
+        };
+        let mut members: Vec<(i64, Vec<i64>)> = Vec::new();
+        let mut goes_on = false;
+        for (line, text) in self.deck.data(card) {
+            let ids: Option<Vec<i64>> = fields(text).filter(|field| !field.is_empty()).map(integer).collect();
+            let Some(ids) = ids else {
+                self.syntax(card, line, "an element number and its nodes", text);
+                continue;
+            };
+            match (goes_on, members.last_mut()) {
+                (true, Some((_, nodes))) => nodes.extend(ids),
+                _ => members.extend(ids.split_first().map(|(id, nodes)| (*id, nodes.to_vec()))),
+            }
+            // A line that ends with a comma goes on; long elements go on without one as well.
+            let wanted = super::element_kinds::n_nodes(&kind);
+            let have = members.last().map_or(0, |(_, nodes)| nodes.len());
+            goes_on = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
+        }
+        if let Some(name) = card.name("ELSET") {
+            scope.element_sets.entry(name).or_default().extend(members.iter().map(|(id, _)| *id));
+        }
+        scope.elements.push(Elements { kind, members });
+    }
+
+    /// Members of a set: numbers, ranges with GENERATE, and what `known` makes of names. The first name that is
+    /// not known leaves the set without members.
+    fn members<T>(
+        &mut self,
+        card: &Card,
+        number: impl Fn(i64) -> T,
+        known: impl Fn(&str) -> Option<Vec<T>>,
+    ) -> Resolved<T> {
+        let generate = card.parameter("GENERATE").is_some();
+        let (mut members, mut unknown) = (Vec::new(), None);
+        for (line, text) in self.deck.data(card) {
+            if generate {
+                let bounds: Option<Vec<i64>> =
+                    fields(text).filter(|field| !field.is_empty()).map(integer).collect();
+                match bounds.as_deref().and_then(range) {
+                    Some((first, last, step)) => {
+                        members.extend((first..=last).step_by(step as usize).map(&number));
+                    }
+                    None => self.syntax(card, line, "first, last and increment", text),
+                }
+                continue;
+            }
+            for field in fields(text).filter(|field| !field.is_empty()) {
+                let name = String::from_utf8_lossy(field);
+                let name = name.trim_matches('"');
+                match integer(name.as_bytes()).map(|id| vec![number(id)]).or_else(|| known(name)) {
+                    Some(more) => members.extend(more),
+                    None => {
+                        let message = format!("*{}: `{name}` is no number and no set above", card.title);
+                        let help = "define the set above, or correct the name";
+                        let refused = self.deck.at(card, line, Code::DeckSyntax, message).with_help(help);
+                        unknown.get_or_insert(refused);
+                    }
+                }
+            }
+        }
+        match unknown {
+            None => Ok(members),
+            Some(refused) => Err(refused),
+        }
+    }
+
+    fn set(&mut self, card: &Card, scopes: &mut Scopes) {
+        let Some(name) = card.parameter("NSET").map(str::to_owned) else {
+            let diagnostic = self.deck.about(card, Code::DeckSyntax, "*NSET has no name");
+            return self.complain(diagnostic.with_help("write *NSET, NSET=NAME"));
+        };
+        let members = match card.parameter("ELSET").filter(|elements| !elements.is_empty()) {
+            Some(elements) => self.nodes_of_elements(card, elements, scopes),
+            None => self.nodes_of_set(card, scopes),
+        };
+        scopes.current().sets.extend(&name, members);
+    }
+
+    /// The nodes of *NSET, ELSET=NAME, of an instance or of the scope of the card.
+    fn nodes_of_elements(&self, card: &Card, elements: &str, scopes: &Scopes) -> Resolved<Member> {
+        let nodes = match card.parameter("INSTANCE") {
+            Some(instance) => scopes.instances().nodes_of_elements(instance, elements),
+            None => {
+                let nodes = scopes.open().and_then(|scope| scope.nodes_of_elements(elements));
+                nodes.map(|own| own.into_iter().map(Member::own).collect())
+            }
+        };
+        nodes.ok_or_else(|| {
+            let message = format!("element set `{elements}` is not known here");
+            let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
+            diagnostic.with_help("define the element set above")
+        })
+    }
+
+    /// The nodes of *NSET by numbers and names, of an instance or of the scope of the card.
+    fn nodes_of_set(&mut self, card: &Card, scopes: &Scopes) -> Resolved<Member> {
+        let instances = scopes.instances();
+        let Some(instance) = card.parameter("INSTANCE") else {
+            let known = |set: &str| {
+                let own = scopes.open().and_then(|scope| scope.sets.find(set)?.as_ref().ok());
+                own.cloned().or_else(|| instances.named(set))
+            };
+            return self.members(card, Member::own, known);
+        };
+        match instances.find(instance) {
+            Some(one) => self.members(card, |id| one.member(id), |set| one.set(set)),
+            None => {
+                let message = format!("the instance `{instance}` is not in the deck");
+                let diagnostic = self.deck.about(card, Code::DeckSyntax, message);
+                Err(diagnostic.with_help("name an instance of the assembly"))
+            }
+        }
+    }
+
+    fn element_set(&mut self, card: &Card, scope: &mut Scope) {
+        // Element sets of the assembly pick elements of instances; nothing here needs them.
+        let (Some(name), None) = (card.name("ELSET"), card.parameter("INSTANCE")) else { return };
+        let known = |set: &str| scope.element_sets.get(&comparable(set)).cloned();
+        // One with a name that is not known is not known either.
+        if let Ok(members) = self.members(card, |id| id, known) {
+            scope.element_sets.entry(name).or_default().extend(members);
+        } else {
+            scope.element_sets.remove(&name);
+        }
+    }
+}
+
+/// First, last and increment of a generated set.
+fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
+    let (first, last, step) = match *bounds {
+        [first, last] => (first, last, 1),
+        [first, last, step] if step > 0 => (first, last, step),
+        _ => return None,
+    };
+    let few = last.checked_sub(first).is_some_and(|length| length / step < MOST_GENERATED);
+    (first <= last && few).then_some((first, last, step))
+}
+
+/// A number; an empty field is zero.
+fn real(field: &[u8]) -> Option<f64> {
+    if field.is_empty() { Some(0.0) } else { crate::coordinates::real(field) }
+}
+
+/// Cartesian coordinates of a node given in cylindrical (`C`: radius, degrees, z) or spherical ones (`S`:
+/// radius, longitude and latitude in degrees).
+fn in_cartesian(system: &str, x: [f64; 3]) -> [f64; 3] {
+    let [r, theta, third] = x;
+    let (sin, cos) = theta.to_radians().sin_cos();
+    match system {
+        "C" => [r * cos, r * sin, third],
+        "S" => {
+            let (up, out) = third.to_radians().sin_cos();
+            [r * cos * out, r * sin * out, r * up]
+        }
+        _ => x,
+    }
+}

@@ -1,0 +1,116 @@
+//! Reference nodes of `*DISTRIBUTING COUPLING` of CalculiX.
+//!
+//! Such a coupling makes the displacement of its reference node the mean of those of its nodes, with weights, and
+//! eliminates the first of these. The coordinates of the reference node mean nothing to CalculiX; a rigid motion moves it
+//! as the mean of the places of the nodes, which is where its rows are.
+
+use super::Found;
+use super::deck::{Card, Deck, fields};
+use super::deck_mesh::DeckMesh;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::numbers::significant;
+use flexbody_base::text::table::{integer, printable};
+use flexbody_model::DofLabel;
+use nalgebra::Vector3;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+const HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one element of type DCOUP3D in E and lines `node or set, weight`; or take it out of the deck and name its nodes as an averaging interface: --interface NAME=SET,averaging";
+
+/// Returns the reference nodes of the couplings of a deck, each with the mean of the places of its nodes.
+///
+/// # Errors
+/// FB111 for a coupling whose reference node or nodes cannot be identified.
+pub(super) fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i64, [f64; 3]>> {
+    let is_coupling = |card: &&Card| card.keyword == "DISTRIBUTINGCOUPLING";
+    let mut sums: BTreeMap<i64, Sum<'_>> = BTreeMap::new();
+    for card in deck.cards().iter().filter(is_coupling) {
+        let node = reference_node(card, mesh).map_err(|why| refused(deck, card, &why))?;
+        let sum = sums.entry(node).or_insert(Sum { card, moment: Vector3::zeros(), total: 0.0 });
+        // Data that goes on in another file has a card of its own.
+        for (line, text) in deck.data(card) {
+            let (places, weight) = weighted(text, mesh).ok_or_else(|| {
+                let text = printable(text);
+                let message =
+                    format!("*DISTRIBUTING COUPLING: `{text}` is not a node or node set and its weight");
+                vec![deck.at(card, line, Code::DeckUnsupported, message).with_help(HELP)]
+            })?;
+            sum.moment += places.iter().map(|place| weight * Vector3::from(*place)).sum::<Vector3<f64>>();
+            sum.total += weight * places.len() as f64;
+        }
+    }
+    let mean = |(node, sum): (i64, Sum<'_>)| {
+        let place = sum.moment / sum.total;
+        let why = "the weights of its nodes add up to zero";
+        let is_finite = place.iter().all(|x| x.is_finite());
+        is_finite.then(|| (node, place.into())).ok_or_else(|| refused(deck, sum.card, why))
+    };
+    sums.into_iter().map(mean).collect()
+}
+
+/// Places of nodes, summed up with their weights.
+struct Sum<'d> {
+    card: &'d Card,
+    moment: Vector3<f64>,
+    total: f64,
+}
+
+fn refused(deck: &Deck, card: &Card, why: &str) -> Vec<Diagnostic> {
+    let message = format!("*DISTRIBUTING COUPLING: {why}");
+    vec![deck.about(card, Code::DeckUnsupported, message).with_help(HELP)]
+}
+
+/// Returns a note that names the reference nodes with rows, which lie elsewhere than the deck says.
+pub(super) fn placed_note(
+    means: &BTreeMap<i64, [f64; 3]>,
+    labels: &[DofLabel],
+    path: &Path,
+) -> Option<Diagnostic> {
+    let with_rows: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
+    let named: Vec<String> = means
+        .iter()
+        .filter(|(node, _)| with_rows.contains(node))
+        .map(|(node, x)| format!("{node} at ({})", x.map(|x| significant(x, 6)).join(", ")))
+        .collect();
+    let message = format!(
+        "reference nodes of distributing couplings lie at the weighted mean of their nodes, whatever their coordinates are: {}",
+        named.join("; ")
+    );
+    (!named.is_empty()).then(|| Diagnostic::new(Code::DeckReference, message).in_file(path))
+}
+
+/// Returns the node of the only element of the set of a coupling.
+///
+/// # Errors
+/// A set that is missing, or has other elements than one DCOUP3D, in words.
+fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
+    let set = card.name("ELSET").ok_or("ELSET is missing")?;
+    let members = mesh.element_sets.get(&set).ok_or_else(|| format!("element set `{set}` is unknown"))?;
+    let is_coupling = |kind: &str| kind == "DCOUP3D";
+    let nodes: Vec<i64> = mesh
+        .elements
+        .iter()
+        .filter(|own| is_coupling(&own.kind))
+        .flat_map(|own| &own.members)
+        .filter(|(id, _)| members.contains(id))
+        .flat_map(|(_, nodes)| nodes.iter().copied())
+        .collect();
+    match (nodes.as_slice(), members.len()) {
+        (&[node], 1) => Ok(node),
+        _ => Err(format!("element set `{set}` is not one element of type DCOUP3D")),
+    }
+}
+
+/// Returns the places of the nodes that a line names by a number or a set, and the weight of each; `None` for a line that
+/// names no node or set of the deck, or has no weight.
+fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
+    let mut given = fields(line);
+    let (name, weight) = (given.next()?, given.next()?);
+    let weight = fast_float2::parse(weight).ok().filter(|weight: &f64| weight.is_finite())?;
+    let nodes: BTreeSet<i64> = match integer(name) {
+        Some(node) => BTreeSet::from([node]),
+        None => mesh.set(&String::from_utf8_lossy(name))?.iter().copied().collect(),
+    };
+    let places: Option<Vec<[f64; 3]>> = nodes.iter().map(|node| mesh.nodes.get(node).copied()).collect();
+    Some((places?, weight))
+}

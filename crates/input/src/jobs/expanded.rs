@@ -1,0 +1,245 @@
+//! Elements that CalculiX expands into solids: several rows have the label of one node of the deck.
+//!
+//! A node at the corner of a quadratic shell (S6, S8, S8R) becomes three, on both faces and between them, one
+//! at the middle of an edge becomes two. The one between the faces has more mass than those beside it, since it is
+//! the middle of an edge of the solid. With the node of the deck at x, the vector d through the thickness and the
+//! OFFSET o of the section they lie at x - (1/2 + o) d, x - o d and x + (1/2 - o) d, and K says what d is: K R = 0
+//! of the rigid rotations R leaves it no other. Where none of them lies at x, the one between the faces has the
+//! number of the node; others get numbers that the deck does not have.
+
+use super::Found;
+use super::deck::Deck;
+use super::deck_mesh::DeckMesh;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
+use flexbody_model::{DofLabel, RawMatrix};
+use std::collections::{BTreeMap, HashMap};
+use std::path::Path;
+
+/// Elements that are expanded, and those among them whose rows can be told apart.
+const EXPANDED: &[&str] = &["S", "B", "CPS", "CPE", "CAX", "M3D", "T3D", "T2D"];
+const SHELLS: &[&str] = &["S6", "S8", "S8R"];
+
+/// Part of the size of the body by which the rows of a node may differ from those of a point.
+const POINT: f64 = 1e-6;
+
+/// Labels of which each stands for one row, and places of nodes that lie elsewhere than the deck says, most of
+/// which it does not have.
+pub(super) struct Once {
+    pub labels: Vec<DofLabel>,
+    pub places: BTreeMap<i64, [f64; 3]>,
+}
+
+/// A node of the deck that has become several.
+struct Expanded {
+    node: i64,
+    /// First row of each, from one face to the other, and how much of d it lies off the node of the deck.
+    copies: Vec<(usize, f64)>,
+}
+
+/// Labels each row once.
+///
+/// # Errors
+/// FB111 where rows of one label cannot be told apart, or K does not say where they belong.
+pub(super) fn label_once(
+    deck: &Deck,
+    mesh: &DeckMesh,
+    labels: Vec<DofLabel>,
+    [stiffness, mass]: [&RawMatrix; 2],
+    path: &Path,
+) -> Found<Once> {
+    let mut rows: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
+    labels.iter().enumerate().for_each(|(row, label)| rows.entry(label.node).or_default().push(row));
+    let is_repeated = |rows: &Vec<usize>| {
+        let mut directions: Vec<u8> = rows.iter().map(|row| labels[*row].direction).collect();
+        directions.sort_unstable();
+        directions.windows(2).any(|pair| pair[0] == pair[1])
+    };
+    rows.retain(|_, own| is_repeated(own));
+    let Some(first) = rows.values().map(|own| own[0]).min().map(|row| labels[row]) else {
+        return Ok(Once { labels, places: BTreeMap::new() });
+    };
+    let kinds = expanded_kinds(mesh);
+    let refuse = |why: &str| vec![refused(first, &kinds, why).in_file(path)];
+    if kinds.is_empty() || !kinds.iter().all(|kind| SHELLS.contains(kind)) {
+        return Err(refuse("the deck does not say where their nodes lie"));
+    }
+    let offsets = offsets(deck, mesh, &rows).map_err(refuse)?;
+    let mut all = Vec::new();
+    for (&node, own) in &rows {
+        let copies = copies(own, &labels, mass, offsets[&node]);
+        let copies = copies.ok_or_else(|| refuse("their rows cannot be told apart"))?;
+        all.push(Expanded { node, copies });
+    }
+    all.sort_by_key(|own| own.copies[0].0);
+    let through = thickness(stiffness, &labels, &mesh.nodes, &all)
+        .ok_or_else(|| refuse("the stiffness does not say where their nodes lie"))?;
+    numbered(mesh, labels, &all, &through).ok_or_else(|| refuse("their nodes have no numbers left"))
+}
+
+/// The rows of a node as points, each with the part of d by which it lies off the node; `None` where rows are no
+/// points, or none of three is the one between the faces.
+fn copies(rows: &[usize], labels: &[DofLabel], mass: &RawMatrix, offset: f64) -> Option<Vec<(usize, f64)>> {
+    let is_vector = |own: &[usize]| {
+        let direction = |k: usize| own.get(k).map(|row| (*row, labels[*row].direction));
+        (0..3).all(|k| direction(k) == Some((own[0] + k, k as u8 + 1)))
+    };
+    let masses: Vec<f64> = rows.chunks(3).map(|own| mass.matrix.get(own[0], own[0])).collect();
+    let parts: &[f64] = match *masses.as_slice() {
+        [_, _] => &[-0.5, 0.5],
+        [below, middle, above] if middle > below.max(above) => &[-0.5, 0.0, 0.5],
+        _ => return None,
+    };
+    let place = |(own, part): (&[usize], &f64)| (own[0], part - offset);
+    rows.chunks(3).all(is_vector).then(|| rows.chunks(3).zip(parts).map(place).collect())
+}
+
+/// OFFSET of the sections of the elements of each node, in parts of the thickness.
+fn offsets(
+    deck: &Deck,
+    mesh: &DeckMesh,
+    nodes: &BTreeMap<i64, Vec<usize>>,
+) -> Result<BTreeMap<i64, f64>, &'static str> {
+    let mut of_elements: HashMap<i64, f64> = HashMap::new();
+    for card in deck.cards().iter().filter(|card| card.keyword == "SHELLSECTION") {
+        let Some(offset) = card.name("OFFSET") else { continue };
+        let offset = match offset.as_str() {
+            "SPOS" => Some(0.5),
+            "SNEG" => Some(-0.5),
+            number => crate::coordinates::real(number.as_bytes()).filter(|value| value.is_finite()),
+        };
+        let members = card.name("ELSET").and_then(|set| mesh.element_sets.get(&set));
+        let (Some(offset), Some(members)) = (offset, members) else {
+            return Err("the OFFSET of a section, or its elements, cannot be read");
+        };
+        of_elements.extend(members.iter().map(|element| (*element, offset)));
+    }
+    let mut of_nodes: BTreeMap<i64, f64> = BTreeMap::new();
+    for (element, own) in mesh.elements.iter().flat_map(|own| &own.members) {
+        let offset = of_elements.get(element).copied().unwrap_or(0.0);
+        for node in own.iter().filter(|node| nodes.contains_key(node)) {
+            if of_nodes.insert(*node, offset).is_some_and(|other| other != offset) {
+                return Err("sections with different OFFSET share a node");
+            }
+        }
+    }
+    nodes.keys().for_each(|node| {
+        of_nodes.entry(*node).or_insert(0.0);
+    });
+    Ok(of_nodes)
+}
+
+/// Labels with a number for each point, and where these points lie; `None` if there are no numbers left.
+fn numbered(
+    mesh: &DeckMesh,
+    mut labels: Vec<DofLabel>,
+    all: &[Expanded],
+    through: &[[f64; 3]],
+) -> Option<Once> {
+    let mut next = labels.iter().map(|label| label.node).chain(mesh.nodes.keys().copied()).max().unwrap_or(0);
+    let mut places = BTreeMap::new();
+    for (Expanded { node, copies }, d) in all.iter().zip(through) {
+        let x = mesh.nodes[node];
+        let at_node = copies.iter().position(|(_, part)| *part == 0.0);
+        let own = at_node.or((copies.len() == 3).then_some(1));
+        for (copy, &(row, part)) in copies.iter().enumerate() {
+            let place = [0, 1, 2].map(|k| x[k] + part * d[k]);
+            if own == Some(copy) {
+                if part != 0.0 {
+                    places.insert(*node, place);
+                }
+                continue;
+            }
+            next = next.checked_add(1)?;
+            (row..row + 3).for_each(|row| labels[row].node = next);
+            places.insert(next, place);
+        }
+    }
+    Some(Once { labels, places })
+}
+
+/// Vectors d of the nodes. With R_b of the rows that are known, turned about each axis, those of a node at x move
+/// by e x x + c e x d, c being the parts of their copies: C'KC D = -C'K R_b. `None` where they are no points.
+fn thickness(
+    stiffness: &RawMatrix,
+    labels: &[DofLabel],
+    nodes: &BTreeMap<i64, [f64; 3]>,
+    all: &[Expanded],
+) -> Option<Vec<[f64; 3]>> {
+    let n = labels.len();
+    let size = nodes.values().flatten().fold(0.0f64, |size, x| size.max(x.abs()));
+    // Unknown of each row, and its part.
+    let mut unknown = vec![None; n];
+    for (at, Expanded { node, copies }) in all.iter().enumerate() {
+        nodes.get(node)?;
+        for &(row, part) in copies.iter().filter(|(_, part)| *part != 0.0) {
+            (0..3).for_each(|k| unknown[row + k] = Some(((3 * at + k) as u32, part)));
+        }
+    }
+    let turn = |row: usize, axis: usize| {
+        let DofLabel { node, direction } = labels[row];
+        let Some(x) = nodes.get(&node) else { return 0.0 };
+        let k = usize::from(direction) - 1;
+        // e_a x x along k.
+        match (k + 3 - axis) % 3 {
+            1 => -x[(axis + 2) % 3],
+            2 => x[(axis + 1) % 3],
+            _ => 0.0,
+        }
+    };
+    let mut load = Mat::zeros(3 * all.len(), 3);
+    let mut entries = Vec::new();
+    for column in 0..n {
+        let (rows, values) = stiffness.matrix.column(column);
+        for (&row, &value) in rows.iter().zip(values) {
+            let Some((i, part)) = unknown[row as usize] else { continue };
+            (0..3).for_each(|axis| load[(i as usize, axis)] -= part * value * turn(column, axis));
+            if let Some((j, other)) = unknown[column] {
+                entries.push((i, j, part * value * other));
+            }
+        }
+    }
+    let own = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(3 * all.len(), 3 * all.len(), &entries));
+    let turned = solved(&own, &load)?;
+    let vector = |at: usize| {
+        let entry = |k: usize, axis: usize| turned[(3 * at + k, axis)];
+        // The two entries that a coordinate has, and how far the rows are from those of a point.
+        let pairs = [0, 1, 2].map(|c| (entry((c + 1) % 3, (c + 2) % 3), -entry((c + 2) % 3, (c + 1) % 3)));
+        let differs = pairs.iter().map(|(a, b)| (a - b).abs()).chain((0..3).map(|k| entry(k, k).abs()));
+        (differs.fold(0.0, f64::max) <= POINT * size).then(|| pairs.map(|(a, b)| 0.5 * (a + b)))
+    };
+    (0..all.len()).map(vector).collect()
+}
+
+/// Solves A X = B for a positive definite matrix, with one step of refinement; `None` for another matrix.
+fn solved(own: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
+    let n = own.n();
+    let unit: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
+    let unit = SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &unit))?;
+    let pencil = Pencil::new(own, &unit, 1);
+    let analysis = Analysis::new(&pencil)?;
+    let factor = Cholesky::<f64>::new(&analysis, &pencil, 0.0)?;
+    let mut solution = load.clone();
+    factor.solve_in_place(solution.as_mut());
+    let mut rest = load - pencil.apply_stiffness(solution.as_ref());
+    factor.solve_in_place(rest.as_mut());
+    solution += &rest;
+    Some(solution)
+}
+
+/// Types of the expanded elements of a deck.
+fn expanded_kinds(mesh: &DeckMesh) -> Vec<&str> {
+    let expanded = |kind: &&str| EXPANDED.iter().any(|head| kind.starts_with(head));
+    let mut kinds: Vec<&str> = mesh.elements.iter().map(|own| own.kind.as_str()).filter(expanded).collect();
+    kinds.sort_unstable();
+    kinds.dedup();
+    kinds
+}
+
+fn refused(label: DofLabel, kinds: &[&str], why: &str) -> Diagnostic {
+    let kinds = if kinds.is_empty() { "elements".to_owned() } else { kinds.join(", ") };
+    let message = format!("{label} labels several rows: CalculiX expands {kinds} into solids, and {why}");
+    Diagnostic::new(Code::DeckUnsupported, message)
+        .with_help("model the part with solid elements, C3D4, C3D8, C3D10, C3D20 and their kin, or with the shells S6, S8, S8R alone")
+}

@@ -1,0 +1,225 @@
+//! Matrices whose lines name node and direction of row and column, as Abaqus writes them with FORMAT=MATRIX INPUT
+//! or LABELS: `node, direction, node, direction, value`. Their rows are the labels in ascending order.
+
+use super::deck::fields;
+use super::{Found, FromFile, both};
+use crate::assemble::{Entry, Sides, Storage, assemble, check_size};
+use crate::coordinates::{Blocks, excerpt, line_aligned, lines, most_entries, real};
+use crate::digits::{COUNTED, written_digits};
+use crate::recent::Recent;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_base::text::table::integer;
+use flexbody_model::{DofLabel, RawMatrix};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Bad lines of a file that are told one by one.
+const SHOWN: usize = 5;
+
+/// Two matrices and the labels of their rows.
+///
+/// # Errors
+/// FB101, FB132, FB301 for their lines, and those of [`assemble`].
+pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
+    let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
+    let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);
+    let mut labels: Vec<DofLabel> = all.copied().collect();
+    labels.sort_unstable();
+    labels.dedup();
+    let (k, m) = both(k.into_matrix(&labels, paths[0]), m.into_matrix(&labels, paths[1]))?;
+    Ok((labels, [(k, k_file), (m, m_file)]))
+}
+
+/// Whether the first line of data of a matrix names nodes and directions: it has fields with commas.
+pub(super) fn has_labels(path: &Path) -> Found<bool> {
+    let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
+    let mut blocks = Blocks::of(&file, Compression::None);
+    while let Some(block) = blocks.next().map_err(|e| vec![file.failed(&e)])? {
+        if let Some(line) = lines(&block).find(|line| is_data(line)) {
+            return Ok(line.contains(&b','));
+        }
+    }
+    Ok(false)
+}
+
+fn is_data(line: &[u8]) -> bool {
+    !line.is_empty() && !line.starts_with(b"*")
+}
+
+/// The lines of a file.
+struct LabelledLines {
+    pieces: Vec<Piece>,
+}
+
+impl LabelledLines {
+    fn read(path: &Path) -> Found<(Self, SeenFile)> {
+        let one = |diagnostic| vec![diagnostic];
+        let file = InputFile::open_unread(path).map_err(one)?;
+        let mut blocks = Blocks::of(&file, Compression::None);
+        let mut pieces = Vec::new();
+        while let Some(block) = blocks.next().map_err(|e| one(file.failed(&e)))? {
+            let texts: Vec<&[u8]> = line_aligned(&block).collect();
+            pieces.par_extend(texts.into_par_iter().map(Piece::parse));
+            blocks.take_back(block);
+        }
+        // What is wrong with a file that changed meanwhile may be wrong for this reason.
+        file.refuse_changed().map_err(one)?;
+        let bad = bad_lines(&pieces, path);
+        if bad.is_empty() { Ok((Self { pieces }, file.seen().map_err(one)?)) } else { Err(bad) }
+    }
+
+    /// The matrix whose rows have the ascending `labels`.
+    fn into_matrix(self, labels: &[DofLabel], path: &Path) -> Found<RawMatrix> {
+        let n = labels.len() as u64;
+        let count = self.pieces.iter().map(|piece| piece.entries.len() as u64).sum();
+        check_size(n, n, count).map_err(|diagnostic| vec![diagnostic.in_file(path)])?;
+        let written = self.pieces.iter().map(|piece| piece.written).max().unwrap_or(0);
+        let numbered: Vec<Vec<Entry>> =
+            self.pieces.into_par_iter().map(|piece| piece.numbered(labels)).collect();
+        let some = |side: fn(&Entry) -> bool| numbered.par_iter().flatten_iter().any(side);
+        let sides = Sides {
+            lower: some(|entry| entry.row > entry.col && entry.value != 0.0),
+            upper: some(|entry| entry.row < entry.col && entry.value != 0.0),
+        };
+        assemble(labels.len(), numbered, Storage::of(sides), written, path)
+            .map_err(|diagnostic| vec![diagnostic])
+    }
+}
+
+fn bad_lines(pieces: &[Piece], path: &Path) -> Vec<Diagnostic> {
+    let mut before = 0;
+    let mut told = Vec::new();
+    for piece in pieces {
+        told.extend(piece.bad.iter().map(|(line, text)| {
+            let message = format!("expected node, direction, node, direction, value, found `{text}`");
+            Diagnostic::new(Code::MatrixSyntax, message).in_file(path).at_line(before + line)
+        }));
+        before += piece.lines;
+    }
+    told.truncate(SHOWN);
+    told
+}
+
+/// Some lines. Rows and columns of the entries are places in `labels`, where a label may stand more than once.
+#[derive(Default)]
+struct Piece {
+    entries: Vec<Entry>,
+    labels: Vec<DofLabel>,
+    written: u8,
+    lines: usize,
+    /// The first bad lines: number within the piece, from 1, and text.
+    bad: Vec<(usize, String)>,
+}
+
+impl Piece {
+    fn parse(text: &[u8]) -> Self {
+        let mut piece = Self { entries: Vec::with_capacity(most_entries(text)), ..Self::default() };
+        let mut recent = Recent::new();
+        for line in lines(text) {
+            piece.lines += 1;
+            if !is_data(line) {
+                continue;
+            }
+            match labelled_line(line) {
+                Some((row, col, value, number)) => {
+                    if piece.entries.len() < COUNTED {
+                        piece.written = piece.written.max(written_digits(number));
+                    }
+                    let mut place = |label: DofLabel| {
+                        recent.place(label, (label.node, label.direction), &mut piece.labels)
+                    };
+                    let (row, col) = (place(row), place(col));
+                    piece.entries.push(Entry { row, col, value });
+                }
+                None if piece.bad.len() < SHOWN => piece.bad.push((piece.lines, excerpt(line))),
+                None => {}
+            }
+        }
+        piece
+    }
+
+    /// The entries with the places of their labels among all.
+    fn numbered(mut self, all: &[DofLabel]) -> Vec<Entry> {
+        let at = |label: &DofLabel| all.binary_search(label).expect("every label is listed") as u32;
+        let place: Vec<u32> = self.labels.iter().map(at).collect();
+        for entry in &mut self.entries {
+            (entry.row, entry.col) = (place[entry.row as usize], place[entry.col as usize]);
+        }
+        self.entries
+    }
+}
+
+/// Row, column, value and the value as written.
+fn labelled_line(text: &[u8]) -> Option<(DofLabel, DofLabel, f64, &[u8])> {
+    let mut parts = fields(text);
+    let mut label = || {
+        let node = integer(parts.next()?)?;
+        let direction = integer(parts.next()?).filter(|direction| (1..=6).contains(direction))?;
+        Some(DofLabel { node, direction: direction as u8 })
+    };
+    let (row, column) = (label()?, label()?);
+    let number = parts.next()?;
+    let value = real(number).filter(|value| value.is_finite())?;
+    parts.next().is_none().then_some((row, column, value, number))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fmt::Write;
+
+    /// Nodes 3, 10, 17, ... far apart and in no order, a chain of springs on each direction; more than two pieces.
+    fn chain(nodes: usize) -> (String, Vec<i64>) {
+        let ids: Vec<i64> = (0..nodes as i64).map(|k| 3 + 7 * ((k * 7919) % nodes as i64)).collect();
+        let mut text = String::from("** a comment\n");
+        for (k, &id) in ids.iter().enumerate() {
+            for direction in 1..=3 {
+                let next = ids[(k + 1) % nodes];
+                writeln!(text, "{id},{direction}, {id},{direction}, {:.15e}", 2.0 + k as f64)
+                    .expect("memory");
+                writeln!(text, "{id},{direction}, {next},{direction}, {:.15e}", -1.0 - direction as f64)
+                    .expect("memory");
+                writeln!(text, "{next},{direction}, {id},{direction}, {:.15e}", -1.0 - direction as f64)
+                    .expect("memory");
+            }
+        }
+        (text, ids)
+    }
+
+    #[test]
+    fn rows_are_the_labels_in_ascending_order_however_many_pieces_name_them() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (text, ids) = chain(9973);
+        assert!(text.len() > 3 << 20);
+        let path = folder.path().join("K.mtx");
+        std::fs::write(&path, text).expect("written");
+        let (labels, [(k, _), (m, _)]) = labelled([&path, &path]).expect("read");
+        assert_eq!(labels.len(), 3 * ids.len());
+        assert!(labels.is_sorted());
+        assert_eq!((k.matrix.nnz(), k.digits), (9 * ids.len(), m.digits));
+        let row = |node, direction| labels.binary_search(&DofLabel { node, direction }).expect("labelled");
+        for (at, &id) in ids.iter().enumerate().step_by(97) {
+            for direction in 1..=3u8 {
+                let (own, next) = (row(id, direction), row(ids[(at + 1) % ids.len()], direction));
+                assert_eq!(k.matrix.get(own, own), 2.0 + at as f64);
+                assert_eq!(k.matrix.get(next, own), -1.0 - f64::from(direction));
+            }
+        }
+    }
+
+    #[test]
+    fn bad_lines_are_numbered_through_the_whole_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let (mut text, _) = chain(9973);
+        let lines = text.lines().count();
+        text +=
+            "1,1, 1,1\n1,7, 1,1, 1.0\n1,1, 1,1, NaN\n1,1, 1,1, 1.0, 2\n\none,1, 1,1, 1.0\n1,0, 1,1, 1.0\n";
+        let path = folder.path().join("K.mtx");
+        std::fs::write(&path, text).expect("written");
+        let found = LabelledLines::read(&path).err().expect("refused");
+        let at: Vec<_> = found.iter().map(|d| d.line()).collect();
+        assert_eq!(at, [1, 2, 3, 4, 6].map(|k| Some(lines + k)));
+    }
+}

@@ -1,0 +1,158 @@
+//! Jobs of Nastran: a deck (.bdf, .dat, .nas), or a punch file with the grids of a superelement, and the
+//! matrices in it or beside it: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
+
+mod assigned;
+mod bulk;
+mod constraints;
+mod elements;
+mod elimination;
+mod matrices;
+mod outputs;
+mod rows;
+mod sets;
+mod systems;
+
+use super::{Found, JobFile, JobModel, JobReader, condensed};
+use crate::bulk_cards::is_bulk_data;
+use crate::node_file::{NodeFile, Unresolved};
+use bulk::Bulk;
+use elimination::Places;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_model::{Elements, NodeAxes as Axes, Nodes};
+use matrices::Matrices;
+use std::collections::HashMap;
+use std::path::Path;
+use systems::Systems;
+
+/// Bytes in which a deck is recognised: comments may stand above its first card.
+const DECK_HEAD: usize = 1 << 20;
+
+/// The reader of Nastran jobs.
+pub(super) struct Nastran;
+
+impl JobReader for Nastran {
+    fn name(&self) -> &'static str {
+        "nastran"
+    }
+
+    fn needs(&self) -> &'static str {
+        "job.bdf with DMIG cards, or with job.pch or job.op4 beside it"
+    }
+
+    fn recognises(&self, path: &Path) -> bool {
+        InputFile::open_unread(path).is_ok_and(|file| is_bulk_data(&file.first_bytes(DECK_HEAD)))
+    }
+
+    fn names_matrices(&self) -> bool {
+        true
+    }
+
+    fn read(&self, job: &JobFile) -> Found<JobModel> {
+        let path = job.path.as_path();
+        let mut bulk = Bulk::read(path)?;
+        if bulk.grids.is_empty() {
+            let diagnostic = Diagnostic::new(Code::DeckSyntax, "the deck has no GRID").in_file(path);
+            return Err(vec![diagnostic.with_help("give the deck, or the punch file that has the grids")]);
+        }
+        let (nodes, axes) = places(&bulk)?;
+        let dmigs = std::mem::take(&mut bulk.dmigs);
+        let places = Places::new(&nodes, &axes);
+        let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
+        let mut diagnostics = told(&bulk, path);
+        let matrices = matrices.without_followers(&mut diagnostics).turned(&axes)?;
+        let matrices = matrices.without_empty_rows(&mut diagnostics);
+        matrices.refuse_modal(&bulk)?;
+        if bulk.is_condensed() {
+            diagnostics.push(condensed(matrices.grids(&bulk), &matrices.stiffness.path));
+        }
+        let sets = bulk.sets.of(&bulk.grids);
+        let mut files: Vec<(&'static str, SeenFile)> =
+            bulk.files.iter().map(|file| ("deck", file.clone())).collect();
+        files.extend(matrices.files.iter().map(|file| ("matrices", file.clone())));
+        let given_rows = matrices.given_rows(axes);
+        let unresolved = Unresolved::new();
+        let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
+        // Condensed matrices leave no element all of its nodes.
+        let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
+        Ok(JobModel {
+            stiffness,
+            mass,
+            nodes,
+            dofs,
+            given_rows,
+            sets,
+            unresolved,
+            elements,
+            files,
+            diagnostics,
+        })
+    }
+}
+
+/// Places of the grids in the basic system, and the axes of the rows of those that stand along others.
+fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
+    const SHOWN: usize = 5;
+    let mut systems = Systems::new(&bulk.systems, &bulk.grids);
+    let (mut nodes, mut axes, mut bad) = (Nodes::default(), HashMap::new(), Vec::new());
+    for (&id, grid) in &bulk.grids {
+        let found = systems.position(grid).and_then(|x| Ok((x, systems.axes(grid, x)?)));
+        match found {
+            Ok((x, own)) => {
+                nodes.ids.push(id);
+                nodes.positions.push(x);
+                if grid.axes.is_some_and(|system| system != 0) {
+                    axes.insert(id, own);
+                }
+            }
+            Err(diagnostic) if bad.len() < SHOWN => bad.push(match diagnostic.file() {
+                None => diagnostic
+                    .about(format!("grid {id}"))
+                    .in_file(&bulk.card_files[grid.file])
+                    .at_line(grid.line),
+                Some(_) => diagnostic,
+            }),
+            Err(_) => {}
+        }
+    }
+    bad.dedup();
+    if bad.is_empty() { Ok((nodes, axes)) } else { Err(bad) }
+}
+
+/// The grids, sets and elements of a deck whose matrices come from elsewhere.
+///
+/// # Errors
+/// Those of [`Bulk::read`], and FB111 where rows of grids stand along other axes than those of the basic
+/// system.
+pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
+    let bulk = Bulk::read(path)?;
+    let (nodes, axes) = places(&bulk)?;
+    if let Some(grid) = axes.keys().min() {
+        let message = format!(
+            "rows of {} grids stand along the axes of their CD, the first of them grid {grid}: matrices from elsewhere cannot be turned with them",
+            axes.len()
+        );
+        let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(path);
+        return Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")]);
+    }
+    let sets = bulk.sets.of(&bulk.grids);
+    let followers = bulk.constraints.followers();
+    Ok(NodeFile { nodes, sets, elements: bulk.elements, followers, ..NodeFile::default() })
+}
+
+/// What the deck says that a user should know.
+fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    if bulk.has_elements && !bulk.coupled_mass {
+        let message = "the deck does not ask for coupled masses (PARAM,COUPMASS,1): Nastran lumps them";
+        found.push(Diagnostic::new(Code::DeckLumps, message).in_file(path));
+    }
+    if let Some((path, line, count)) = &bulk.supports {
+        let message = match count {
+            1 => "a card supports the body".to_owned(),
+            _ => format!("{count} cards support the body"),
+        };
+        found.push(Diagnostic::new(Code::DeckSupports, message).in_file(path).at_line(*line));
+    }
+    found
+}

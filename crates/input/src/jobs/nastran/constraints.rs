@@ -1,0 +1,334 @@
+//! Rigid elements and multipoint constraints of a deck: which components of grids follow others. KGG and MGG do
+//! not have them: rows that follow are eliminated.
+
+use crate::bulk_cards::{Card, components, whole};
+use crate::coordinates::real;
+use crate::dmig::{Point, label};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_model::DofLabel;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// Cards that make components of grids follow others and are not read.
+const NOT_READ: &[&str] = &[
+    "RTRPLT", "RTRPLT1", "RJOINT", "RSPLINE", "RSSCON", "RSPINT", "RBE2GS", "RBE2A", "RBE3U", "MPCY", "MPCAX",
+];
+
+/// Points that one THRU of a rigid element may name.
+const MOST_IN_RANGE: i64 = 1_000_000;
+
+/// The constraints of a deck.
+#[derive(Default)]
+pub(super) struct Constraints {
+    all: Vec<Constraint>,
+    /// Sets that MPCADD joins.
+    joined: BTreeMap<i64, Vec<i64>>,
+    /// Sets that the case control selects.
+    selected: BTreeSet<i64>,
+}
+
+/// A card that makes components follow others.
+pub(super) struct Constraint {
+    /// `RBE2 901`.
+    pub name: String,
+    pub relation: Relation,
+    pub path: PathBuf,
+    pub line: usize,
+}
+
+/// Relation by which components follow others.
+pub(super) enum Relation {
+    /// A rigid body that six independent components move.
+    Rigid { independent: Vec<Point>, dependent: Vec<Point> },
+    /// Two grids at a constant distance: the component that follows.
+    Rod { grids: [i64; 2], dependent: Point },
+    /// The weighted average of the motions of other grids.
+    Average { reference: i64, components: Vec<u8>, weighted: Vec<(Point, f64)> },
+    /// A sum of components that is zero, solved for the first of them, of the set with this number.
+    Sum { set: i64, terms: Vec<(Point, f64)> },
+    /// A card that is not read, with the whole numbers on it, some of which are grids.
+    NotRead { numbers: Vec<i64> },
+}
+
+impl Constraint {
+    /// The points that follow.
+    fn dependent(&self) -> Vec<Point> {
+        match &self.relation {
+            Relation::Rigid { dependent, .. } => dependent.clone(),
+            Relation::Rod { dependent, .. } => vec![*dependent],
+            Relation::Average { reference, components, .. } => {
+                components.iter().map(|component| (*reference, *component)).collect()
+            }
+            Relation::Sum { terms, .. } => vec![terms[0].0],
+            Relation::NotRead { .. } => Vec::new(),
+        }
+    }
+
+    /// The points that are followed.
+    fn independent(&self) -> Vec<Point> {
+        match &self.relation {
+            Relation::Rigid { independent, .. } => independent.clone(),
+            Relation::Rod { grids, dependent } => {
+                let all = grids.iter().flat_map(|grid| (1..=3).map(|component| (*grid, component)));
+                all.filter(|point| point != dependent).collect()
+            }
+            Relation::Average { weighted, .. } => weighted.iter().map(|(point, _)| *point).collect(),
+            Relation::Sum { terms, .. } => terms[1..].iter().map(|(point, _)| *point).collect(),
+            Relation::NotRead { .. } => Vec::new(),
+        }
+    }
+
+    /// FB111 about the card.
+    pub(super) fn refused(&self, why: impl std::fmt::Display) -> Diagnostic {
+        let message = format!("{}: {why}", self.name);
+        Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.path).at_line(self.line)
+    }
+}
+
+impl Constraints {
+    /// Takes a line of case control: `MPC = 5`.
+    pub(super) fn control(&mut self, line: &str) {
+        let words: Vec<&str> =
+            line.split(|c: char| c == '=' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
+        if let [name, number] = words.as_slice()
+            && name.eq_ignore_ascii_case("MPC")
+        {
+            self.selected.extend(number.parse::<i64>().ok());
+        }
+    }
+
+    /// Takes a card if it is one of a constraint; `None` for one that cannot be read.
+    pub(super) fn card(&mut self, card: &Card, path: &Path) -> Option<bool> {
+        let relation = match card.name.as_str() {
+            "RBE2" => rbe2(card)?,
+            "RBAR" => rbar(card)?,
+            "RBAR1" => rbar1(card)?,
+            "RBE1" => rbe1(card)?,
+            "RROD" => rrod(card)?,
+            "RBE3" => rbe3(card)?,
+            "MPC" => sum(card)?,
+            "MPCADD" => {
+                let sets: Option<Vec<i64>> = filled(card, 1).map(|k| card.integer(k)).collect();
+                self.joined.entry(card.integer(0)?).or_default().extend(sets?);
+                return Some(true);
+            }
+            name if NOT_READ.contains(&name) => not_read(card),
+            _ => return Some(false),
+        };
+        let name = format!("{} {}", card.name, card.integer(0).unwrap_or(0));
+        let (path, line) = (path.to_path_buf(), card.line());
+        self.all.push(Constraint { name, relation, path, line });
+        Some(true)
+    }
+
+    /// Sets that the case control selects, with those that MPCADD joins in them.
+    fn sets(&self) -> BTreeSet<i64> {
+        let joined = |set: &i64| self.joined.get(set).into_iter().flatten().copied();
+        self.selected.iter().flat_map(|set| joined(set).chain([*set])).collect()
+    }
+
+    /// Constraints that hold: rigid elements, and sums of the sets that the case control selects.
+    fn holding(&self) -> impl Iterator<Item = &Constraint> {
+        let sets = self.sets();
+        self.all.iter().filter(move |own| match &own.relation {
+            Relation::Sum { set, .. } => sets.contains(set),
+            _ => true,
+        })
+    }
+
+    /// Returns the points that follow others, and those that are followed.
+    pub(super) fn points(&self) -> (BTreeSet<Point>, BTreeSet<Point>) {
+        let followers = self.holding().flat_map(Constraint::dependent).collect();
+        (followers, self.holding().flat_map(Constraint::independent).collect())
+    }
+
+    /// Returns the rows that follow others, by the names of the constraints.
+    pub(super) fn followers(&self) -> Vec<(String, Vec<DofLabel>)> {
+        let of =
+            |own: &Constraint| (own.name.clone(), own.dependent().into_iter().map(label).collect::<Vec<_>>());
+        self.holding().map(of).collect()
+    }
+
+    /// Returns the constraints that matrices do not contain: `has` tells whether the matrices have rows of a point,
+    /// and rows that follow are not in matrices after the constraints were applied.
+    ///
+    /// # Errors
+    /// FB111 for constraints that are not read, and for sums of a set that is not selected: they may hold or not.
+    pub(super) fn open(&self, has: impl Fn(&Point) -> bool) -> Result<Vec<&Constraint>, Diagnostic> {
+        let sets = self.sets();
+        let mut open = Vec::new();
+        for own in &self.all {
+            match &own.relation {
+                Relation::NotRead { numbers } => {
+                    let moves = |grid: i64| (0..=6).any(|component| has(&(grid, component)));
+                    if numbers.iter().filter(|number| moves(**number)).count() > 1 {
+                        let help = "write the matrices of the a-set (EXTOUT, EXTSEOUT), which contain it, or write it as RBE2, RBE3 without UM, RBAR or MPC";
+                        return Err(own.refused("the constraint is not read").with_help(help));
+                    }
+                }
+                Relation::Sum { set, .. } if !sets.contains(set) && own.dependent().iter().any(&has) => {
+                    let why = "the case control does not select the set, so that it may hold or not";
+                    let help =
+                        format!("write MPC = {set} into the case control, or take the cards of the set out");
+                    return Err(own.refused(why).with_help(help));
+                }
+                _ if own.dependent().iter().any(&has) => open.push(own),
+                _ => {}
+            }
+        }
+        Ok(open)
+    }
+}
+
+/// Fields of a card that are not empty, from one on.
+fn filled(card: &Card, from: usize) -> impl Iterator<Item = usize> {
+    (from..card.len()).filter(|k| !card.field(*k).is_empty())
+}
+
+/// True if a field is a real number and no whole one: a weight, or a coefficient of expansion.
+fn is_real(field: &[u8]) -> bool {
+    whole(field).is_none() && real(field).is_some()
+}
+
+fn grid(card: &Card, k: usize) -> Option<i64> {
+    card.integer(k).filter(|id| *id > 0)
+}
+
+/// Points of a grid. Components of scalar points are 0 or none.
+fn points(grid: i64, field: &[u8]) -> Option<Vec<Point>> {
+    let own = components(field)?;
+    Some(if own.is_empty() { vec![(grid, 0)] } else { own.into_iter().map(|c| (grid, c)).collect() })
+}
+
+fn all_of(grid: i64) -> impl Iterator<Item = Point> {
+    (1..=6).map(move |component| (grid, component))
+}
+
+/// Grids, with ranges, from a field up to the first that is no whole number; and where that is.
+fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
+    let (mut ids, mut k) = (Vec::new(), from);
+    while k < card.len() {
+        let field = card.field(k);
+        if field.eq_ignore_ascii_case(b"THRU") {
+            let (first, last) = (*ids.last()?, grid(card, k + 1)?);
+            (last > first && last - first < MOST_IN_RANGE).then_some(())?;
+            ids.extend(first + 1..=last);
+            k += 1;
+        } else if !field.is_empty() {
+            match whole(field) {
+                Some(id) if id > 0 => ids.push(id),
+                Some(_) => return None,
+                None => break,
+            }
+        }
+        k += 1;
+    }
+    Some((ids, k))
+}
+
+fn not_read(card: &Card) -> Relation {
+    Relation::NotRead { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
+}
+
+/// EID, GN, CM, GM1, GM2, ..., ALPHA.
+fn rbe2(card: &Card) -> Option<Relation> {
+    let own = components(card.field(2)).filter(|own| !own.is_empty() && !own.contains(&0))?;
+    let (followers, end) = grids(card, 3)?;
+    (end >= card.len() || is_real(card.field(end))).then_some(())?;
+    let dependent = followers.iter().flat_map(|id| own.iter().map(|c| (*id, *c))).collect();
+    Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
+}
+
+/// EID, GA, GB, CNA, CNB, CMA, CMB, ALPHA.
+fn rbar(card: &Card) -> Option<Relation> {
+    let own = |k: usize| -> Option<Vec<Point>> {
+        let id = grid(card, 1 + k % 2)?;
+        Some(components(card.field(3 + k))?.into_iter().map(|c| (id, c)).collect())
+    };
+    let independent = [own(0)?, own(1)?].concat();
+    let stated = [own(2)?, own(3)?].concat();
+    let others = || {
+        let all = all_of(grid(card, 1)?).chain(all_of(grid(card, 2)?));
+        Some(all.filter(|point| !independent.contains(point)).collect())
+    };
+    let dependent = if stated.is_empty() { others()? } else { stated };
+    Some(Relation::Rigid { independent, dependent })
+}
+
+/// EID, GA, GB, CB, ALPHA.
+fn rbar1(card: &Card) -> Option<Relation> {
+    let own = components(card.field(3))?;
+    let own = if own.is_empty() { vec![1, 2, 3, 4, 5, 6] } else { own };
+    let follower = grid(card, 2)?;
+    let dependent = own.into_iter().map(|c| (follower, c)).collect();
+    Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
+}
+
+/// EID, pairs of grids and components, UM, pairs that follow, ALPHA.
+fn rbe1(card: &Card) -> Option<Relation> {
+    let (mut independent, mut dependent, mut follows) = (Vec::new(), Vec::new(), false);
+    let mut fields = filled(card, 1);
+    while let Some(k) = fields.next() {
+        if card.field(k).eq_ignore_ascii_case(b"UM") {
+            follows = true;
+        } else if is_real(card.field(k)) {
+            break;
+        } else {
+            let own = points(grid(card, k)?, card.field(fields.next()?))?;
+            if follows { &mut dependent } else { &mut independent }.extend(own);
+        }
+    }
+    Some(Relation::Rigid { independent, dependent })
+}
+
+/// EID, GA, GB, CMA, CMB, ALPHA.
+fn rrod(card: &Card) -> Option<Relation> {
+    let grids = [grid(card, 1)?, grid(card, 2)?];
+    let own = [components(card.field(3))?, components(card.field(4))?];
+    let dependent = match (own[0].as_slice(), own[1].as_slice()) {
+        (&[component @ 1..=3], []) => (grids[0], component),
+        ([], &[component @ 1..=3]) => (grids[1], component),
+        _ => return None,
+    };
+    Some(Relation::Rod { grids, dependent })
+}
+
+/// EID, blank, REFGRID, REFC, then weight, components and grids in turn, UM, ALPHA.
+fn rbe3(card: &Card) -> Option<Relation> {
+    let reference = grid(card, 2)?;
+    let own = components(card.field(3)).filter(|own| !own.is_empty() && !own.contains(&0))?;
+    let (mut weighted, mut k) = (Vec::new(), 4);
+    while k < card.len() {
+        let field = card.field(k);
+        if field.is_empty() {
+            k += 1;
+        } else if field.eq_ignore_ascii_case(b"UM") {
+            return Some(not_read(card));
+        } else if field.eq_ignore_ascii_case(b"ALPHA") {
+            break;
+        } else {
+            let weight = real(field).filter(|weight| weight.is_finite())?;
+            let components = components(card.field(k + 1))?;
+            let (members, end) = grids(card, k + 2)?;
+            (!members.is_empty()).then_some(())?;
+            let points = members.iter().flat_map(|id| components.iter().map(|c| ((*id, *c), weight)));
+            weighted.extend(points);
+            k = end;
+        }
+    }
+    Some(Relation::Average { reference, components: own, weighted })
+}
+
+/// SID, then grid, component and coefficient, two to a line of eight fields.
+fn sum(card: &Card) -> Option<Relation> {
+    let set = grid(card, 0)?;
+    let mut terms = Vec::new();
+    for k in (0..card.len()).step_by(8).flat_map(|row| [row + 1, row + 4]) {
+        if card.field(k).is_empty() {
+            continue;
+        }
+        let component = card.integer(k + 1).filter(|component| (0..=6).contains(component))?;
+        terms.push(((grid(card, k)?, component as u8), card.real(k + 2)?));
+    }
+    (terms.first()?.1 != 0.0).then_some(Relation::Sum { set, terms })
+}

@@ -1,0 +1,277 @@
+//! K and M of a deck, and their way from the rows of the files to those of the model.
+
+use super::Axes;
+use super::bulk::Bulk;
+use super::elimination::{Elimination, Followers, Places};
+use super::outputs::{Outputs, Read, choose_pair, no_files, no_pair};
+use crate::dmig::{Dmigs, Point, label};
+use crate::jobs::{Found, JobFile, both, siblings};
+use crate::row_axes::Turn;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::SeenFile;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{DofLabel, GivenRows, RawMatrix, RowMap, filled_rows};
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::path::PathBuf;
+
+/// K and M with the labels of their rows.
+pub(super) struct Matrices {
+    pub stiffness: RawMatrix,
+    pub mass: RawMatrix,
+    pub labels: Vec<DofLabel>,
+    /// Files beside the deck that they were read from.
+    pub files: Vec<SeenFile>,
+    /// Number of rows of the files.
+    n_given: usize,
+    /// Rows that follow others by constraints of the deck, where the files have them.
+    followers: Option<(Elimination, String)>,
+    /// The axes of the rows, where they were turned.
+    turn: Option<CscMatrix>,
+    /// Rows that were kept, where others were left out.
+    kept: Option<Vec<usize>>,
+}
+
+impl Matrices {
+    /// The matrices of the deck, else those of the files beside it: either of punch files or of OUTPUT4.
+    pub(super) fn of(bulk: &Bulk, dmigs: Dmigs, job: &JobFile, places: &Places<'_>) -> Found<Self> {
+        let (path, stated) = (&job.path, job.matrices.as_ref());
+        let names = dmigs.names();
+        // Beside elements they are a part of the model that its own matrices contain.
+        if !names.is_empty() && !bulk.has_elements {
+            let pair = choose_pair(&names, &dmigs.candidates(), stated)
+                .map_err(|pairs| no_pair(&names, &pairs, stated, path))?;
+            return Self::of_dmigs(bulk, dmigs, pair, places);
+        }
+        let (punches, outputs) = files_beside(bulk, job)?;
+        let punched = Dmigs::of(&punches)?;
+        let outputs = Outputs::of(outputs)?;
+        let punch_pair = choose_pair(&punched.names(), &punched.candidates(), stated);
+        match (punch_pair, choose_pair(&outputs.names, &outputs.fitting(bulk), stated)) {
+            (Ok(pair), Err(_)) => Self::of_dmigs(bulk, punched, pair, places),
+            (Err(_), Ok(pair)) => Self::new(bulk, outputs.matrices(bulk, pair)?, places),
+            (punch_pair, output_pair) => {
+                let names = [punched.names(), outputs.names].concat();
+                let shift = punched.names().len();
+                let shifted = |(k, m): (usize, usize)| (k + shift, m + shift);
+                let mut pairs = punch_pair.map_or_else(|pairs| pairs, |pair| vec![pair]);
+                let others = output_pair.map_or_else(|pairs| pairs, |pair| vec![pair]);
+                pairs.extend(others.into_iter().map(shifted));
+                Err(no_pair(&names, &pairs, stated, path))
+            }
+        }
+    }
+
+    fn of_dmigs(bulk: &Bulk, mut dmigs: Dmigs, (k, m): (usize, usize), places: &Places<'_>) -> Found<Self> {
+        let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
+        // Rows that others follow have to be there, also where they are zero.
+        let followers = followers(bulk, |point| points.contains(point), places)?;
+        points.extend(followers.iter().flat_map(|own| own.leaders()));
+        // So have rows that are turned together.
+        let turned: Vec<Point> = points.iter().filter(|(id, _)| places.are_turned(*id)).copied().collect();
+        for (id, component) in turned {
+            let first = if component > 3 { 4 } else { 1 };
+            points.extend((first..first + 3).map(|component| (id, component)));
+        }
+        let points: Vec<Point> = points.into_iter().collect();
+        let mut matrix = |at| dmigs.take_matrix(at, &points).map_err(|diagnostic| vec![diagnostic]);
+        let (stiffness, mass) = both(matrix(k), matrix(m))?;
+        let files = dmigs.files;
+        Self::new(bulk, Read { stiffness, mass, points, files }, places)
+    }
+
+    fn new(bulk: &Bulk, read: Read, places: &Places<'_>) -> Found<Self> {
+        let Read { stiffness, mass, points, files } = read;
+        let followers = followers(bulk, |point| points.binary_search(point).is_ok(), places)?;
+        let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&stiffness.path)];
+        let eliminated = followers.map(|own| Ok((own.eliminate(&points)?, own.some_names())));
+        let followers = eliminated.transpose().map_err(in_file)?;
+        let n_given = points.len();
+        let labels = points.into_iter().map(label).collect();
+        Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, kept: None })
+    }
+
+    /// Returns the matrices without rows that follow others by constraints of the deck.
+    pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
+        let Some((own, names)) = &self.followers else { return self };
+        let followers = self.n_given - own.points.len();
+        let message = format!("{followers} rows follow others and are eliminated: {names}");
+        found.push(Diagnostic::new(Code::DeckConstrained, message).in_file(&self.stiffness.path));
+        let all: Vec<u32> = (0..own.points.len() as u32).collect();
+        let map = RowMap::new(own.follows.clone(), own.picks.clone(), all);
+        let rows = GivenRows::new(vec![map], HashMap::new());
+        let labels = own.points.iter().copied().map(label).collect();
+        let [stiffness, mass] = [&self.stiffness, &self.mass].map(|raw| {
+            let matrix = rows.matrix(raw.matrix.clone()).expect("all rows are kept");
+            RawMatrix { matrix, digits: raw.digits, path: raw.path.clone() }
+        });
+        Self { stiffness, mass, labels, ..self }
+    }
+
+    /// Returns the matrices with all rows along the axes of the basic system.
+    pub(super) fn turned(self, axes: &HashMap<i64, Axes>) -> Found<Self> {
+        if !self.labels.iter().any(|label| axes.contains_key(&label.node)) {
+            return Ok(self);
+        }
+        let turn = Turn::new(&self.labels, axes).map_err(|node| {
+            let message = format!(
+                "rows of grid {node} stand along the axes of its CD, but not each of its directions is there once"
+            );
+            vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.stiffness.path)]
+        })?;
+        let turned = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+        let (stiffness, mass) = both(turned(self.stiffness), turned(self.mass))?;
+        Ok(Self { stiffness, mass, turn: Some(turn.axes()), ..self })
+    }
+
+    /// Without the rows that are empty in both matrices: rotations of solids, and all rows of points that
+    /// nothing is fixed to.
+    pub(super) fn without_empty_rows(self, found: &mut Vec<Diagnostic>) -> Self {
+        let labels = &self.labels;
+        let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], labels.len());
+        let rows = || labels.iter().zip(&filled);
+        let moving: HashSet<i64> =
+            rows().filter(|(_, filled)| **filled).map(|(label, _)| label.node).collect();
+        // A displacement without stiffness and mass is a mistake where the node has others.
+        let keeps = |(label, filled): (&DofLabel, &bool)| {
+            *filled || label.direction <= 3 && moving.contains(&label.node)
+        };
+        let kept: Vec<usize> = (0..labels.len()).filter(|&row| keeps((&labels[row], &filled[row]))).collect();
+        if kept.len() == labels.len() {
+            return self;
+        }
+        let turning = rows().filter(|(label, filled)| !**filled && moving.contains(&label.node)).count();
+        let left_out = labels.len() - kept.len();
+        let message = format!(
+            "{left_out} rows without stiffness and mass are left out: {turning} rotations, {} of points that nothing is fixed to",
+            left_out - turning
+        );
+        found.push(Diagnostic::new(Code::RowsEmpty, message).in_file(&self.stiffness.path));
+        let labels = kept.iter().map(|&row| labels[row]).collect();
+        let [stiffness, mass] = [self.stiffness, self.mass].map(|raw| principal(raw, &kept));
+        Self { stiffness, mass, labels, kept: Some(kept), ..self }
+    }
+
+    /// FB111 for modal coordinates: rows of scalar points with mass. What they move, and so how the inertia
+    /// changes with them, is not in K and M.
+    pub(super) fn refuse_modal(&self, bulk: &Bulk) -> Found<()> {
+        let is_modal = |(row, label): (usize, &DofLabel)| {
+            !bulk.grids.contains_key(&label.node)
+                && bulk.scalars.contains(&label.node)
+                && !self.mass.matrix.column(row).0.is_empty()
+        };
+        let modal = self.labels.iter().enumerate().filter(|own| is_modal(*own)).count();
+        if modal == 0 {
+            return Ok(());
+        }
+        let message = format!(
+            "{modal} scalar points have mass: modal coordinates, whose shapes are not in the matrices"
+        );
+        let help = "give K and M of all grids, and the modes by --basis craig-bampton or --basis imported; or condense to grids alone (no QSET, SPOINT)";
+        let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.mass.path);
+        Err(vec![diagnostic.with_help(help)])
+    }
+
+    /// Number of the grids that have rows.
+    pub(super) fn grids(&self, bulk: &Bulk) -> usize {
+        let named = self.labels.iter().map(|label| label.node);
+        named.filter(|node| bulk.grids.contains_key(node)).collect::<HashSet<i64>>().len()
+    }
+
+    /// Returns how what is given by the rows of the files, or by those that are left of them, becomes what is given
+    /// by the rows of K and M here; `axes` are those of the grids.
+    pub(super) fn given_rows(&self, axes: HashMap<i64, Axes>) -> GivenRows {
+        let n = self.followers.as_ref().map_or(self.n_given, |(own, _)| own.points.len());
+        let all = || (0..n).collect::<Vec<usize>>();
+        let kept = self.kept.clone().unwrap_or_else(all);
+        if self.followers.is_none() && self.turn.is_none() && kept.len() == n {
+            return GivenRows::default();
+        }
+        let turn = self.turn.clone().unwrap_or_else(|| columns_of_identity(n, &all()));
+        let rows = || kept.iter().map(|&row| row as u32).collect::<Vec<u32>>();
+        // Rows of the files, rows without those that follow, and rows without empty ones as well.
+        let whole = match &self.followers {
+            Some((own, _)) => RowMap::new(product(&turn, &own.follows), product(&turn, &own.picks), rows()),
+            None => RowMap::new(turn.clone(), turn.clone(), rows()),
+        };
+        let left = RowMap::new(turn.clone(), turn.clone(), rows());
+        let own = product(&turn, &columns_of_identity(n, &kept));
+        let least = RowMap::new(own.clone(), own, rows());
+        let mut maps = vec![whole];
+        for map in [left, least] {
+            if maps.iter().all(|known| known.n_given() != map.n_given()) {
+                maps.push(map);
+            }
+        }
+        GivenRows::new(maps, axes)
+    }
+}
+
+/// Columns of the identity of n rows.
+fn columns_of_identity(n: usize, columns: &[usize]) -> CscMatrix {
+    let entries: Vec<(u32, u32, f64)> =
+        (0u32..).zip(columns).map(|(at, &row)| (row as u32, at, 1.0)).collect();
+    CscMatrix::from_triplets(n, columns.len(), &entries)
+}
+
+/// The product of two sparse matrices.
+fn product(a: &CscMatrix, b: &CscMatrix) -> CscMatrix {
+    let mut entries = Vec::with_capacity(a.nnz().max(b.nnz()));
+    for column in 0..b.n_cols() {
+        let (rows, values) = b.column(column);
+        for (row, factor) in rows.iter().zip(values) {
+            let (to, own) = a.column(*row as usize);
+            entries.extend(to.iter().zip(own).map(|(to, value)| (*to, column as u32, value * factor)));
+        }
+    }
+    CscMatrix::from_triplets(a.n_rows(), b.n_cols(), &entries)
+}
+
+/// The files of matrices beside a deck: punch files, and those of OUTPUT4. A file of the name of the deck goes
+/// before those whose names go on.
+fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>)> {
+    let path = &job.path;
+    let with = |extension: &str| {
+        let beside = siblings(path).filter(|(rest, file)| rest.ends_with(extension) && file != path);
+        let mut files: Vec<(String, PathBuf)> = beside.collect();
+        files.sort();
+        if files.iter().any(|(rest, _)| rest == extension) {
+            files.retain(|(rest, _)| rest == extension);
+        }
+        files.into_iter().map(|(_, file)| file).collect::<Vec<PathBuf>>()
+    };
+    let (punches, mut outputs) = (with(".pch"), with(".op4"));
+    let assigned = bulk.assigned.outputs(path);
+    let (there, absent): (Vec<PathBuf>, Vec<PathBuf>) = assigned.into_iter().partition(|file| file.is_file());
+    outputs.extend(there.into_iter().filter(|file| !outputs.contains(file)).collect::<Vec<_>>());
+    if punches.is_empty() && outputs.is_empty() {
+        return Err(no_files(path, &absent));
+    }
+    Ok((punches, outputs))
+}
+
+/// Returns the points that follow by constraints which matrices do not contain; `has` tells of which points they
+/// have rows.
+fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &Places<'_>) -> Found<Option<Followers>> {
+    let one = |diagnostic| vec![diagnostic];
+    let open = bulk.constraints.open(has).map_err(one)?;
+    if open.is_empty() {
+        return Ok(None);
+    }
+    Followers::new(&open, places).map(Some).map_err(one)
+}
+
+/// Some rows, ascending, and the same columns of a matrix that has no entries elsewhere.
+fn principal(raw: RawMatrix, kept: &[usize]) -> RawMatrix {
+    let mut local = vec![u32::MAX; raw.matrix.n_rows()];
+    kept.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);
+    let mut col_ptr = vec![0];
+    let (mut row_idx, mut values) = (Vec::new(), Vec::new());
+    for &column in kept {
+        let (rows, own) = raw.matrix.column(column);
+        row_idx.extend(rows.iter().map(|&row| local[row as usize]));
+        values.extend_from_slice(own);
+        col_ptr.push(row_idx.len());
+    }
+    let matrix = CscMatrix::from_parts(kept.len(), kept.len(), col_ptr, row_idx, values);
+    RawMatrix { matrix, ..raw }
+}

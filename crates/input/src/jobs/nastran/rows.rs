@@ -1,0 +1,71 @@
+//! What the rows of matrices stand for that do not name them: those of OUTPUT4 follow the points in ascending
+//! order, six to a grid and one to a scalar point, less what the set of the matrix does not have.
+
+use super::bulk::Bulk;
+use crate::dmig::Point;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// True if matrices of `n` rows may be those of a set of the deck.
+pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
+    bulk.resequenced || points(bulk, n, "", Path::new("")).is_ok()
+}
+
+/// Points of the rows of matrices with `n` rows: the g-set, the a-set of the deck, the g-set without what follows
+/// others by constraints, without what supports hold as well, or the displacements where all elements are solids;
+/// the first that has as many.
+///
+/// # Errors
+/// FB112 when none has.
+pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<Vec<Point>, Diagnostic> {
+    if bulk.resequenced {
+        let message = "SEQGP changes the order of the rows, which OUTPUT4 does not name";
+        let help = "take the SEQGP cards out, or write the matrices as DMIG";
+        return Err(Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help));
+    }
+    let all = || {
+        let grids = bulk.grids.keys().flat_map(|&id| (1..=6).map(move |component| (id, component)));
+        grids.chain(bulk.scalars.iter().map(|&id| (id, 0))).collect::<BTreeSet<Point>>()
+    };
+    let (grids, scalars) = (bulk.grids.len(), bulk.scalars.len());
+    let mut counted = vec![(format!("{grids} grids and {scalars} scalar points"), 6 * grids + scalars)];
+    if n == counted[0].1 {
+        return Ok(all().into_iter().collect());
+    }
+    let boundary = bulk.boundary();
+    if !boundary.is_empty() {
+        counted.push(("the a-set".to_owned(), boundary.len()));
+        if boundary.len() == n {
+            return Ok(boundary.into_iter().collect());
+        }
+    }
+    let (followers, followed) = bulk.constraints.points();
+    let left: BTreeSet<Point> = all().difference(&followers).copied().collect();
+    if !followers.is_empty() {
+        counted.push(("without what follows by constraints".to_owned(), left.len()));
+        if left.len() == n {
+            return Ok(left.into_iter().collect());
+        }
+    }
+    let supported = bulk.supported();
+    if !supported.is_empty() {
+        let free: Vec<Point> = left.difference(&supported).copied().collect();
+        counted.push(("without supports".to_owned(), free.len()));
+        if free.len() == n {
+            return Ok(free);
+        }
+    }
+    if bulk.has_elements && !bulk.has_rotations {
+        let moves = |point: &Point| point.1 <= 3 || followed.contains(point);
+        let displacements: Vec<Point> = left.into_iter().filter(moves).collect();
+        counted.push(("displacements only".to_owned(), displacements.len()));
+        if displacements.len() == n {
+            return Ok(displacements);
+        }
+    }
+    let counted: Vec<String> = counted.into_iter().map(|(what, rows)| format!("{what} {rows}")).collect();
+    let message = format!("matrix {name} has {n} rows; of the deck {}", counted.join(", "));
+    let help = "write KGG and MGG, or the matrices of the a-set that ASET cards of the deck name";
+    Err(Diagnostic::new(Code::DeckRows, message).in_file(path).with_help(help))
+}

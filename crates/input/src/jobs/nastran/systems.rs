@@ -1,0 +1,302 @@
+//! Coordinate systems: by three grids (CORD1x) or three points (CORD2x), each in another system, and what
+//! they make of coordinates and of the axes of rows.
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+/// Systems that refer to one another deeper than this.
+const DEEPEST: usize = 200;
+/// Sine of the angle between the points of a system below which they lie on one line.
+const ON_A_LINE: f64 = 1e-12;
+/// Distance from the axis, relative to that from the origin, below which a grid lies on the axis.
+const ON_THE_AXIS: f64 = 1e-12;
+
+/// What the coordinates of a system are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// x, y, z.
+    Rectangular,
+    /// Radius, angle in degrees, z.
+    Cylindrical,
+    /// Radius, angle from the z axis, angle about it, both in degrees.
+    Spherical,
+}
+
+/// A grid: where it lies in which system, and the system of its rows.
+#[derive(Debug, Clone)]
+pub(super) struct Grid {
+    /// System of the coordinates (CP) and of the rows (CD); `None` only while the deck is read.
+    pub system: Option<i64>,
+    pub x: [f64; 3],
+    pub axes: Option<i64>,
+    /// Whether it says itself what holds it.
+    pub has_support_field: bool,
+    /// Components that it says are held.
+    pub held: Vec<u8>,
+    /// Where its card stands: index of the file, and line.
+    pub file: usize,
+    pub line: usize,
+}
+
+/// The card of a system.
+#[derive(Debug, Clone)]
+pub(super) struct SystemCard {
+    kind: Kind,
+    definition: Definition,
+    path: PathBuf,
+    line: usize,
+}
+
+/// Origin, a point of the z axis, and a point of the plane of x and z.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Definition {
+    /// Three grids.
+    Grids([i64; 3]),
+    /// Three points in another system.
+    Points { reference: i64, points: [[f64; 3]; 3] },
+}
+
+impl Grid {
+    /// True if both cards say the same.
+    pub(super) fn is_the_same(&self, other: &Self) -> bool {
+        let said = |own: &Self| (own.system, own.x, own.axes, own.held.clone());
+        said(self) == said(other)
+    }
+}
+
+impl SystemCard {
+    /// True if both cards say the same.
+    pub(super) fn is_the_same(&self, other: &Self) -> bool {
+        self.kind == other.kind && self.definition == other.definition
+    }
+
+    pub(super) fn new(kind: Kind, definition: Definition, path: &Path, line: usize) -> Self {
+        Self { kind, definition, path: path.to_path_buf(), line }
+    }
+}
+
+/// A system in the basic one.
+#[derive(Debug, Clone, Copy)]
+struct System {
+    kind: Kind,
+    origin: [f64; 3],
+    /// Unit vectors along x, y, z.
+    axes: [[f64; 3]; 3],
+}
+
+const BASIC: System = System {
+    kind: Kind::Rectangular,
+    origin: [0.0; 3],
+    axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+};
+
+/// Finds systems and places, each once.
+pub(super) struct Systems<'b> {
+    cards: &'b HashMap<i64, SystemCard>,
+    grids: &'b BTreeMap<i64, Grid>,
+    known: HashMap<i64, System>,
+    /// Systems that are being found.
+    open: Vec<i64>,
+}
+
+/// What is wrong, and where where another card than that of the grid is.
+type Found<T> = Result<T, Diagnostic>;
+
+impl<'b> Systems<'b> {
+    pub(super) fn new(cards: &'b HashMap<i64, SystemCard>, grids: &'b BTreeMap<i64, Grid>) -> Self {
+        Self { cards, grids, known: HashMap::from([(0, BASIC)]), open: Vec::new() }
+    }
+
+    /// Where a grid lies in the basic system.
+    ///
+    /// # Errors
+    /// FB110 for systems that are not there, refer to themselves, or have their points on one line.
+    pub(super) fn position(&mut self, grid: &Grid) -> Found<[f64; 3]> {
+        let system = self.system(grid.system.unwrap_or(0))?;
+        Ok(system.point(grid.x))
+    }
+
+    /// The unit vectors, in the basic system, along which the rows of a grid at `x` stand.
+    ///
+    /// # Errors
+    /// As [`position`](Self::position).
+    pub(super) fn axes(&mut self, grid: &Grid, x: [f64; 3]) -> Found<[[f64; 3]; 3]> {
+        Ok(self.system(grid.axes.unwrap_or(0))?.axes_at(x))
+    }
+
+    fn system(&mut self, id: i64) -> Found<System> {
+        if let Some(known) = self.known.get(&id) {
+            return Ok(*known);
+        }
+        let refused = |message: String| Diagnostic::new(Code::DeckSyntax, message);
+        let Some(card) = self.cards.get(&id) else {
+            return Err(refused(format!("coordinate system {id} is not in the deck")));
+        };
+        let at = |diagnostic: Diagnostic| diagnostic.in_file(&card.path).at_line(card.line);
+        if self.open.contains(&id) || self.open.len() >= DEEPEST {
+            let through: Vec<String> = self.open.iter().take(8).map(i64::to_string).collect();
+            let message = format!("coordinate system {id} refers to itself through {}", through.join(", "));
+            return Err(at(refused(message)).with_help("give a system of the circle in the basic one"));
+        }
+        self.open.push(id);
+        let points = self.points(card).map_err(|diagnostic| match diagnostic.file() {
+            None => at(diagnostic),
+            Some(_) => diagnostic,
+        });
+        self.open.pop();
+        let system = System::through(card.kind, points?)
+            .ok_or_else(|| at(refused(format!("the points of coordinate system {id} lie on one line"))))?;
+        self.known.insert(id, system);
+        Ok(system)
+    }
+
+    /// The three points of a card in the basic system.
+    fn points(&mut self, card: &SystemCard) -> Found<[[f64; 3]; 3]> {
+        match &card.definition {
+            Definition::Points { reference, points } => {
+                let system = self.system(*reference)?;
+                Ok(points.map(|x| system.point(x)))
+            }
+            Definition::Grids(ids) => {
+                let mut points = [[0.0; 3]; 3];
+                for (point, id) in points.iter_mut().zip(ids) {
+                    let grids = self.grids;
+                    let Some(grid) = grids.get(id) else {
+                        let message = format!("grid {id} of a coordinate system is not in the deck");
+                        return Err(Diagnostic::new(Code::DeckSyntax, message));
+                    };
+                    *point = self.position(grid)?;
+                }
+                Ok(points)
+            }
+        }
+    }
+}
+
+impl System {
+    /// Origin, a point of the z axis, a point of the plane of x and z; `None` where they lie on one line.
+    fn through(kind: Kind, [origin, on_z, in_plane]: [[f64; 3]; 3]) -> Option<Self> {
+        let z = unit(minus(on_z, origin))?;
+        let across = unit(minus(in_plane, origin))?;
+        let normal = cross(z, across);
+        let y = unit(normal).filter(|_| length(normal) > ON_A_LINE)?;
+        Some(Self { kind, origin, axes: [cross(y, z), y, z] })
+    }
+
+    /// A point in the basic system.
+    fn point(&self, x: [f64; 3]) -> [f64; 3] {
+        let [a, b, c] = x;
+        let local = match self.kind {
+            Kind::Rectangular => x,
+            Kind::Cylindrical => {
+                let (sin, cos) = sin_cos(b);
+                [a * cos, a * sin, c]
+            }
+            Kind::Spherical => {
+                let ((sin, cos), (sin_about, cos_about)) = (sin_cos(b), sin_cos(c));
+                [a * sin * cos_about, a * sin * sin_about, a * cos]
+            }
+        };
+        [0, 1, 2].map(|k| self.origin[k] + (0..3).map(|j| local[j] * self.axes[j][k]).sum::<f64>())
+    }
+
+    /// Unit vectors at a point of the basic system. On the axis of a cylindrical or spherical system they are
+    /// those of the rectangular system that defines it.
+    fn axes_at(&self, x: [f64; 3]) -> [[f64; 3]; 3] {
+        let from = minus(x, self.origin);
+        let [u, v, w] = self.axes.map(|axis| dot(axis, from));
+        let radius = u.hypot(v);
+        if self.kind == Kind::Rectangular || radius <= ON_THE_AXIS * length(from) {
+            return self.axes;
+        }
+        let (cos, sin) = (u / radius, v / radius);
+        let [e, f, z] = self.axes;
+        let mix = |a: f64, b: f64, c: f64| [0, 1, 2].map(|k| a * e[k] + b * f[k] + c * z[k]);
+        match self.kind {
+            Kind::Spherical => {
+                let whole = radius.hypot(w);
+                let (down, up) = (radius / whole, w / whole);
+                [mix(down * cos, down * sin, up), mix(up * cos, up * sin, -down), mix(-sin, cos, 0.0)]
+            }
+            _ => [mix(cos, sin, 0.0), mix(-sin, cos, 0.0), z],
+        }
+    }
+}
+
+/// Sine and cosine of an angle in degrees, exact at right angles.
+fn sin_cos(degrees: f64) -> (f64, f64) {
+    match degrees.rem_euclid(360.0) {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        turn => turn.to_radians().sin_cos(),
+    }
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| a[k] - b[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| a[k] * b[k]).sum()
+}
+
+fn length(a: [f64; 3]) -> f64 {
+    a[0].hypot(a[1]).hypot(a[2])
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
+    let own = length(a);
+    (own > 0.0 && own.is_finite()).then(|| a.map(|x| x / own))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn card(kind: Kind, reference: i64, points: [[f64; 3]; 3]) -> SystemCard {
+        SystemCard::new(kind, Definition::Points { reference, points }, Path::new("job.bdf"), 1)
+    }
+
+    /// A cylinder about an axis along x, in it a sphere.
+    #[test]
+    fn systems_within_systems() {
+        let upright = [[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
+        let lying = [[1.0, 2.0, 3.0], [2.0, 2.0, 3.0], [1.0, 3.0, 3.0]];
+        let cards = HashMap::from([
+            (1, card(Kind::Cylindrical, 0, lying)),
+            (2, card(Kind::Spherical, 1, [[2.0, 90.0, 5.0], [2.0, 90.0, 6.0], [3.0, 90.0, 5.0]])),
+            (3, card(Kind::Rectangular, 4, upright)),
+            (4, card(Kind::Rectangular, 3, upright)),
+            (5, card(Kind::Rectangular, 0, [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])),
+        ]);
+        let grids = BTreeMap::new();
+        let mut systems = Systems::new(&cards, &grids);
+        let near = |a: [f64; 3], b: [f64; 3]| assert!(length(minus(a, b)) < 1e-14, "{a:?} {b:?}");
+        let cylinder = systems.system(1).expect("a system");
+        near(cylinder.point([2.0, 90.0, 5.0]), [6.0, 2.0, 5.0]);
+        let axes = cylinder.axes_at([6.0, 2.0, 5.0]);
+        near(axes[0], [0.0, 0.0, 1.0]);
+        near(axes[1], [0.0, -1.0, 0.0]);
+        near(axes[2], [1.0, 0.0, 0.0]);
+        near(cylinder.axes_at([9.0, 2.0, 3.0])[0], [0.0, 1.0, 0.0]);
+        let sphere = systems.system(2).expect("a system");
+        // Its z axis lies along x, its x axis along z.
+        near(sphere.point([2.0, 90.0, 0.0]), [6.0, 2.0, 7.0]);
+        near(sphere.point([2.0, 0.0, 77.0]), [8.0, 2.0, 5.0]);
+        let axes = sphere.axes_at([6.0, 2.0, 7.0]);
+        near(axes[0], [0.0, 0.0, 1.0]);
+        near(axes[1], [-1.0, 0.0, 0.0]);
+        near(axes[2], [0.0, -1.0, 0.0]);
+        for (id, part) in [(3, "refers to itself"), (5, "on one line"), (9, "is not in the deck")] {
+            let error = systems.system(id).expect_err(part);
+            assert!(error.message().contains(part), "{}", error.message());
+        }
+    }
+}

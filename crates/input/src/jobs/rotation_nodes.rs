@@ -1,0 +1,211 @@
+//! Nodes of CalculiX whose directions 1 to 3 are rotations of a reference node.
+//!
+//! ROT NODE of *RIGID BODY names such a node. *COUPLING with *KINEMATIC makes one that the deck does not
+//! have, and its number follows from the deck: CalculiX reads all *NODE cards, then all *COUPLING cards in
+//! their order, and only then the cards and elements that make further nodes. Each kinematic coupling takes
+//! the next number for its rotation node, and numbers without rows for its equations (see
+//! [`Coupling::n_numbers`]).
+
+use super::Found;
+use super::deck::{Card, Deck, fields};
+use super::deck_mesh::DeckMesh;
+use super::deck_surfaces::nodes_of_surface;
+use flexbody_base::diagnostic::Code;
+use flexbody_base::text::table::integer;
+use flexbody_model::DofLabel;
+use std::collections::{BTreeSet, HashMap};
+
+/// Internal nodes of an element with incompatible modes (C3D8I).
+const INTERNAL_NODES: usize = 3;
+
+const HELP: &str = "run CalculiX again if the deck has changed since; else write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B instead of the coupling";
+
+/// Returns the rotation nodes of a deck, each with the reference node that turns. `labels` are the rows as
+/// CalculiX labels them.
+///
+/// # Errors
+/// FB111 if the rows that are rotations, or the node that they turn, cannot be identified.
+pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<HashMap<i64, i64>> {
+    let mut rotations = named_rotation_nodes(deck)?;
+    rotations.extend(made_rotation_nodes(deck, mesh, labels)?);
+    let with_rows: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
+    let mut turned: HashMap<i64, i64> = HashMap::new();
+    let mut nodes = HashMap::new();
+    for Rotation { node, reference, card } in rotations {
+        // One rotation node turns one reference node, and no reference node has rotations of two.
+        if let Some(other) = nodes.insert(node, reference).filter(|other| *other != reference) {
+            let message = format!("ROT NODE {node} is that of two reference nodes, {other} and {reference}");
+            let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+            return Err(vec![diagnostic.with_help("give each *RIGID BODY a ROT NODE of its own")]);
+        }
+        if with_rows.contains(&node) && turned.insert(reference, node).is_some_and(|other| other != node) {
+            let message = format!(
+                "REF NODE {reference} of *{} is also the REF NODE of another coupling: it has two sets of rotations",
+                card.title
+            );
+            let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+            return Err(vec![diagnostic.with_help("give each coupling a REF NODE of its own")]);
+        }
+    }
+    Ok(nodes)
+}
+
+/// A rotation node, the reference node that it turns, and the card that says so.
+struct Rotation<'d> {
+    node: i64,
+    reference: i64,
+    card: &'d Card,
+}
+
+/// Returns the rotation nodes that *RIGID BODY names.
+///
+/// # Errors
+/// FB111 for *RIGID BODY without REF NODE or ROT NODE.
+fn named_rotation_nodes(deck: &Deck) -> Found<Vec<Rotation<'_>>> {
+    let mut rotations = Vec::new();
+    for card in deck.cards().iter().filter(|card| card.keyword == "RIGIDBODY") {
+        let node = |name: &str| {
+            card.parameter(name).and_then(|text| fields(text.as_bytes()).next().and_then(integer))
+        };
+        let message = match (node("REFNODE"), node("ROTNODE")) {
+            (Some(reference), Some(node)) => {
+                rotations.push(Rotation { node, reference, card });
+                continue;
+            }
+            (Some(_), None) => "*RIGID BODY has no ROT NODE: the rows of its rotations cannot be identified",
+            (None, _) => "*RIGID BODY has no REF NODE: its rows cannot be identified",
+        };
+        let diagnostic = deck.about(card, Code::DeckUnsupported, message);
+        return Err(vec![diagnostic.with_help("write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B")]);
+    }
+    Ok(rotations)
+}
+
+/// A *COUPLING with *KINEMATIC.
+struct Coupling<'d> {
+    card: &'d Card,
+    /// Lines of directions below *KINEMATIC.
+    n_lines: usize,
+}
+
+impl Coupling<'_> {
+    /// Returns the kinematic couplings of a deck in their order. *DISTRIBUTING only spreads loads over a
+    /// surface: it makes no nodes, and its reference node has no rows.
+    fn all(deck: &Deck) -> Vec<Coupling<'_>> {
+        let cards = deck.cards();
+        let mut couplings = Vec::new();
+        for (k, card) in cards.iter().enumerate().filter(|(_, card)| card.keyword == "COUPLING") {
+            let below = cards[k + 1..].iter().take_while(|card| card.keyword == "KINEMATIC");
+            let counts: Vec<usize> = below.map(|card| deck.data(card).count()).collect();
+            if !counts.is_empty() {
+                couplings.push(Coupling { card, n_lines: counts.iter().sum() });
+            }
+        }
+        couplings
+    }
+
+    /// Returns how many numbers the coupling takes besides that of its rotation node. Each line of directions
+    /// makes one node for each node of the surface; with ORIENTATION every node of the surface makes a copy
+    /// of itself and one node for the copy's equations, and the lines make none. Returns `None` if the nodes
+    /// of the surface are unknown.
+    fn n_numbers(&self, deck: &Deck, mesh: &DeckMesh) -> Option<i64> {
+        let nodes = nodes_of_surface(deck, mesh, &self.card.name("SURFACE")?)?.len();
+        let for_each = if self.card.parameter("ORIENTATION").is_some() { 2 } else { self.n_lines };
+        i64::try_from(nodes.checked_mul(for_each)?).ok()
+    }
+
+    /// Returns the reference node, given by its number or by a set of one node.
+    ///
+    /// # Errors
+    /// FB111 if REF NODE is neither.
+    fn reference(&self, deck: &Deck, mesh: &DeckMesh) -> Found<i64> {
+        let text = self.card.parameter("REFNODE").unwrap_or_default();
+        let set = || match mesh.set(text)? {
+            [node] => Some(*node),
+            _ => None,
+        };
+        integer(text.as_bytes()).or_else(set).ok_or_else(|| {
+            let message = format!("REF NODE `{text}` of *COUPLING is neither a node nor a set of one node");
+            let diagnostic = deck.about(self.card, Code::DeckUnsupported, message);
+            vec![diagnostic.with_help("write the number of the reference node, as in REF NODE=17")]
+        })
+    }
+
+    /// Returns FB111: the rows of the rotations of the reference node cannot be identified.
+    fn refuse<T>(&self, deck: &Deck, reference: i64, why: &str, help: &str) -> Found<T> {
+        let message = format!(
+            "*COUPLING, *KINEMATIC: the rows of the rotations of REF NODE {reference} cannot be identified: {why}"
+        );
+        Err(vec![deck.about(self.card, Code::DeckUnsupported, message).with_help(help)])
+    }
+}
+
+/// A kinematic coupling with its reference node, and the number that its rotation node has by the deck.
+struct Numbered<'d> {
+    coupling: Coupling<'d>,
+    reference: i64,
+    node: i64,
+}
+
+/// Returns the rotation nodes that kinematic couplings make and that have rows.
+///
+/// # Errors
+/// FB111 if rows of nodes that the deck does not have are not those that its couplings make.
+fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<Vec<Rotation<'d>>> {
+    let mut next = mesh.nodes.keys().next_back().and_then(|highest| highest.checked_add(1));
+    let mut end = i64::MIN;
+    let mut numbered = Vec::new();
+    for coupling in Coupling::all(deck) {
+        let reference = coupling.reference(deck, mesh)?;
+        let Some(node) = next else {
+            let why = "the nodes of the surface of a coupling above it cannot be counted";
+            let help =
+                "write the *SURFACE of each coupling by nodes or by the faces S1 to S6 of solid elements";
+            return coupling.refuse(deck, reference, why, help);
+        };
+        next = coupling.n_numbers(deck, mesh).and_then(|count| node.checked_add(count)?.checked_add(1));
+        // Numbers below this are those of couplings.
+        end = next.unwrap_or(node);
+        numbered.push(Numbered { coupling, reference, node });
+    }
+    let Some(last) = numbered.last() else { return Ok(Vec::new()) };
+    let expected: BTreeSet<i64> = numbered.iter().map(|own| own.node).collect();
+    // Nodes that have rows, but no place in the deck: rotation nodes, and others beyond their numbers.
+    let made: BTreeSet<i64> =
+        labels.iter().map(|label| label.node).filter(|node| !mesh.nodes.contains_key(node)).collect();
+    let others: Vec<i64> = made.difference(&expected).copied().collect();
+    let stray = others.first().filter(|other| **other < end);
+    let n_internal = INTERNAL_NODES * n_with_internal_nodes(mesh);
+    let is_explained = others.len() == n_internal;
+    // A coupling has no rows if all its nodes follow another coupling, or if the deck is not the one that was
+    // run.
+    let absent = numbered.iter().find(|own| own.coupling.n_lines > 0 && !made.contains(&own.node));
+    let Numbered { coupling, reference, node } = absent.unwrap_or(last);
+    match stray {
+        Some(stray) => {
+            let why = format!("by the deck they belong to node {node}, but node {stray} has rows");
+            coupling.refuse(deck, *reference, &why, HELP)
+        }
+        None if !is_explained => {
+            let why = format!(
+                "by the deck they belong to node {node}, and elements have {n_internal} internal nodes, but {} nodes beyond those of the deck have rows",
+                made.len()
+            );
+            coupling.refuse(deck, *reference, &why, HELP)
+        }
+        None => {
+            let with_rows = numbered.into_iter().filter(|own| made.contains(&own.node));
+            let rotation = |own: Numbered<'d>| Rotation {
+                node: own.node,
+                reference: own.reference,
+                card: own.coupling.card,
+            };
+            Ok(with_rows.map(rotation).collect())
+        }
+    }
+}
+
+/// Returns the number of elements of a deck that have internal nodes.
+fn n_with_internal_nodes(mesh: &DeckMesh) -> usize {
+    mesh.elements.iter().filter(|own| own.kind == "C3D8I").map(|own| own.members.len()).sum()
+}

@@ -1,0 +1,66 @@
+//! Reading: manifest, matrices, tables of nodes and degrees of freedom, jobs of FE programs. One file per
+//! matrix format behind [`Reader`] and [`READERS`], one per FE program in `jobs`; the contracts users see
+//! are `docs/input.md` and `docs/fe_programs.md`.
+
+#![deny(
+    clippy::exit,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used
+)]
+
+mod array;
+mod assemble;
+mod bulk_cards;
+mod compressed;
+mod coordinates;
+mod digits;
+mod dmig;
+#[cfg(feature = "hdf5")]
+mod hdf5;
+#[cfg(not(feature = "hdf5"))]
+#[path = "without_hdf5.rs"]
+mod hdf5;
+mod jobs;
+#[cfg(feature = "hdf5")]
+mod lent;
+mod manifest;
+mod mapping;
+mod mat5;
+mod matrix_market;
+mod mesh;
+mod mode_files;
+mod model_files;
+mod named_matrices;
+mod nastran_names;
+mod node_file;
+mod node_files;
+mod npy;
+mod output4;
+mod petsc;
+mod read_model;
+mod reader;
+mod readers;
+mod recent;
+mod recipes;
+mod region;
+mod row_axes;
+mod scipy_npz;
+mod shapes;
+mod tables;
+mod upright_order;
+
+pub use assemble::check_size;
+pub use jobs::{JobFile, is_job, job_programs};
+pub use manifest::read_manifest;
+pub use model_files::{
+    InterfaceNodes, InterfaceSource, LoadSource, MatrixLocation, ModelFiles, ModelSource, TableFiles,
+    parse_units,
+};
+pub use read_model::{read_matrix, read_model, read_nodal_masses};
+pub use reader::{HEAD, MatrixRole, MatrixSource, Reader};
+pub use readers::READERS;
+pub use recipes::{RECIPES, Recipe, Step};
+pub use region::Region;
+pub use shapes::{ImportedColumns, read_imported, read_shapes};

@@ -1,0 +1,192 @@
+//! The tables `[[interface]]`.
+
+use super::{ManifestWalk, Table, Value, integer, real};
+use crate::model_files::{InterfaceNodes, InterfaceSource};
+use flexbody_base::diagnostic::Code;
+use flexbody_model::{Coupling, Reference};
+use std::collections::HashSet;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use toml::de::DeValue;
+
+pub(super) const INTERFACE: &[&str] = &[
+    "name",
+    "nodes",
+    "nodes_file",
+    "set",
+    "box",
+    "cylinder",
+    "plane",
+    "nearest",
+    "coupling",
+    "reference",
+    "reference_node",
+];
+
+/// Interfaces of a body: each takes sixteen entries of its file, which has at most 100,000.
+const MOST_INTERFACES: usize = 6000;
+
+/// Keys of [`INTERFACE`] that say which nodes it has.
+const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane", "nearest"];
+
+impl ManifestWalk<'_, '_> {
+    /// `None` when anything is wrong with the list.
+    pub(super) fn interfaces(&mut self, top: &Table, dimension: usize) -> Option<Vec<InterfaceSource>> {
+        let Some(value) = top.get("interface") else {
+            return Some(Vec::new());
+        };
+        let DeValue::Array(list) = value.get_ref() else {
+            self.mistyped("interface", value, "a list of tables: write [[interface]]");
+            return None;
+        };
+        if list.len() > MOST_INTERFACES {
+            let message =
+                format!("the manifest has {} interfaces, a body has at most {MOST_INTERFACES}", list.len());
+            self.complain(Code::ManifestSyntax, value.span(), message);
+            return None;
+        }
+        let mut names = HashSet::new();
+        let mut interfaces = Vec::new();
+        for item in list.iter() {
+            let DeValue::Table(table) = item.get_ref() else {
+                self.mistyped("interface", item, "a list of tables: write [[interface]]");
+                continue;
+            };
+            if let Some(interface) = self.interface(table, item.span(), dimension) {
+                if !names.insert(interface.name.clone()) {
+                    let message = format!("interface `{}` is given twice", interface.name);
+                    self.complain(Code::ManifestSyntax, item.span(), message);
+                }
+                interfaces.push(interface);
+            }
+        }
+        Some(interfaces)
+    }
+
+    fn interface(&mut self, table: &Table, span: Range<usize>, dimension: usize) -> Option<InterfaceSource> {
+        self.known_keys(table, "[[interface]]", INTERFACE);
+        if !table.contains_key("name") {
+            self.complain(Code::ManifestSyntax, span.clone(), "interface has no name".into());
+        }
+        let name = self.string(table, "name")?;
+        // The name becomes a group of the flex-body file, where a slash is encoded, and a word in files of
+        // text, where a line break cannot be.
+        if name.is_empty() || name.chars().any(char::is_control) {
+            let message =
+                format!("interface name `{}` is empty or has control characters", name.escape_debug());
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        }
+        let nodes = self.interface_nodes(table, &name, span.clone(), dimension)?;
+        let coupling = match table.get("coupling") {
+            Some(value) => Some(self.coupling(value)?),
+            None => None,
+        };
+        let reference = match (table.get("reference"), table.get("reference_node")) {
+            (None, None) => match &nodes {
+                InterfaceNodes::Region(region) => region.reference(),
+                _ => Reference::Centre,
+            },
+            (Some(point), None) => Reference::Point(self.point("reference", point, dimension)?),
+            (None, Some(node)) => match integer(node) {
+                Some(node) => Reference::Node(node),
+                None => {
+                    self.mistyped("reference_node", node, "a node number");
+                    return None;
+                }
+            },
+            (Some(_), Some(_)) => {
+                let message = format!("interface `{name}` has both `reference` and `reference_node`");
+                self.complain(Code::ManifestSyntax, span, message);
+                return None;
+            }
+        };
+        Some(InterfaceSource { name, nodes, coupling, reference })
+    }
+
+    /// Which nodes an interface has: one key says it.
+    fn interface_nodes(
+        &mut self,
+        table: &Table,
+        name: &str,
+        span: Range<usize>,
+        dimension: usize,
+    ) -> Option<InterfaceNodes> {
+        let given: Vec<&str> = NODES.iter().copied().filter(|key| table.contains_key(*key)).collect();
+        let &[key] = given.as_slice() else {
+            let message = match given.as_slice() {
+                [] => format!("interface `{name}` has neither `nodes` nor `nodes_file`"),
+                [one, other, ..] => format!("interface `{name}` has both `{one}` and `{other}`"),
+                [_] => unreachable!("matched above"),
+            };
+            self.complain(Code::ManifestSyntax, span, message);
+            return None;
+        };
+        let value = table.get(key)?;
+        Some(match key {
+            "nodes" => InterfaceNodes::Listed(self.node_list(name, value)?),
+            "nodes_file" => {
+                let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
+                InterfaceNodes::File(folder.join(PathBuf::from(self.string(table, key)?)))
+            }
+            "set" => InterfaceNodes::Set(self.string(table, key)?),
+            _ => InterfaceNodes::Region(self.region(key, value, dimension)?),
+        })
+    }
+
+    fn coupling(&mut self, value: &Value) -> Option<Coupling> {
+        let name = match value.get_ref() {
+            DeValue::String(name) => name.as_ref(),
+            _ => "",
+        };
+        let coupling = Coupling::ALL.into_iter().find(|coupling| coupling.name() == name);
+        if coupling.is_none() {
+            let expected = Coupling::ALL.map(|coupling| format!("`{}`", coupling.name())).join(", ");
+            let message = format!("`coupling` is none of {expected}");
+            self.complain(Code::ManifestSyntax, value.span(), message);
+        }
+        coupling
+    }
+
+    /// A point in space; in the plane its two coordinates.
+    pub(super) fn point(&mut self, key: &str, value: &Value, dimension: usize) -> Option<[f64; 3]> {
+        let coordinates: Option<Vec<f64>> = match value.get_ref() {
+            DeValue::Array(list) => list.iter().map(real).collect(),
+            _ => None,
+        };
+        let mut point = [0.0; 3];
+        match coordinates {
+            Some(coordinates) if coordinates.len() == dimension => {
+                point[..dimension].copy_from_slice(&coordinates);
+                Some(point)
+            }
+            _ => {
+                let message = format!("`{key}` is not a list of {dimension} coordinates");
+                self.complain(Code::ManifestSyntax, value.span(), message);
+                None
+            }
+        }
+    }
+
+    fn node_list(&mut self, name: &str, value: &Value) -> Option<Vec<i64>> {
+        let DeValue::Array(list) = value.get_ref() else {
+            self.mistyped("nodes", value, "a list of node numbers");
+            return None;
+        };
+        if list.is_empty() {
+            self.complain(Code::ManifestSyntax, value.span(), format!("interface `{name}` has no nodes"));
+        }
+        let (mut nodes, mut seen) = (Vec::new(), HashSet::new());
+        for item in list.iter() {
+            match integer(item) {
+                Some(node) if seen.insert(node) => nodes.push(node),
+                Some(node) => {
+                    let message = format!("interface `{name}` lists node {node} twice");
+                    self.complain(Code::NodeDuplicate, item.span(), message);
+                }
+                None => self.mistyped("nodes", item, "a list of node numbers"),
+            }
+        }
+        Some(nodes)
+    }
+}

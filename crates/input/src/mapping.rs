@@ -1,0 +1,101 @@
+//! Which degree of freedom each matrix row is: our table, or what Ansys writes beside its matrices.
+
+use super::matrix_market::read_array;
+use super::tables::read_dofs;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::table::integer;
+use flexbody_model::DofLabel;
+use std::path::Path;
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// What a file says of the rows.
+pub(super) enum Mapping {
+    /// The label of every row.
+    Labels(Vec<DofLabel>),
+    /// The nodes in the order of the rows, each with as many directions as fit (`*EXPORT` of Ansys).
+    Nodes(Vec<i64>),
+}
+
+impl Mapping {
+    /// Reads a table of labels (`node,dir`), a Matrix Market array of node numbers, or lines `row node
+    /// direction` with directions such as `UX` (the mapping of `HBMAT`).
+    ///
+    /// # Errors
+    /// FB203 to FB208, FB301, FB302.
+    pub(super) fn read(file: &InputFile) -> Found<Self> {
+        let bytes = file.bytes();
+        if bytes.get(..14).is_some_and(|start| start.eq_ignore_ascii_case(b"%%MatrixMarket")) {
+            return node_array(file).map(Self::Nodes);
+        }
+        match named_directions(bytes) {
+            Some(labels) => Ok(Self::Labels(labels)),
+            None => read_dofs(file).map(Self::Labels),
+        }
+    }
+
+    /// The labels of a matrix of `n` rows.
+    ///
+    /// # Errors
+    /// FB402 where the nodes do not share the rows equally.
+    pub(super) fn labels(self, n: usize, path: &Path) -> Found<Vec<DofLabel>> {
+        let nodes = match self {
+            Self::Labels(labels) => return Ok(labels),
+            Self::Nodes(nodes) => nodes,
+        };
+        let each = n / nodes.len().max(1);
+        if nodes.is_empty() || each * nodes.len() != n || !matches!(each, 2 | 3 | 6) {
+            let message = format!(
+                "{} nodes cannot share the {n} rows of the matrices equally, by 2, 3 or 6",
+                nodes.len()
+            );
+            let help = "write labels of the rows as a table: node,dir";
+            return Err(vec![Diagnostic::new(Code::DofCount, message).in_file(path).with_help(help)]);
+        }
+        let label = |node| (1..=each as u8).map(move |direction| DofLabel { node, direction });
+        Ok(nodes.into_iter().flat_map(label).collect())
+    }
+}
+
+fn node_array(file: &InputFile) -> Found<Vec<i64>> {
+    let array = read_array(file, Compression::of(file.bytes()))
+        .map_err(|found| found.into_iter().map(|d| d.in_file(file.path())).collect::<Vec<_>>())?;
+    let wrong = |what: String| vec![Diagnostic::new(Code::TableRow, what).in_file(file.path())];
+    if array.cols != 1 {
+        return Err(wrong(format!("mapping has {} columns, expected one of node numbers", array.cols)));
+    }
+    let whole = |value: &f64| match value.fract() == 0.0 && value.abs() < 9e15 {
+        true => Ok(*value as i64),
+        false => Err(wrong(format!("{value} is no node number"))),
+    };
+    array.values.iter().map(whole).collect()
+}
+
+/// Labels of lines `row node direction`, whose directions have names; `None` where a line is not of that
+/// form, or a row is missing.
+fn named_directions(bytes: &[u8]) -> Option<Vec<DofLabel>> {
+    const NAMES: [&str; 6] = ["UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"];
+    let mut rows: Vec<(i64, DofLabel)> = Vec::new();
+    for line in bytes.split(|&b| b == b'\n') {
+        let words: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
+        let &[row, node, name] = words.as_slice() else {
+            // Heads and blank lines stand above the first row.
+            if rows.is_empty() || words.is_empty() {
+                continue;
+            }
+            return None;
+        };
+        let name = String::from_utf8_lossy(name).to_uppercase();
+        let direction = NAMES.iter().position(|own| *own == name);
+        match (integer(row), integer(node), direction) {
+            (Some(row), Some(node), Some(at)) => rows.push((row, DofLabel { node, direction: at as u8 + 1 })),
+            _ if rows.is_empty() => {}
+            _ => return None,
+        }
+    }
+    rows.sort_by_key(|(row, _)| *row);
+    let complete = !rows.is_empty() && rows.iter().enumerate().all(|(k, (row, _))| *row == k as i64 + 1);
+    complete.then(|| rows.into_iter().map(|(_, label)| label).collect())
+}

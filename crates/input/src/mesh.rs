@@ -1,0 +1,86 @@
+//! The surface that a part is drawn by, out of the elements of its files.
+
+use super::node_files::NodeFile;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_model::{Elements, Nodes, Skin, SurfaceMesh, extents, skin};
+use std::collections::HashMap;
+use std::path::Path;
+
+/// Nodes of a mesh may be this far from those of the model, relative to the largest extent of the model:
+/// meshes are written with few digits.
+const APART: f64 = 1e-3;
+
+/// Kinds of elements that a message names.
+const NAMED: usize = 6;
+
+/// What the surface of a model is made of.
+pub(super) struct MeshReading<'m> {
+    pub nodes: &'m Nodes,
+    /// Elements that were read with the nodes.
+    pub elements: &'m Elements,
+    /// The file of the nodes.
+    pub path: &'m Path,
+}
+
+/// A surface, and what it lacks.
+type Found = Result<(Option<SurfaceMesh>, Vec<Diagnostic>), Vec<Diagnostic>>;
+
+impl MeshReading<'_> {
+    /// The surface, by the elements of the file `from` where there is one, else by those read with the
+    /// nodes.
+    ///
+    /// # Errors
+    /// FB125 when `from` is not a mesh on the nodes of the model.
+    pub(crate) fn mesh(&self, from: Option<(&NodeFile, &Path)>) -> Found {
+        let Some((mesh, path)) = from else {
+            return Ok(self.drawn(self.elements, self.path));
+        };
+        let foreign = |message: String| vec![Diagnostic::new(Code::MeshForeign, message).in_file(path)];
+        if mesh.elements.is_empty() {
+            return Err(foreign("file has no elements that can be drawn".to_owned()));
+        }
+        if let Some(message) = self.stranger(&mesh.nodes) {
+            return Err(foreign(message));
+        }
+        let (drawn, partly) = self.drawn(&mesh.elements, path);
+        match drawn {
+            Some(_) => Ok((drawn, partly)),
+            None => Err(foreign("no element of the mesh has all of its nodes in the model".to_owned())),
+        }
+    }
+
+    /// A node of a mesh that lies elsewhere in the model.
+    fn stranger(&self, mesh: &Nodes) -> Option<String> {
+        let index: HashMap<i64, usize> = self.nodes.ids.iter().copied().zip(0..).collect();
+        let allowed = APART * extents(&self.nodes.positions).into_iter().fold(0.0, f64::max);
+        let elsewhere = |(id, x): (&i64, &[f64; 3])| {
+            let own = &self.nodes.positions[*index.get(id)?];
+            let apart = (0..3).map(|k| (x[k] - own[k]).powi(2)).sum::<f64>().sqrt();
+            (apart > allowed)
+                .then(|| format!("node {id} of the mesh lies at {x:?}, the node of the model at {own:?}"))
+        };
+        mesh.ids.iter().zip(&mesh.positions).find_map(elsewhere)
+    }
+
+    fn drawn(&self, elements: &Elements, path: &Path) -> (Option<SurfaceMesh>, Vec<Diagnostic>) {
+        let Skin { mesh, without_nodes } = skin(elements, self.nodes);
+        let left_out: Vec<String> =
+            elements.left_out().map(|(kind, count)| format!("{count} of {kind}")).collect();
+        let mut partly = Vec::new();
+        let mut tell = |message: String| {
+            partly.push(Diagnostic::new(Code::MeshPartial, message).in_file(path));
+        };
+        if !left_out.is_empty() {
+            let more = if left_out.len() > NAMED { ", and of other kinds" } else { "" };
+            let named = left_out[..left_out.len().min(NAMED)].join(", ");
+            tell(format!("elements that are not drawn: {named}{more}"));
+        }
+        if without_nodes > 0 {
+            let all = elements.len();
+            tell(format!(
+                "{without_nodes} of {all} elements have nodes that the model lacks: they are not drawn"
+            ));
+        }
+        (mesh, partly)
+    }
+}

@@ -1,0 +1,66 @@
+//! Modes as FE programs write them, by nodes and with their eigenvalues. One file per format, each told by
+//! its content.
+
+mod ansys_list;
+mod frd;
+mod op2;
+mod punch;
+mod table;
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::provenance::SourceFile;
+use flexbody_base::text::input_file::InputFile;
+use flexbody_model::RawModes;
+use table::ModeTable;
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// A format of files of modes.
+struct Format {
+    recognises: fn(&[u8]) -> bool,
+    read: fn(&InputFile) -> Found<ModeTable>,
+}
+
+/// The first that recognises the begin of a file reads it.
+const FORMATS: &[Format] = &[
+    Format { recognises: frd::recognises, read: frd::read },
+    Format { recognises: op2::recognises, read: op2::read },
+    Format { recognises: punch::recognises, read: punch::read },
+    Format { recognises: ansys_list::recognises, read: ansys_list::read },
+];
+
+/// Number of bytes that formats are told by.
+const HEAD: usize = 4096;
+
+/// The modes of a file; `None` of a file in none of the formats. `role` names it in the provenance.
+///
+/// # Errors
+/// FB128 for what cannot be read, FB306 for values that are not finite.
+pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Found<RawModes>> {
+    let bytes = file.bytes();
+    let head = &bytes[..bytes.len().min(HEAD)];
+    let format = FORMATS.iter().find(|format| (format.recognises)(head))?;
+    if let Err(diagnostic) = file.load() {
+        return Some(Err(vec![diagnostic]));
+    }
+    let modes = |table: ModeTable| {
+        let sha256 = file.sha256().map_err(|diagnostic| vec![diagnostic])?;
+        table.into_modes(file, SourceFile::new(role, file.path(), sha256))
+    };
+    Some((format.read)(file).and_then(modes))
+}
+
+/// FB128 at a line.
+fn syntax(file: &InputFile, line: usize, message: impl Into<String>) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).at_line(line)]
+}
+
+/// FB128 of a file as a whole.
+fn unreadable(file: &InputFile, message: impl Into<String>, help: &str) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).with_help(help)]
+}
+
+/// Lines of a text with their numbers, without what ends them.
+fn lines(file: &InputFile) -> impl Iterator<Item = (usize, &[u8])> {
+    file.bytes().split(|&b| b == b'\n').enumerate().map(|(at, line)| (at + 1, line.trim_ascii_end()))
+}

@@ -1,0 +1,137 @@
+//! Lists of Ansys: `PRNSOL,U` or `PRNSOL,DOF` after `SET` for every mode, in one file.
+
+use super::table::ModeTable;
+use super::{Found, lines, syntax, unreadable};
+use crate::coordinates::{excerpt, real};
+use crate::digits::written_digits;
+use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::table::integer;
+use flexbody_model::DofLabel;
+use std::f64::consts::TAU;
+
+/// Whether the text has the head of a list of degrees of freedom.
+pub(super) fn recognises(head: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(head);
+    text.contains("NODAL DEGREE OF FREEDOM LISTING")
+}
+
+/// What is read so far.
+#[derive(Default)]
+struct Reading {
+    table: ModeTable,
+    /// Load step and substep of the mode.
+    mode: Option<(i64, i64)>,
+    /// Directions of the columns below a head; `None` for the sum and for what is no displacement.
+    columns: Option<Vec<Option<u8>>>,
+}
+
+/// Reads all lists; pages and lists of one substep are one mode.
+pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+    let mut reading = Reading::default();
+    for (at, line) in lines(file) {
+        let words = numbers_apart(line);
+        let first = words.first().map(Vec::as_slice).unwrap_or_default();
+        if first == b"LOAD" || first.starts_with(b"FREQ=") || first.starts_with(b"TIME=") {
+            reading.head(file, at, line)?;
+        } else if first == b"NODE" {
+            reading.columns = columns(&words[1..]);
+        } else if line.trim_ascii().starts_with(b"THE FOLLOWING DEGREE OF FREEDOM RESULTS") {
+            if !line.windows(6).any(|word| word == b"GLOBAL") {
+                let message = format!("the list is not along the axes of the model: `{}`", excerpt(line));
+                return Err(syntax(file, at, message)
+                    .into_iter()
+                    .map(|d| d.with_help("RSYS,0 before PRNSOL"))
+                    .collect());
+            }
+        } else if let Some(node) = integer(first) {
+            reading.node(file, at, node, &words[1..])?;
+        } else if !words.is_empty() {
+            reading.columns = None;
+        }
+    }
+    let Reading { mut table, .. } = reading;
+    if table.len() == 0 {
+        let help = "SET,1,K and PRNSOL,DOF for every mode K";
+        return Err(unreadable(file, "no displacements of modes are in the list", help));
+    }
+    table.digits = table.digits.max(1);
+    table.eigenvalue_digits = table.eigenvalue_digits.max(1);
+    Ok(table)
+}
+
+impl Reading {
+    /// `LOAD STEP=     1  SUBSTEP=     7`, and below it `FREQ=    3907.0      LOAD CASE=   0`.
+    fn head(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+        self.columns = None;
+        if let (Some(step), Some(substep)) =
+            (behind(line, b"STEP=").and_then(integer), behind(line, b"SUBSTEP=").and_then(integer))
+        {
+            if self.mode != Some((step, substep)) {
+                self.mode = Some((step, substep));
+                self.table.begin(None);
+            }
+        } else if behind(line, b"TIME=").is_some() {
+            return Err(syntax(
+                file,
+                at,
+                "the list belongs to a time: the modes of a modal analysis are read",
+            ));
+        } else if let Some(text) = behind(line, b"FREQ=") {
+            let Some(hertz) = real(text) else {
+                return Err(syntax(file, at, format!("expected a frequency, found `{}`", excerpt(line))));
+            };
+            self.table.eigenvalue_digits = self.table.eigenvalue_digits.max(written_digits(text));
+            self.table.state((TAU * hertz).powi(2));
+        }
+        Ok(())
+    }
+
+    /// A line of a node.
+    fn node(&mut self, file: &InputFile, at: usize, node: i64, words: &[Vec<u8>]) -> Found<()> {
+        let Some(columns) = &self.columns else { return Ok(()) };
+        let values: Option<Vec<f64>> = words.iter().map(|word| real(word)).collect();
+        let Some(values) = values.filter(|values| values.len() == columns.len()) else {
+            let message = format!("expected node {node} with {} values", columns.len());
+            return Err(syntax(file, at, message));
+        };
+        for ((column, value), word) in columns.iter().zip(values).zip(words) {
+            if let Some(direction) = *column {
+                self.table.set(file, Some(at), DofLabel { node, direction }, value)?;
+                self.table.digits = self.table.digits.max(written_digits(word));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Directions of the columns `UX UY UZ USUM`, `ROTX ROTY ROTZ RSUM`; `None` where no column has one.
+fn columns(names: &[Vec<u8>]) -> Option<Vec<Option<u8>>> {
+    const NAMES: [&[u8]; 6] = [b"UX", b"UY", b"UZ", b"ROTX", b"ROTY", b"ROTZ"];
+    let direction = |name: &Vec<u8>| (1..).zip(NAMES).find(|(_, own)| name == own).map(|(k, _)| k);
+    let directions: Vec<Option<u8>> = names.iter().map(direction).collect();
+    directions.iter().any(Option::is_some).then_some(directions)
+}
+
+/// The word behind a name in a line.
+fn behind<'l>(line: &'l [u8], name: &[u8]) -> Option<&'l [u8]> {
+    let is_name = |at: &usize| line[*at..].starts_with(name) && (*at == 0 || line[*at - 1] == b' ');
+    let at = (0..line.len()).find(is_name)? + name.len();
+    line[at..].split(u8::is_ascii_whitespace).find(|word| !word.is_empty())
+}
+
+/// The words of a line; numbers of full width touch each other, and a sign that follows a digit begins the
+/// next.
+fn numbers_apart(line: &[u8]) -> Vec<Vec<u8>> {
+    let mut words: Vec<Vec<u8>> = Vec::new();
+    for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
+        let mut own = Vec::new();
+        for (at, &byte) in word.iter().enumerate() {
+            if byte == b'-' && at > 0 && (word[at - 1].is_ascii_digit() || word[at - 1] == b'.') {
+                words.push(std::mem::take(&mut own));
+            }
+            own.push(byte);
+        }
+        words.push(own);
+    }
+    words
+}

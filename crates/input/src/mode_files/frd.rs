@@ -1,0 +1,161 @@
+//! Results of CalculiX (.frd, text): the displacements of every mode of a `*FREQUENCY` step, with five
+//! decimals behind the first digit, in fields of fixed width that touch each other.
+
+use super::table::ModeTable;
+use super::{Found, lines, syntax, unreadable};
+use crate::coordinates::{excerpt, real};
+use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::table::integer;
+use flexbody_model::DofLabel;
+use std::f64::consts::TAU;
+
+/// Whether a file begins as results of CalculiX do.
+pub(super) fn recognises(head: &[u8]) -> bool {
+    head.starts_with(b"    1C")
+}
+
+/// Significant digits of a displacement (12 characters as in -1.23456E-02), and of an eigenvalue.
+const DIGITS: (u8, u8) = (6, 7);
+
+/// Characters of a displacement.
+const WIDTH: usize = 12;
+
+/// Kind of the analysis in the head of a block: vibration.
+const FREQUENCY: &[u8] = b"2";
+
+/// What stands above the blocks of a mode.
+#[derive(Debug, Default)]
+struct Head {
+    /// Whether the step has modes at all.
+    mode: bool,
+    modal_mass: Option<f64>,
+    modal_stiffness: Option<f64>,
+}
+
+/// A block of values by nodes.
+struct Block {
+    eigenvalue: f64,
+    /// Where the number of a node ends and the values begin.
+    start: usize,
+    expected: i64,
+    read: i64,
+}
+
+/// Reads the displacements of all modes.
+pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+    let mut table = ModeTable::new(DIGITS.0, DIGITS.1);
+    let (mut head, mut pending, mut block): (Head, Option<Block>, Option<Block>) = Default::default();
+    for (at, line) in lines(file) {
+        if let Some(open) = &mut block {
+            if line.starts_with(b" -1") {
+                open.node(&mut table, file, at, line)?;
+                continue;
+            } else if line.starts_with(b" -2") || line.starts_with(b" -5") {
+                continue;
+            }
+            let whole = block.take().filter(|open| open.read == open.expected && line.starts_with(b" -3"));
+            if whole.is_none() {
+                return Err(syntax(
+                    file,
+                    at,
+                    "a block of displacements has another number of nodes than its head says",
+                ));
+            }
+        }
+        if line.starts_with(b"    1P") {
+            head.parameter(file, at, line)?;
+        } else if line.starts_with(b"  100C") {
+            pending = head.block(file, at, line)?;
+        } else if line.starts_with(b" -4") {
+            let name = line.get(5..13).unwrap_or_default().trim_ascii();
+            if name.starts_with(b"DISPI") && pending.is_some() {
+                let help = "imported modes are real: a model without cyclic symmetry and damping has such";
+                return Err(unreadable(file, "modes have imaginary parts", help));
+            }
+            block = pending.take().filter(|_| name == b"DISP");
+            if let Some(block) = &block {
+                table.begin(Some(block.eigenvalue));
+            }
+        }
+    }
+    match block {
+        Some(_) => Err(unreadable(
+            file,
+            "file ends within a block of displacements",
+            "it may be cut off: run the job again",
+        )),
+        None if table.len() == 0 => Err(unreadable(
+            file,
+            "no displacements of modes are in the file",
+            "the step is *FREQUENCY, and *NODE FILE below it has the line U",
+        )),
+        None => Ok(table),
+    }
+}
+
+impl Head {
+    /// A line that says something of the step: `1PMODE`, `1PGM` and `1PGK` (modal mass and stiffness),
+    /// `1PHID` (nodal diameter of a cyclic structure, -1 without).
+    fn parameter(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+        let mut words = line[6..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let (Some(name), Some(value)) = (words.next(), words.next()) else { return Ok(()) };
+        match name {
+            b"STEP" => *self = Self::default(),
+            b"MODE" => self.mode = true,
+            b"GM" => self.modal_mass = real(value),
+            b"GK" => self.modal_stiffness = real(value),
+            b"HID" if integer(value).is_some_and(|diameter| diameter >= 0) => {
+                let message = "modes belong to a nodal diameter of a cyclic structure";
+                return Err(syntax(file, at, message));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// The block of a mode below the head of a block.
+    fn block(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<Option<Block>> {
+        let field =
+            |from: usize, to: usize| line.get(from..to.min(line.len())).unwrap_or_default().trim_ascii();
+        if !self.mode || field(56, 58) != FREQUENCY {
+            return Ok(None);
+        }
+        let expected = integer(field(24, 36)).filter(|count| *count > 0);
+        let (Some(hertz), Some(expected)) = (real(field(12, 24)), expected) else {
+            let message =
+                format!("expected frequency and number of nodes of a mode, found `{}`", excerpt(line));
+            return Err(syntax(file, at, message));
+        };
+        let start = match field(73, 75) {
+            b"0" => 8,
+            b"1" => 13,
+            _ => {
+                let help = "*NODE FILE writes text where *NODE OUTPUT writes binary";
+                return Err(unreadable(file, "results are written in binary", help));
+            }
+        };
+        let eigenvalue = match (self.modal_mass, self.modal_stiffness) {
+            (Some(mass), Some(stiffness)) if mass > 0.0 => stiffness / mass,
+            _ => (TAU * hertz).powi(2),
+        };
+        Ok(Some(Block { eigenvalue, start, expected, read: 0 }))
+    }
+}
+
+impl Block {
+    /// The displacements of a node.
+    fn node(&mut self, table: &mut ModeTable, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+        let node = line.get(3..self.start).and_then(|field| integer(field.trim_ascii()));
+        let value =
+            |k: usize| real(line.get(self.start + WIDTH * k..self.start + WIDTH * (k + 1))?.trim_ascii());
+        let (Some(node), Some(x), Some(y), Some(z)) = (node, value(0), value(1), value(2)) else {
+            let message = format!("expected a node and three displacements, found `{}`", excerpt(line));
+            return Err(syntax(file, at, message));
+        };
+        for (direction, value) in (1..).zip([x, y, z]) {
+            table.set(file, Some(at), DofLabel { node, direction }, value)?;
+        }
+        self.read += 1;
+        Ok(())
+    }
+}

@@ -1,0 +1,239 @@
+//! Binary results of Nastran (.op2): the real eigenvectors of the tables OUGV1 and their kin, in words of 32
+//! bits (single precision) or 64 bits (double precision, as ILP64 builds write them). Records have their length before and behind them; between records stand keys (a
+//! record of one word): a positive one says how many words the next record has, one that is not positive ends
+//! a part of the table, zero the table.
+
+use super::table::ModeTable;
+use super::{Found, unreadable};
+use flexbody_base::text::input_file::InputFile;
+use flexbody_model::DofLabel;
+
+/// Whether a file begins with a key of 32 or 64 bits.
+pub(super) fn recognises(head: &[u8]) -> bool {
+    let begins = |key: [u8; 8]| head.starts_with(&key);
+    let is_key = |value: u8| {
+        begins([4, 0, 0, 0, value, 0, 0, 0])
+            || begins([0, 0, 0, 4, 0, 0, 0, value])
+            || begins([8, 0, 0, 0, value, 0, 0, 0])
+            || begins([0, 0, 0, 8, 0, 0, 0, 0])
+    };
+    is_key(2) || is_key(3)
+}
+
+/// Digits of single and of double precision.
+const DIGITS: [u8; 2] = [7, 15];
+
+/// Words of the head of a part.
+const IDENT: usize = 146;
+
+/// Approach code of real eigenvalues, table codes of displacements and eigenvectors.
+const REAL_EIGENVALUES: i64 = 2;
+const SHAPES: [i64; 2] = [1, 7];
+
+/// Words of a grid point: its number, its type, three displacements, three rotations.
+const WIDE: usize = 8;
+
+/// Type of a grid point, beside scalar points and others.
+const GRID: i64 = 1;
+
+const HELP: &str = "write it with PARAM,POST,-1, or give the shapes as an array: docs/fe_programs.md has the lines for pyNastran";
+
+/// Tables of eigenvectors along the axes of the grid points.
+const TABLES: &[&str] = &["OUGV1", "OUG1", "OUGV1PAT", "OPHIG"];
+
+/// Reads the eigenvectors of all modes.
+pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+    let mut records = Records::new(file);
+    let digits = DIGITS[usize::from(records.wide)];
+    let mut table = ModeTable::new(digits, digits).along_nodes();
+    records.skip_label()?;
+    while let Some(name) = records.table_name()? {
+        let parts = records.parts(TABLES.contains(&name.as_str()))?;
+        // A trailer, a name, then pairs of a head and its values.
+        for pair in parts.get(2..).unwrap_or_default().chunks_exact(2) {
+            add_mode(&mut table, &records, &pair[0], &pair[1])?;
+        }
+    }
+    if table.len() == 0 {
+        return Err(unreadable(file, "no real eigenvectors are in the file (table OUGV1)", HELP));
+    }
+    Ok(table)
+}
+
+/// The values of a mode, if the part is one.
+fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: &[u64]) -> Found<()> {
+    let file = records.file;
+    let whole = |at: usize| records.whole(head[at]);
+    if head.len() < IDENT || whole(0) / 10 != REAL_EIGENVALUES || !SHAPES.contains(&(whole(1) % 1000)) {
+        return Ok(());
+    }
+    if whole(1) / 1000 != 0 || whole(8) != 1 || whole(9) != WIDE as i64 || !values.len().is_multiple_of(WIDE)
+    {
+        let message = "eigenvectors are complex, or not sorted by modes: real ones (SORT1) are read";
+        return Err(unreadable(file, message, HELP));
+    }
+    table.begin(Some(records.real(head[5])));
+    for point in values.chunks_exact(WIDE) {
+        if records.whole(point[1]) != GRID {
+            continue;
+        }
+        let node = records.whole(point[0]) / 10;
+        for (direction, value) in (1..).zip(&point[2..]) {
+            table.set(file, None, DofLabel { node, direction }, records.real(*value))?;
+        }
+    }
+    Ok(())
+}
+
+/// The records of a file. Their lengths have 32 bits, their words and keys 32 or 64.
+struct Records<'f> {
+    file: &'f InputFile,
+    rest: &'f [u8],
+    little: bool,
+    /// Words of 64 bits.
+    wide: bool,
+}
+
+impl<'f> Records<'f> {
+    fn new(file: &'f InputFile) -> Self {
+        let rest = file.bytes();
+        // The length of the first key: that of a word.
+        let head = rest.get(..4).unwrap_or_default();
+        Self { file, rest, little: head.starts_with(&[4]) || head.starts_with(&[8]), wide: head.contains(&8) }
+    }
+
+    /// Bytes of a word.
+    fn width(&self) -> usize {
+        if self.wide { 8 } else { 4 }
+    }
+
+    /// The bits of a word or a length.
+    fn bits(&self, bytes: &[u8]) -> u64 {
+        let add = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
+        if self.little { bytes.iter().rev().fold(0, add) } else { bytes.iter().fold(0, add) }
+    }
+
+    fn word(&self, bytes: &[u8]) -> Option<u64> {
+        (bytes.len() == self.width()).then(|| self.bits(bytes))
+    }
+
+    /// A word as a whole number.
+    fn whole(&self, word: u64) -> i64 {
+        if self.wide { word as i64 } else { i64::from(word as u32 as i32) }
+    }
+
+    /// A word as a real number.
+    fn real(&self, word: u64) -> f64 {
+        if self.wide { f64::from_bits(word) } else { f64::from(f32::from_bits(word as u32)) }
+    }
+
+    /// The letters of a record: four to a word.
+    fn letters(&self, record: &[u8]) -> String {
+        let letters: Vec<u8> =
+            record.chunks(self.width()).flat_map(|word| &word[..word.len().min(4)]).copied().collect();
+        String::from_utf8_lossy(&letters).trim_matches([' ', '\0']).to_owned()
+    }
+
+    fn broken<T>(&self) -> Found<T> {
+        let at = self.file.bytes().len() - self.rest.len();
+        Err(unreadable(self.file, format!("records do not follow each other at byte {at}"), HELP))
+    }
+
+    /// The bytes of the next record; `None` at the end of the file.
+    fn record(&mut self) -> Found<Option<&'f [u8]>> {
+        if self.rest.is_empty() {
+            return Ok(None);
+        }
+        let length_at = |at: usize| {
+            let bytes = self.rest.get(at..at.saturating_add(4))?;
+            usize::try_from(self.bits(bytes)).ok()
+        };
+        let length = length_at(0).unwrap_or(usize::MAX);
+        let end = length.saturating_add(4);
+        if length_at(end) != Some(length) {
+            return self.broken();
+        }
+        let record = &self.rest[4..end];
+        self.rest = &self.rest[end + 4..];
+        Ok(Some(record))
+    }
+
+    /// The next key; `None` at the end of the file.
+    fn key(&mut self) -> Found<Option<i64>> {
+        match self.record()? {
+            None => Ok(None),
+            Some(record) => match self.word(record) {
+                Some(key) => Ok(Some(self.whole(key))),
+                None => self.broken(),
+            },
+        }
+    }
+
+    /// The record that a key announces.
+    fn announced(&mut self, words: i64) -> Found<&'f [u8]> {
+        match self.record()? {
+            Some(record) if record.len() as u64 == (words as u64).saturating_mul(self.width() as u64) => {
+                Ok(record)
+            }
+            _ => self.broken(),
+        }
+    }
+
+    /// The label of the tape, where there is one: a date, a name, eight more letters.
+    fn skip_label(&mut self) -> Found<()> {
+        let start = self.rest;
+        if self.key()? != Some(3) {
+            self.rest = start;
+            return Ok(());
+        }
+        self.announced(3)?;
+        loop {
+            match self.key()? {
+                Some(words) if words > 0 => self.announced(words)?,
+                Some(0) | None => return Ok(()),
+                Some(_) => continue,
+            };
+        }
+    }
+
+    /// Name of the next table; `None` behind the last.
+    fn table_name(&mut self) -> Found<Option<String>> {
+        match self.key()? {
+            Some(2) => {
+                let name = self.announced(2)?;
+                Ok(Some(self.letters(name)))
+            }
+            Some(0) | None => Ok(None),
+            Some(_) => self.broken(),
+        }
+    }
+
+    /// The words of every part of a table, where they are `wanted`.
+    fn parts(&mut self, wanted: bool) -> Found<Vec<Vec<u64>>> {
+        let mut parts: Vec<Vec<u64>> = Vec::new();
+        // The first record of a part behind the first says of which kind it is, in one word.
+        let mut kind_follows = false;
+        loop {
+            match self.key()? {
+                Some(words) if words > 0 => {
+                    let record = self.announced(words)?;
+                    if !std::mem::take(&mut kind_follows)
+                        && wanted
+                        && let Some(part) = parts.last_mut()
+                    {
+                        part.extend(record.chunks_exact(self.width()).filter_map(|bytes| self.word(bytes)));
+                    }
+                }
+                Some(0) => {
+                    parts.retain(|part| !part.is_empty());
+                    return Ok(parts);
+                }
+                Some(_) => {
+                    kind_follows = !parts.is_empty();
+                    parts.push(Vec::new());
+                }
+                None => return self.broken(),
+            }
+        }
+    }
+}

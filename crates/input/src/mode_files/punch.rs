@@ -1,0 +1,156 @@
+//! Punch files of Nastran (.pch): `DISPLACEMENT(PUNCH) = ALL` in SOL 103 writes two lines for every grid
+//! point of every mode, with seven digits.
+
+use super::table::ModeTable;
+use super::{Found, lines, syntax, unreadable};
+use crate::coordinates::{excerpt, real};
+use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::table::integer;
+use flexbody_model::DofLabel;
+
+/// Whether a file begins as a punch file with results does.
+pub(super) fn recognises(head: &[u8]) -> bool {
+    let mut lines = head.split(|&b| b == b'\n').map(|line| line.trim_ascii_start());
+    let first = lines.find(|line| !line.is_empty()).unwrap_or_default();
+    [&b"$TITLE"[..], b"$SUBTITLE", b"$LABEL", b"$EIGENVECTOR", b"$DISPLACEMENTS", b"$SUBCASE"]
+        .iter()
+        .any(|word| first.starts_with(word))
+}
+
+/// Digits of a value and of an eigenvalue, as in 1.234567E-02.
+const DIGITS: u8 = 7;
+
+/// Columns of a line before its sequence number.
+const COLUMNS: usize = 72;
+
+/// What the lines below a head are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Kind {
+    /// Shapes of modes.
+    Modes,
+    /// Anything else.
+    Other,
+}
+
+/// Reads the eigenvectors of all modes.
+pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
+    let mut table = ModeTable::new(DIGITS, DIGITS).along_nodes();
+    let mut kind = Kind::Other;
+    let mut is_mode = false;
+    // The node whose rotations are on the next line.
+    let mut node: Option<i64> = None;
+    for (at, line) in lines(file) {
+        let line = &line[..line.len().min(COLUMNS)];
+        if line.starts_with(b"$") {
+            if let Some(node) = node {
+                return Err(syntax(file, at, format!("the second line of grid point {node} is missing")));
+            }
+            kind = kind_of(line, kind);
+            if kind == Kind::Modes {
+                refuse_other_forms(file, at, line)?;
+                match eigenvalue(file, at, line)? {
+                    Some(value) => {
+                        table.begin(Some(value));
+                        is_mode = true;
+                    }
+                    None => is_mode &= !line.starts_with(b"$TITLE"),
+                }
+            }
+        } else if kind == Kind::Modes && is_mode && !line.trim_ascii().is_empty() {
+            node = grid_line(&mut table, file, at, line, node)?;
+        }
+    }
+    match node {
+        Some(_) => {
+            Err(unreadable(file, "file ends within a grid point", "it may be cut off: write it again"))
+        }
+        None if table.len() == 0 => Err(unreadable(
+            file,
+            "no eigenvectors are in the file",
+            "run SOL 103 with DISPLACEMENT(SORT1,REAL,PUNCH) = ALL",
+        )),
+        None => Ok(table),
+    }
+}
+
+/// What a line of the head says of the lines below it.
+fn kind_of(line: &[u8], before: Kind) -> Kind {
+    const HEADS: &[&[u8]] = &[
+        b"$TITLE",
+        b"$SUBTITLE",
+        b"$LABEL",
+        b"$REAL",
+        b"$MAGNITUDE",
+        b"$SUBCASE",
+        b"$EIGENVALUE",
+        b"$POINT",
+    ];
+    let line = line.trim_ascii();
+    match line {
+        b"$EIGENVECTOR" | b"$DISPLACEMENTS" => Kind::Modes,
+        _ if HEADS.iter().any(|head| line.starts_with(head)) => before,
+        _ => Kind::Other,
+    }
+}
+
+fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
+    let what = if line.starts_with(b"$REAL-IMAGINARY") || line.starts_with(b"$MAGNITUDE") {
+        "eigenvectors are complex"
+    } else if line.starts_with(b"$POINT") {
+        "values are sorted by grid points (SORT2)"
+    } else {
+        return Ok(());
+    };
+    let message = format!("{what}: real ones, mode by mode, are read");
+    Err(syntax(file, at, message)
+        .into_iter()
+        .map(|d| d.with_help("DISPLACEMENT(SORT1,REAL,PUNCH) = ALL"))
+        .collect())
+}
+
+/// `$EIGENVALUE =  3.947842E+05  MODE =     1`.
+fn eigenvalue(file: &InputFile, at: usize, line: &[u8]) -> Found<Option<f64>> {
+    let Some(rest) = line.strip_prefix(b"$EIGENVALUE") else { return Ok(None) };
+    let mut words = rest.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let value = match words.next() {
+        Some(b"=") => words.next().and_then(real),
+        _ => None,
+    };
+    match value {
+        Some(value) => Ok(Some(value)),
+        None => Err(syntax(file, at, format!("expected an eigenvalue, found `{}`", excerpt(line)))),
+    }
+}
+
+/// A line of a grid point (its number, G and three displacements; below it -CONT- and three rotations). Gives
+/// the node whose rotations are to follow.
+fn grid_line(
+    table: &mut ModeTable,
+    file: &InputFile,
+    at: usize,
+    line: &[u8],
+    before: Option<i64>,
+) -> Found<Option<i64>> {
+    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let bad = || {
+        let message = format!(
+            "expected a grid point with three values, or -CONT- and three more, found `{}`",
+            excerpt(line)
+        );
+        Err(syntax(file, at, message))
+    };
+    let (first, node) = match (words.next(), before) {
+        (Some(b"-CONT-"), Some(node)) => (4, node),
+        (Some(number), None) => match (integer(number), words.next()) {
+            (Some(node), Some(b"G")) => (1, node),
+            _ => return bad(),
+        },
+        _ => return bad(),
+    };
+    let values: Option<Vec<f64>> = words.map(real).collect();
+    let Some(&[x, y, z]) = values.as_deref() else { return bad() };
+    for (direction, value) in (first..).zip([x, y, z]) {
+        table.set(file, Some(at), DofLabel { node, direction }, value)?;
+    }
+    Ok((first == 1).then_some(node))
+}

@@ -1,0 +1,139 @@
+//! Values of modes as they come out of a file: node by node, mode by mode.
+
+use super::{Found, unreadable};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::provenance::SourceFile;
+use flexbody_base::text::input_file::InputFile;
+use flexbody_model::{DofLabel, RawModes};
+use std::collections::HashMap;
+
+/// The modes of a file, all of the same nodes and directions.
+#[derive(Debug, Default)]
+pub(super) struct ModeTable {
+    labels: Vec<DofLabel>,
+    /// Row of each label.
+    index: HashMap<DofLabel, usize>,
+    modes: Vec<Mode>,
+    /// Row behind the one that was set last: files list the same nodes for every mode.
+    next: usize,
+    /// Significant digits of the eigenvalues and of the values.
+    pub eigenvalue_digits: u8,
+    pub digits: u8,
+    /// True if values stand along the axes of the rows of their nodes.
+    along_nodes: bool,
+}
+
+#[derive(Debug)]
+struct Mode {
+    eigenvalue: Option<f64>,
+    /// By rows; NaN where nothing is set.
+    values: Vec<f64>,
+}
+
+impl ModeTable {
+    /// No modes yet, of values and eigenvalues with so many digits.
+    pub(super) fn new(digits: u8, eigenvalue_digits: u8) -> Self {
+        Self { digits, eigenvalue_digits, ..Self::default() }
+    }
+
+    /// Marks the values as standing along the axes of the rows of their nodes.
+    pub(super) fn along_nodes(self) -> Self {
+        Self { along_nodes: true, ..self }
+    }
+
+    /// Begins the next mode.
+    pub(super) fn begin(&mut self, eigenvalue: Option<f64>) {
+        self.modes.push(Mode { eigenvalue, values: Vec::with_capacity(self.labels.len()) });
+        self.next = 0;
+    }
+
+    /// States the eigenvalue of the mode that was begun last.
+    pub(super) fn state(&mut self, eigenvalue: f64) {
+        if let Some(mode) = self.modes.last_mut() {
+            mode.eigenvalue = Some(eigenvalue);
+        }
+    }
+
+    /// Number of modes.
+    pub(super) fn len(&self) -> usize {
+        self.modes.len()
+    }
+
+    /// Sets a value of the mode that was begun last; `line` is where it stands in a file that has lines.
+    ///
+    /// # Errors
+    /// FB128 for a value that is set twice, or without a mode; FB306 for one that is not finite.
+    pub(super) fn set(
+        &mut self,
+        file: &InputFile,
+        line: Option<usize>,
+        label: DofLabel,
+        value: f64,
+    ) -> Found<()> {
+        let number = self.modes.len();
+        let wrong = |code, message: String| {
+            let diagnostic = Diagnostic::new(code, message).in_file(file.path());
+            Err(vec![match line {
+                Some(line) => diagnostic.at_line(line),
+                None => diagnostic,
+            }])
+        };
+        let Some(mode) = self.modes.last_mut() else {
+            return wrong(Code::ModeFileSyntax, "values stand before the first mode".to_owned());
+        };
+        if !value.is_finite() {
+            return wrong(Code::MatrixNotFinite, format!("mode {number} has {value} at {label}"));
+        }
+        let row = match self.labels.get(self.next) {
+            Some(expected) if *expected == label => self.next,
+            _ => *self.index.entry(label).or_insert_with(|| {
+                self.labels.push(label);
+                self.labels.len() - 1
+            }),
+        };
+        if mode.values.len() <= row {
+            mode.values.resize(row + 1, f64::NAN);
+        }
+        if !mode.values[row].is_nan() {
+            return wrong(Code::ModeFileSyntax, format!("mode {number} has two values at {label}"));
+        }
+        mode.values[row] = value;
+        self.next = row + 1;
+        Ok(())
+    }
+
+    /// All modes by the same rows.
+    ///
+    /// # Errors
+    /// FB128 for no mode, or modes of different nodes.
+    pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Found<RawModes> {
+        let n = self.labels.len();
+        if n == 0 {
+            let help = "write the displacements of the modes: docs/fe_programs.md says how";
+            return Err(unreadable(file, "the file has no modes", help));
+        }
+        for (number, mode) in self.modes.iter_mut().enumerate() {
+            mode.values.resize(n, f64::NAN);
+            if let Some(row) = mode.values.iter().position(|value| value.is_nan()) {
+                let message = format!(
+                    "mode {} has no value at {}, which other modes have",
+                    number + 1,
+                    self.labels[row]
+                );
+                return Err(unreadable(file, message, "the file may be cut off: write it again"));
+            }
+        }
+        let matrix = Mat::from_fn(n, self.modes.len(), |i, j| self.modes[j].values[i]);
+        Ok(RawModes {
+            labels: self.labels,
+            along_nodes: self.along_nodes,
+            matrix,
+            eigenvalues: self.modes.iter().map(|mode| mode.eigenvalue).collect(),
+            eigenvalue_digits: self.eigenvalue_digits,
+            digits: self.digits,
+            path: file.path().to_path_buf(),
+            source,
+        })
+    }
+}

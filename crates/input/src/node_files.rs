@@ -1,0 +1,105 @@
+//! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its
+//! content.
+
+mod ansys_axes;
+mod ansys_list;
+mod cdb;
+mod exodus;
+mod gmsh;
+mod vtk_cells;
+mod vtk_legacy;
+mod vtk_numbers;
+mod vtk_xml;
+mod xml_elements;
+
+use super::bulk_cards::is_bulk_data;
+use super::jobs::{nodes_of_bulk, nodes_of_deck};
+pub(super) use super::node_file::NodeFile;
+use super::tables::read_nodes;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::compression::refuse_packed;
+use flexbody_base::text::input_file::InputFile;
+use std::collections::HashSet;
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+/// A format of node files besides our table.
+struct Format {
+    recognises: fn(&str) -> bool,
+    read: fn(&InputFile) -> Found<NodeFile>,
+}
+
+/// The first that recognises the begin of a file reads it.
+const FORMATS: &[Format] = &[
+    Format { recognises: gmsh::recognises, read: gmsh::read },
+    Format { recognises: vtk_xml::recognises, read: vtk_xml::read },
+    Format { recognises: vtk_legacy::recognises, read: vtk_legacy::read },
+    Format { recognises: exodus::recognises, read: exodus::read },
+    Format { recognises: cdb::recognises, read: cdb::read },
+    Format { recognises: is_deck, read: nodes_of_deck },
+    Format { recognises: ansys_list::recognises, read: ansys_list::read },
+    Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
+];
+
+/// Number of bytes that formats are told by.
+const HEAD: usize = 4096;
+
+/// Reads the nodes of a file; in the plane z is zero.
+///
+/// # Errors
+/// FB102 for compressed files; FB106, FB203 to FB206 for tables; FB110, FB111, FB115, FB205 for other files.
+pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile> {
+    refuse_packed(file, "file of nodes or elements").map_err(|found| vec![found])?;
+    let bytes = file.bytes();
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
+    let Some(format) = FORMATS.iter().find(|format| (format.recognises)(&head)) else {
+        return read_nodes(file, dimension).map(|nodes| NodeFile { nodes, ..NodeFile::default() });
+    };
+    let read = (format.read)(file)?;
+    let wrong = |code, message: String| Err(vec![Diagnostic::new(code, message).in_file(file.path())]);
+    if read.nodes.is_empty() {
+        return wrong(Code::NodeFileSyntax, "file has no nodes".to_owned());
+    }
+    let mut seen = HashSet::new();
+    if let Some(twice) = read.nodes.ids.iter().find(|id| !seen.insert(**id)) {
+        return wrong(Code::NodeDuplicate, format!("node {twice} is given twice"));
+    }
+    if let Some(at) = read.nodes.positions.iter().position(|x| x.iter().any(|x| !x.is_finite())) {
+        return wrong(
+            Code::CoordinateNotFinite,
+            format!("node {} has no finite coordinates", read.nodes.ids[at]),
+        );
+    }
+    let mut turned: Vec<_> = read.axes.iter().collect();
+    turned.sort_unstable_by_key(|(node, _)| **node);
+    if let Some((node, _)) = turned.iter().find(|(_, axes)| axes.iter().flatten().any(|x| !x.is_finite())) {
+        return wrong(Code::CoordinateNotFinite, format!("node {node} has no finite angles"));
+    }
+    if let Some(at) = read.nodes.positions.iter().position(|x| dimension == 2 && x[2] != 0.0) {
+        let message =
+            format!("node {} has z = {} in a plane model", read.nodes.ids[at], read.nodes.positions[at][2]);
+        return wrong(Code::TableRow, message);
+    }
+    Ok(read)
+}
+
+/// Whether a file is a keyword deck: its first line that is no comment is a keyword.
+fn is_deck(head: &str) -> bool {
+    let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
+    first
+        .is_some_and(|line| line.starts_with('*') && line[1..].starts_with(|c: char| c.is_ascii_alphabetic()))
+}
+
+fn bulk(file: &InputFile) -> Found<NodeFile> {
+    nodes_of_bulk(file.path())
+}
+
+/// FB115 at a line.
+fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
+}
+
+/// FB115 of a file without lines.
+fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
+    vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
+}

@@ -1,0 +1,65 @@
+//! Node lists of Ansys: a table between tabs, whose header names the columns in the user's language, and the
+//! listing of NLIST. Decimal commas are read.
+
+use super::ansys_axes::axes;
+use super::{Found, NodeFile, syntax};
+use crate::coordinates::{excerpt, real};
+use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::table::integer;
+
+/// Whether the text begins with a header between tabs that has an X, or with the listing of NLIST.
+pub(super) fn recognises(head: &str) -> bool {
+    let first = head.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
+    let tabs = first.contains('\t')
+        && first.split('\t').nth(1).is_some_and(|field| field.trim().to_uppercase().starts_with('X'));
+    let starts_with_number = first.trim_start().starts_with(|c: char| c.is_ascii_digit());
+    (tabs
+        && !starts_with_number
+        && first.split('\t').next().is_some_and(|name| !name.trim().eq_ignore_ascii_case("node")))
+        || head.contains("LIST ALL SELECTED NODES")
+        || head.lines().any(is_listing_head)
+}
+
+/// `NODE  X  Y  Z` above every page of a listing.
+fn is_listing_head(line: &str) -> bool {
+    let words: Vec<&str> = line.split_whitespace().collect();
+    !line.contains([',', '\t', ';']) && words.len() >= 4 && words[..4] == ["NODE", "X", "Y", "Z"]
+}
+
+/// Reads every line that is a node number and three coordinates, with three angles of rotated nodes where the
+/// head of the page has them (`THXY`); others are heads of pages.
+pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
+    let mut read = NodeFile::default();
+    let mut with_angles = false;
+    for (k, line) in file.bytes().split(|&b| b == b'\n').enumerate() {
+        let line = line.trim_ascii();
+        let mut fields = line.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
+        let Some(id) = fields.next().and_then(integer) else {
+            let upper = line.to_ascii_uppercase();
+            let mut words = upper.split(u8::is_ascii_whitespace);
+            with_angles |= words.any(|word| word == b"THXY");
+            continue;
+        };
+        let values: Option<Vec<f64>> = fields.take(if with_angles { 6 } else { 3 }).map(decimal).collect();
+        let (Some(&[x, y, z, ref angles @ ..]), false) =
+            (values.as_deref(), with_angles && values.as_ref().is_some_and(|own| own.len() < 6))
+        else {
+            return Err(syntax(
+                file,
+                k + 1,
+                format!("expected a node and three coordinates, found `{}`", excerpt(line)),
+            ));
+        };
+        read.nodes.ids.push(id);
+        read.nodes.positions.push([x, y, z]);
+        let angles = <[f64; 3]>::try_from(angles).unwrap_or_default();
+        read.axes.extend(axes(angles).map(|axes| (id, axes)));
+    }
+    Ok(read)
+}
+
+/// A number with a decimal point or a decimal comma.
+fn decimal(field: &[u8]) -> Option<f64> {
+    let text: Vec<u8> = field.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
+    real(&text)
+}

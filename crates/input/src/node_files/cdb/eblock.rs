@@ -1,0 +1,186 @@
+//! Elements of an archive of Ansys, to draw the part by: what cannot be read is left out and told.
+
+use super::{field, widths};
+use flexbody_base::text::table::integer;
+use flexbody_model::{ElementShape, Elements};
+use std::collections::HashMap;
+
+/// Element types by their local numbers, as `ET,1,186` gives them.
+#[derive(Debug, Default)]
+pub(super) struct Types(HashMap<i64, i64>);
+
+/// What elements of a type look like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Look {
+    Solid,
+    Shell,
+    /// Ends; a third node says how the beam is turned.
+    Beam,
+    /// Ends and a node in the middle.
+    LongBeam,
+    /// Masses, springs, contact and surface loads.
+    Nothing,
+    Unknown,
+}
+
+impl Types {
+    /// Takes a type from a line in upper case, if it is `ET,number,type`.
+    pub(super) fn learn(&mut self, line: &str) {
+        let mut words = line.split(',').map(str::trim);
+        if words.next() != Some("ET") {
+            return;
+        }
+        let number = words.next().and_then(|word| word.parse().ok());
+        let digits = words.next().map(|word| word.trim_start_matches(|c: char| !c.is_ascii_digit()));
+        if let (Some(number), Some(kind)) = (number, digits.and_then(|digits| digits.parse().ok())) {
+            self.0.insert(number, kind);
+        }
+    }
+
+    fn look(&self, number: i64) -> (String, Look) {
+        let Some(&kind) = self.0.get(&number) else {
+            return (format!("type number {number}"), Look::Unknown);
+        };
+        let look = match kind {
+            5
+            | 45
+            | 46
+            | 62
+            | 64
+            | 65
+            | 72
+            | 73
+            | 92
+            | 95
+            | 96
+            | 98
+            | 147
+            | 148
+            | 164
+            | 168
+            | 185..=187
+            | 190
+            | 191
+            | 226
+            | 227
+            | 285 => Look::Solid,
+            2
+            | 28
+            | 41..=43
+            | 63
+            | 82
+            | 91
+            | 93
+            | 99
+            | 143
+            | 145
+            | 146
+            | 150
+            | 162
+            | 163
+            | 181..=183
+            | 281 => Look::Shell,
+            1 | 3 | 4 | 8 | 10 | 16 | 23 | 24 | 44 | 54 | 59 | 161 | 180 | 188 | 288 => Look::Beam,
+            189 | 289 => Look::LongBeam,
+            14 | 21 | 27 | 39 | 40 | 50 | 151..=154 | 156 | 169..=179 | 184 => Look::Nothing,
+            _ => Look::Unknown,
+        };
+        (format!("element type {kind}"), look)
+    }
+}
+
+/// Fields of a line of an element before its nodes.
+const BEFORE_NODES: usize = 11;
+
+/// Reads the block whose head is a line, and gives the line behind it.
+pub(super) fn elements(text: &[&[u8]], head: usize, types: &Types, read: &mut Elements) -> usize {
+    let line = String::from_utf8_lossy(text[head]).to_uppercase();
+    let solid = line.split(',').nth(2).is_some_and(|kind| kind.trim() == "SOLID");
+    let width = text.get(head + 1).and_then(|line| widths(line)).map_or(0, |[(_, width), _]| width);
+    let end = (head + 2..text.len()).find(|&k| text[k].trim_ascii() == b"-1").unwrap_or(text.len());
+    if !solid || width == 0 {
+        read.leave_out("EBLOCK in another form than SOLID", 1);
+        return end + 1;
+    }
+    let mut at = (head + 2).min(end);
+    while at < end {
+        at = match element(&text[at..end], width) {
+            Some(own) => {
+                add(&own, types, read);
+                at + own.lines
+            }
+            None => {
+                read.leave_out("EBLOCK with lines that cannot be read", 1);
+                return end + 1;
+            }
+        };
+    }
+    end + 1
+}
+
+struct Element {
+    type_number: i64,
+    nodes: Vec<i64>,
+    lines: usize,
+}
+
+/// The element that begins with the first of some lines.
+fn element(text: &[&[u8]], width: usize) -> Option<Element> {
+    let number = |line: &[u8], k: usize| integer(field(line, 0, k, width));
+    let first = *text.first()?;
+    let count = usize::try_from(number(first, 8)?).ok().filter(|count| (1..=100).contains(count))?;
+    let type_number = number(first, 1)?;
+    let mut nodes = Vec::with_capacity(count);
+    let mut lines = 1;
+    let mut k = BEFORE_NODES;
+    while nodes.len() < count {
+        let line = text.get(lines - 1)?;
+        match number(line, k) {
+            Some(node) => {
+                nodes.push(node);
+                k += 1;
+            }
+            // The nodes go on in the next line.
+            None if k > 0 && field(line, 0, k, width).is_empty() => {
+                lines += 1;
+                k = 0;
+            }
+            None => return None,
+        }
+    }
+    Some(Element { type_number, nodes, lines })
+}
+
+fn add(element: &Element, types: &Types, read: &mut Elements) {
+    let (name, look) = types.look(element.type_number);
+    let nodes = &element.nodes;
+    let shape = match (look, nodes.len()) {
+        (Look::Nothing, _) => return,
+        (Look::Solid, 4 | 10) => ElementShape::Tetrahedron,
+        (Look::Solid, 5 | 13) => ElementShape::Pyramid,
+        (Look::Solid, 6 | 15) => ElementShape::Wedge,
+        (Look::Solid, 8 | 20) => ElementShape::Hexahedron,
+        (Look::Shell, 3 | 6) => ElementShape::Triangle,
+        (Look::Shell, 4 | 8) => ElementShape::Quadrilateral,
+        (Look::Beam, 2..) | (Look::LongBeam, 3..) => ElementShape::Line,
+        _ => return read.leave_out(&name, 1),
+    };
+    let nodes = match look {
+        Look::Beam => nodes[..2].to_vec(),
+        Look::LongBeam => nodes[..3].to_vec(),
+        _ => with_all_middles(shape, nodes),
+    };
+    read.add(&name, shape, &nodes);
+}
+
+/// Middles of edges that are left out have the number 0: a corner of the edge stands for them.
+fn with_all_middles(shape: ElementShape, nodes: &[i64]) -> Vec<i64> {
+    let mut nodes = nodes.to_vec();
+    for (k, &[corner, _]) in shape.edges().iter().enumerate() {
+        let corner = nodes[corner];
+        if let Some(middle) = nodes.get_mut(shape.corners() + k).filter(|node| **node == 0) {
+            *middle = corner;
+        }
+    }
+    nodes
+}

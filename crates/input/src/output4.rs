@@ -1,0 +1,261 @@
+//! Matrices that Nastran writes with OUTPUT4: as text or binary, dense or as strings of nonzeros (their
+//! starts packed with their lengths, or apart: BIGMAT).
+
+mod binary;
+mod layout;
+mod text;
+
+use super::assemble::{check_size, undeclared_triangle};
+use super::nastran_names::choose;
+use super::reader::{MatrixSource, Reader};
+use binary::Binary;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::InputFile;
+use flexbody_model::RawMatrix;
+use layout::{Columns, SINGLE_DIGITS, Stored, Stretch};
+use rayon::prelude::*;
+use text::Format;
+
+/// Digits in which OUTPUT4 writes numbers of single precision as text.
+const PADDED_DIGITS: u8 = 10;
+
+/// The reader of OUTPUT4 files.
+pub(super) struct Output4;
+
+impl Reader for Output4 {
+    fn name(&self) -> &'static str {
+        "OUTPUT4"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["op4"]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        Binary::of(head).is_some() || text::begins(head)
+    }
+
+    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+        let path = source.file.path();
+        if source.compression != Compression::None {
+            let message = "OUTPUT4 file is compressed as a whole";
+            let diagnostic = Diagnostic::new(Code::FileFormatUnknown, message).in_file(path);
+            return Err(diagnostic.with_help("unpack it").into());
+        }
+        let read = || {
+            let contents = Contents::of(source.file)?;
+            contents.matrix(source.file, choose(&contents.names(), source.role, source.group)?)
+        };
+        read().map_err(|found: Diagnostic| Error::from(found.in_file(path)))
+    }
+}
+
+type Found<T> = std::result::Result<T, Diagnostic>;
+
+/// The matrices of a file, in its order.
+pub(super) struct Contents {
+    matrices: Vec<(Stored, Encoding)>,
+}
+
+/// How the columns of a matrix are written.
+#[derive(Clone, Copy)]
+enum Encoding {
+    Text(Format),
+    Binary(Binary),
+}
+
+impl Contents {
+    /// Goes through a file without reading a value.
+    ///
+    /// # Errors
+    /// FB301 for what is no OUTPUT4 file, FB303, FB304 for files that are cut off.
+    pub(super) fn of(file: &InputFile) -> Found<Self> {
+        let matrices = match Binary::of(file.bytes()) {
+            Some(binary) => {
+                let all = binary.contents(file)?.into_iter();
+                all.map(|stored| (stored, Encoding::Binary(binary))).collect()
+            }
+            None => {
+                let all = text::contents(file)?.into_iter();
+                all.map(|(stored, format)| (stored, Encoding::Text(format))).collect()
+            }
+        };
+        Ok(Self { matrices })
+    }
+
+    /// Names of the matrices.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.matrices.iter().map(|(stored, _)| stored.header.name.clone()).collect()
+    }
+
+    /// Number of rows of a square matrix with entries; `None` of another.
+    pub(super) fn square(&self, at: usize) -> Option<usize> {
+        let (stored, _) = self.matrices.get(at)?;
+        let is_square = stored.header.rows == stored.header.columns && stored.values > 0;
+        usize::try_from(stored.header.rows).ok().filter(|_| is_square)
+    }
+
+    /// The matrix with this index of the file that these are the contents of.
+    ///
+    /// # Errors
+    /// FB301, FB302 for complex and other matrices, FB303, FB305, FB306, FB307, FB312.
+    pub(super) fn matrix(&self, file: &InputFile, wanted: usize) -> Found<RawMatrix> {
+        let Some((stored, encoding)) = self.matrices.get(wanted) else {
+            return Err(Diagnostic::new(Code::MatrixSyntax, "the matrix is not in the file"));
+        };
+        let header = &stored.header;
+        let about = |diagnostic: Diagnostic| diagnostic.about(&header.name);
+        if !header.is_real() {
+            let message = format!("type {} is complex", header.kind);
+            let help = "write real matrices, without structural damping";
+            return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help(help)));
+        }
+        let columns = columns(file, stored, *encoding)?;
+        if !matches!(header.form, 1 | 2 | 6) {
+            let message = format!("form {} is none of a symmetric matrix", header.form);
+            return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help("forms are 1, 2, 6")));
+        }
+        let n = check_size(header.rows, header.columns, columns.count() as u64).map_err(about)?;
+        let triangle = undeclared_triangle(columns.sides(), |_| "write the whole matrix".into());
+        if let Some(triangle) = triangle {
+            return Err(about(triangle));
+        }
+        let written = columns.written;
+        let raw = columns.into_matrix(n, stored.ascending, file.path())?;
+        // Nastran with words of eight bytes calls its numbers single as well, but writes all their digits.
+        let is_single = header.is_single() && written <= PADDED_DIGITS;
+        let digits = if is_single { raw.digits.min(SINGLE_DIGITS) } else { raw.digits };
+        Ok(RawMatrix { digits, ..raw })
+    }
+}
+
+/// All columns of a matrix. Stretches of them are read in parallel, and put together in the order of the file
+/// before the next ones are read: the entries are in memory once.
+fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Columns> {
+    let at_once = 8 * rayon::current_num_threads();
+    let mut all = Columns::with_room(stored.values);
+    for stretches in stored.stretches.chunks(at_once) {
+        let read = |stretch: &Stretch| {
+            let bytes = &file.bytes()[stretch.bytes.clone()];
+            match encoding {
+                Encoding::Text(format) => text::columns(bytes, stretch.line, &stored.header, format),
+                Encoding::Binary(binary) => binary.columns(bytes, &stored.header),
+            }
+        };
+        let read: Vec<Found<Columns>> = stretches.par_iter().map(read).collect();
+        for columns in read {
+            all.append(&columns?);
+        }
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexbody_linalg::CscMatrix;
+    use std::fmt::Write;
+
+    const N: usize = 3000;
+    const BAND: usize = 16;
+
+    /// The band of a column: its first row, and its values, which are symmetric and of all digits.
+    fn column(j: usize) -> (usize, Vec<f64>) {
+        let (first, end) = (j.saturating_sub(BAND), (j + BAND + 1).min(N));
+        (first, (first..end).map(|i| ((i * j) as f64).sqrt() + (i + j) as f64 + 1.0).collect())
+    }
+
+    fn expected() -> CscMatrix {
+        let entries = |j: usize| {
+            let (first, values) = column(j);
+            values.into_iter().enumerate().map(move |(k, value)| ((first + k) as u32, j as u32, value))
+        };
+        CscMatrix::from_triplets(N, N, &(0..N).flat_map(entries).collect::<Vec<_>>())
+    }
+
+    /// The matrix as text, with its columns in some order.
+    fn text(order: impl Iterator<Item = usize>) -> String {
+        let mut text = format!("{N:8}{:8}{:8}{:8}{:8}1P,3E24.16\n", -(N as i64), 6, 2, "KGG");
+        for j in order {
+            let (first, values) = column(j);
+            writeln!(text, "{:8}{:8}{:8}", j + 1, 0, 2 * values.len() + 2).expect("memory");
+            writeln!(text, "{:8}{:8}", 2 * values.len() + 1, first + 1).expect("memory");
+            for three in values.chunks(3) {
+                three.iter().for_each(|value| write!(text, "{value:24.16E}").expect("memory"));
+                text.push('\n');
+            }
+        }
+        write!(text, "{:8}{:8}{:8}\n{:24.16E}\n", N + 1, 1, 1, 2f64.sqrt()).expect("memory");
+        text
+    }
+
+    fn binary() -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut record = |words: &[i32], name: &[u8], values: &[f64]| {
+            let mut own: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            own.extend_from_slice(name);
+            own.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+            let length = (own.len() as i32).to_le_bytes();
+            bytes.extend([&length[..], &own, &length].concat());
+        };
+        let n = N as i32;
+        record(&[n, -n, 6, 2], b"KGG     ", &[]);
+        for j in 0..N {
+            let (first, values) = column(j);
+            let words = 2 * values.len() as i32;
+            record(&[j as i32 + 1, 0, words + 2, words + 1, first as i32 + 1], b"", &values);
+        }
+        record(&[n + 1, 1, 2], b"", &[2f64.sqrt()]);
+        bytes
+    }
+
+    fn read(bytes: &[u8], threads: usize) -> Found<RawMatrix> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("job.op4");
+        std::fs::write(&path, bytes).expect("written");
+        let file = InputFile::open(&path).expect("a file");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| Contents::of(&file)?.matrix(&file, 0))
+    }
+
+    #[test]
+    fn a_matrix_of_many_stretches_is_the_same_on_any_number_of_threads_and_in_any_order_of_columns() {
+        let (expected, upright, reversed) = (expected(), text(0..N), text((0..N).rev()));
+        assert!(upright.len() > 2 << 20, "more than two stretches");
+        for threads in [1, 3] {
+            for bytes in [upright.as_bytes(), reversed.as_bytes(), &binary()] {
+                let raw = read(bytes, threads).expect("read");
+                assert_eq!((&raw.matrix, raw.digits), (&expected, 17));
+            }
+        }
+    }
+
+    #[test]
+    fn a_bad_number_is_told_with_its_line_in_the_whole_file() {
+        let text = text(0..N);
+        let lines: Vec<&str> = text.lines().collect();
+        // The first line of values of the last column but one.
+        let bad = lines.len() - 2 - 2 * (2 + (BAND + 1).div_ceil(3)) + 2;
+        for (number, code) in [("x", Code::MatrixSyntax), ("NaN", Code::MatrixNotFinite)] {
+            let mut lines = lines.clone();
+            let changed = lines[bad].replace(&lines[bad][..24], &format!("{number:>24}"));
+            lines[bad] = &changed;
+            for threads in [1, 3] {
+                let found = read((lines.join("\n") + "\n").as_bytes(), threads).expect_err("refused");
+                assert_eq!((found.code(), found.line()), (code, Some(bad + 1)), "{found}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_that_is_too_short_is_told_with_its_line_in_the_whole_file() {
+        let text = text(0..N);
+        let line = text.lines().count() - 4;
+        let short: Vec<&str> =
+            text.lines().enumerate().map(|(k, own)| if k == line { &own[..30] } else { own }).collect();
+        let found = read(short.join("\n").as_bytes(), 2).expect_err("refused");
+        assert_eq!((found.code(), found.line()), (Code::MatrixSyntax, Some(line + 1)), "{found}");
+    }
+}

@@ -1,0 +1,264 @@
+//! What text and binary files have in common: headers, strings of values, and where they go.
+
+use crate::assemble::{ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, push};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::memory::or_go_without;
+use flexbody_model::RawMatrix;
+use std::ops::Range;
+use std::path::Path;
+
+/// Digits of single precision.
+pub(super) const SINGLE_DIGITS: u8 = 7;
+
+/// From this number of rows on, starts of strings do not fit beside their lengths.
+const BIG: u64 = 65_536;
+
+/// What a matrix begins with.
+#[derive(Debug, Clone)]
+pub(super) struct Header {
+    pub name: String,
+    pub rows: u64,
+    pub columns: u64,
+    pub form: i64,
+    /// 1, 2: real numbers of single and double precision; 3, 4: complex ones.
+    pub kind: i64,
+    /// Strings have start and length in words of their own.
+    pub is_big: bool,
+}
+
+impl Header {
+    /// From the numbers of a header; a complaint about those of no matrix.
+    pub(super) fn new(
+        columns: i64,
+        rows: i64,
+        form: i64,
+        kind: i64,
+        name: &[u8],
+    ) -> Result<Self, Diagnostic> {
+        let name: String = String::from_utf8_lossy(unpadded(name)).to_uppercase();
+        let is_name = |c: char| c.is_ascii_graphic();
+        if columns <= 0
+            || rows == 0
+            || rows == i64::MIN
+            || !(1..=4).contains(&kind)
+            || !name.chars().all(is_name)
+        {
+            let message = format!("header of a matrix says {columns} columns, {rows} rows, type {kind}");
+            return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the file again"));
+        }
+        Ok(Self {
+            name,
+            rows: rows.unsigned_abs(),
+            columns: columns.unsigned_abs(),
+            form,
+            kind,
+            is_big: rows < 0 || rows.unsigned_abs() >= BIG,
+        })
+    }
+
+    /// A name that is stored in words of eight bytes: four letters in each, or eight.
+    pub(super) fn name_of_wide_words(name: &[u8]) -> Vec<u8> {
+        let letters = |word: &[u8]| match word.split_at_checked(4) {
+            Some((four, rest)) if unpadded(rest).is_empty() => four.to_vec(),
+            _ => word.to_vec(),
+        };
+        name.chunks(8).flat_map(letters).collect()
+    }
+
+    pub(super) fn is_real(&self) -> bool {
+        matches!(self.kind, 1 | 2)
+    }
+
+    pub(super) fn is_single(&self) -> bool {
+        self.kind % 2 == 1
+    }
+
+    /// Start and number of words of a string whose two are packed into one number.
+    pub(super) fn unpacked(word: i64) -> (i64, i64) {
+        let length = (word >> 16) - 1;
+        (word - ((length + 1) << 16), length)
+    }
+
+    /// Checks a column number: within the matrix, or the one after it, which ends the matrix.
+    pub(super) fn column(&self, column: i64) -> Result<Column, Diagnostic> {
+        match u64::try_from(column) {
+            Ok(column) if column >= 1 && column <= self.columns => Ok(Column::Number(column as u32 - 1)),
+            Ok(column) if column == self.columns + 1 => Ok(Column::End),
+            _ => {
+                let message =
+                    format!("matrix {} has {} columns, found column {column}", self.name, self.columns);
+                Err(Diagnostic::new(Code::MatrixIndex, message).with_help("write the file again"))
+            }
+        }
+    }
+
+    /// Checks where a string of values lies: its first row, from 0.
+    pub(super) fn first_row(&self, row: i64, count: usize) -> Result<u32, Diagnostic> {
+        let end = row.checked_add(count as i64 - 1).unwrap_or(i64::MAX);
+        if row < 1 || end.unsigned_abs() > self.rows || self.rows > u64::from(u32::MAX) {
+            let message = format!("matrix {} has {} rows, found rows {row} to {end}", self.name, self.rows);
+            return Err(Diagnostic::new(Code::MatrixIndex, message).with_help("write the file again"));
+        }
+        Ok(row as u32 - 1)
+    }
+}
+
+/// A name without the blanks and zero bytes that fill its field.
+pub(super) fn unpadded(name: &[u8]) -> &[u8] {
+    let fills = |b: &u8| b.is_ascii_whitespace() || *b == 0;
+    let start = name.iter().position(|b| !fills(b)).unwrap_or(name.len());
+    let end = name.iter().rposition(|b| !fills(b)).map_or(start, |last| last + 1);
+    &name[start..end]
+}
+
+/// What a column record is.
+pub(super) enum Column {
+    Number(u32),
+    End,
+}
+
+/// Where the columns of a matrix stand in its file. It is found from the lengths that the file states, before
+/// any value is read.
+pub(super) struct Stored {
+    pub header: Header,
+    /// Some whole columns each, in file order.
+    pub stretches: Vec<Stretch>,
+    /// At least as many values as the columns hold.
+    pub values: usize,
+    /// Whether every column has a higher number than the one before it.
+    pub ascending: bool,
+    last: Option<u32>,
+}
+
+/// Some columns of a matrix: their bytes in the file, and the number of lines above them in a text file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Stretch {
+    pub bytes: Range<usize>,
+    pub line: usize,
+}
+
+impl Stored {
+    /// Bytes of columns that one thread reads before it takes others.
+    const STRETCH: usize = 1 << 20;
+
+    pub(super) fn new(header: Header) -> Self {
+        Self { header, stretches: Vec::new(), values: 0, ascending: true, last: None }
+    }
+
+    /// Adds a column of at most so many values that stands at these bytes, below so many lines.
+    pub(super) fn add(&mut self, column: u32, values: usize, bytes: Range<usize>, line: usize) {
+        self.ascending &= self.last.is_none_or(|last| last < column);
+        self.last = Some(column);
+        self.values += values;
+        match self.stretches.last_mut() {
+            Some(stretch) if stretch.bytes.len() < Self::STRETCH => stretch.bytes.end = bytes.end,
+            _ => self.stretches.push(Stretch { bytes, line }),
+        }
+    }
+}
+
+/// The entries of some columns, in file order, without zeros.
+#[derive(Default)]
+pub(super) struct Columns {
+    /// Each column and how many of the entries it has.
+    lengths: Vec<(u32, usize)>,
+    rows: Vec<u32>,
+    values: Vec<f64>,
+    sides: Sides,
+    /// Digits as written.
+    pub written: u8,
+}
+
+impl Columns {
+    /// Room for so many entries, as far as there is memory for it.
+    pub(super) fn with_room(entries: usize) -> Self {
+        let mut own = Self::default();
+        or_go_without(|| {
+            if own.rows.try_reserve_exact(entries).is_ok() {
+                let _ = own.values.try_reserve_exact(entries);
+            }
+        });
+        own
+    }
+
+    /// # Errors
+    /// FB306.
+    pub(super) fn push(&mut self, row: u32, col: u32, value: f64) -> Result<(), Diagnostic> {
+        self.extend(row, col, std::iter::once(value))
+    }
+
+    /// Adds values that stand below one another in a column, from a row on.
+    ///
+    /// # Errors
+    /// FB306.
+    pub(super) fn extend(
+        &mut self,
+        first: u32,
+        col: u32,
+        values: impl Iterator<Item = f64>,
+    ) -> Result<(), Diagnostic> {
+        if self.lengths.last().is_none_or(|(last, _)| *last != col) {
+            self.lengths.push((col, 0));
+        }
+        let before = self.rows.len();
+        // In this order the rows do not go beyond the last one.
+        for (value, row) in values.zip(first..) {
+            if !value.is_finite() {
+                let message = format!("entry ({}, {}) is {value}", row + 1, col + 1);
+                return Err(Diagnostic::new(Code::MatrixNotFinite, message));
+            }
+            if value != 0.0 {
+                self.rows.push(row);
+                self.values.push(value);
+            }
+        }
+        let added = &self.rows[before..];
+        // Rows ascend from the first to the last.
+        self.sides.lower |= added.last().is_some_and(|row| *row > col);
+        self.sides.upper |= added.first().is_some_and(|row| *row < col);
+        if let Some((_, length)) = self.lengths.last_mut() {
+            *length += added.len();
+        }
+        Ok(())
+    }
+
+    /// Adds the columns that follow in the file.
+    pub(super) fn append(&mut self, next: &Self) {
+        self.lengths.extend_from_slice(&next.lengths);
+        self.rows.extend_from_slice(&next.rows);
+        self.values.extend_from_slice(&next.values);
+        self.sides.lower |= next.sides.lower;
+        self.sides.upper |= next.sides.upper;
+        self.written = self.written.max(next.written);
+    }
+
+    pub(super) fn count(&self) -> usize {
+        self.values.len()
+    }
+
+    pub(super) fn sides(&self) -> Sides {
+        self.sides
+    }
+
+    /// The matrix of `n` rows and columns.
+    ///
+    /// # Errors
+    /// FB306, FB312.
+    pub(super) fn into_matrix(self, n: usize, ascending: bool, path: &Path) -> Result<RawMatrix, Diagnostic> {
+        if ascending {
+            let columns = ColumnEntries::new(n, &self.lengths, self.rows, self.values);
+            return assemble_columns(columns, self.written, path);
+        }
+        let mut pieces = Vec::new();
+        let columns = self.lengths.iter().flat_map(|&(col, length)| std::iter::repeat_n(col, length));
+        for ((col, row), value) in columns.zip(self.rows).zip(self.values) {
+            push(&mut pieces, Entry { row, col, value });
+        }
+        assemble(n, pieces, Storage::Full, self.written, path)
+    }
+}
+
+/// FB304.
+pub(super) fn cut_off(name: &str) -> Diagnostic {
+    Diagnostic::new(Code::MatrixCount, format!("the file ends within matrix {name}"))
+}

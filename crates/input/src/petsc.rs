@@ -1,0 +1,164 @@
+//! Matrices of PETSc in its binary form, as `MatView` writes them into a binary viewer:
+//! <https://petsc.org/release/manualpages/Mat/MatLoad/>. All numbers are big-endian. Whole numbers have 32 or 64
+//! bits and values 4, 8 or 16 bytes, as PETSc was configured; the file does not say which, but its size does.
+
+use super::assemble::check_size;
+use super::compressed::Compressed;
+use super::reader::{MatrixSource, Reader};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_model::RawMatrix;
+
+/// The reader of PETSc's binary files.
+pub(super) struct Petsc;
+
+/// Number that begins a matrix. Other objects have numbers near it.
+const MATRIX: u64 = 1_211_216;
+const OTHERS: &[(u64, &str)] =
+    &[(1_211_214, "a vector"), (1_211_218, "an index set"), (1_211_219, "a bag"), (1_211_221, "a mesh")];
+
+const HELP: &str = "write it again: MatView(A, viewer) with a viewer of PetscViewerBinaryOpen";
+const BOTH_TRIANGLES: &str = "store both triangles: MatConvert(A, MATAIJ, MAT_INITIAL_MATRIX, &B)";
+
+impl Reader for Petsc {
+    fn name(&self) -> &'static str {
+        "PETSc"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["petsc"]
+    }
+
+    /// A file that begins with the number of an object of PETSc.
+    fn recognises(&self, head: &[u8]) -> bool {
+        Whole::of(head).is_some()
+    }
+
+    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+        let read = || {
+            source.has_one_matrix("a PETSc file")?;
+            read(source.not_packed("PETSc file")?, source)
+        };
+        read().map_err(|diagnostic: Diagnostic| Error::from(diagnostic.in_file(source.file.path())))
+    }
+}
+
+/// Bytes of a whole number.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Whole {
+    Four,
+    Eight,
+}
+
+impl Whole {
+    /// How many of them the number has that begins the file, if it is that of an object.
+    fn of(head: &[u8]) -> Option<Self> {
+        let known = |number: i64| {
+            u64::try_from(number).is_ok_and(|own| own == MATRIX || OTHERS.iter().any(|(id, _)| *id == own))
+        };
+        [Self::Four, Self::Eight].into_iter().find(|whole| whole.get(head, 0).is_some_and(known))
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::Four => 4,
+            Self::Eight => 8,
+        }
+    }
+
+    /// The k-th number of a list.
+    fn get(self, bytes: &[u8], k: usize) -> Option<i64> {
+        let own = bytes.get(k * self.bytes()..(k + 1) * self.bytes())?;
+        Some(match self {
+            Self::Four => i64::from(i32::from_be_bytes(own.try_into().ok()?)),
+            Self::Eight => i64::from_be_bytes(own.try_into().ok()?),
+        })
+    }
+
+    /// Splits off a list of `count` numbers.
+    fn list(self, bytes: &[u8], count: u64) -> Option<(&[u8], &[u8])> {
+        let length = usize::try_from(count).ok()?.checked_mul(self.bytes())?;
+        bytes.split_at_checked(length)
+    }
+}
+
+fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
+    let cut_off = || {
+        let message = "file ends before the matrix does: it may be cut off";
+        Diagnostic::new(Code::MatrixCount, message).with_help(HELP)
+    };
+    let Some(whole) = Whole::of(bytes) else {
+        let message = "file does not begin with the number of a matrix of PETSc, 1211216";
+        return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
+    };
+    let (head, rest) = whole.list(bytes, 4).ok_or_else(cut_off)?;
+    let [kind, rows, columns, entries] = std::array::from_fn(|k| whole.get(head, k).unwrap_or(-1));
+    let entries = entry_count(kind, entries)?;
+    let size = |extent: i64| extent.max(0) as u64;
+    let n = check_size(size(rows), size(columns), entries)?;
+    let (lengths, rest) = whole.list(rest, n as u64).ok_or_else(cut_off)?;
+    let (indices, values) = whole.list(rest, entries).ok_or_else(cut_off)?;
+    let single = value_bytes(values.len(), entries).ok_or_else(|| wrong_size(values, entries, whole))? == 4;
+    let mut pointers = vec![0u64];
+    for k in 0..n {
+        let length = whole.get(lengths, k).and_then(|length| u64::try_from(length).ok()).unwrap_or(u64::MAX);
+        pointers.push(pointers[k].saturating_add(length));
+    }
+    let value = |k: usize| match single {
+        true => values[4 * k..].first_chunk().map_or(f64::NAN, |b| f64::from(f32::from_be_bytes(*b))),
+        false => values[8 * k..].first_chunk().map_or(f64::NAN, |b| f64::from_be_bytes(*b)),
+    };
+    let compressed = Compressed {
+        n,
+        by_rows: true,
+        pointers,
+        pointers_name: "the sum of the lengths of the rows",
+        entries: entries as usize,
+        entry: &|k| (whole.get(indices, k).unwrap_or(-1), value(k)),
+        help: HELP,
+        both_triangles: BOTH_TRIANGLES,
+    };
+    let raw = compressed.assemble(source.file.path())?;
+    Ok(RawMatrix { digits: if single { raw.digits.min(7) } else { raw.digits }, ..raw })
+}
+
+/// The number of stored entries of what is a sparse matrix.
+fn entry_count(kind: i64, entries: i64) -> std::result::Result<u64, Diagnostic> {
+    let refuse = |message: String, help| Err(Diagnostic::new(Code::MatrixKind, message).with_help(help));
+    if let Some((_, what)) = OTHERS.iter().find(|(id, _)| *id as i64 == kind) {
+        return refuse(format!("file holds {what} of PETSc, not a matrix"), HELP);
+    }
+    match entries {
+        -1 => refuse(
+            "matrix is stored as a dense one".to_owned(),
+            "convert it: MatConvert(A, MATAIJ, MAT_INITIAL_MATRIX, &B)",
+        ),
+        _ => u64::try_from(entries).map_err(|_| {
+            let message = format!("the number of entries is {entries}");
+            Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
+        }),
+    }
+}
+
+/// Bytes of a real value, when `bytes` are `entries` of them.
+fn value_bytes(bytes: usize, entries: u64) -> Option<u64> {
+    [8, 4].into_iter().find(|size| entries.checked_mul(*size) == Some(bytes as u64))
+}
+
+/// What the bytes behind the indices are, when they are not as many real values as there are entries.
+fn wrong_size(values: &[u8], entries: u64, whole: Whole) -> Diagnostic {
+    let bytes = values.len();
+    let following = entries.checked_mul(8).and_then(|end| values.get(usize::try_from(end).ok()?..));
+    if following.is_some_and(|rest| Whole::of(rest) == Some(whole)) {
+        let message = "file holds several objects of PETSc";
+        return Diagnostic::new(Code::Hdf5Layout, message)
+            .with_help("write every matrix to a file of its own");
+    }
+    if entries.checked_mul(16) == Some(bytes as u64) {
+        let message = "values have 16 bytes: they are complex, or of quadruple precision";
+        return Diagnostic::new(Code::MatrixKind, message)
+            .with_help("write it by PETSc with real scalars of double precision");
+    }
+    let message = format!("header announces {entries} entries, {bytes} bytes of values follow their indices");
+    Diagnostic::new(Code::MatrixCount, message)
+}

@@ -1,0 +1,603 @@
+//! Reads every file of a model and collects all that is wrong with any of them.
+
+use super::jobs::{JobModel, comparable, read_job};
+use super::mapping::Mapping;
+use super::mesh::MeshReading;
+use super::model_files::{InterfaceNodes, InterfaceSource, MatrixLocation, ModelFiles, ModelSource};
+use super::node_file::{NodeFile, NodeSets, Unresolved};
+use super::node_files::read_node_file;
+use super::reader::{MatrixRole, MatrixSource};
+use super::readers::reader_for;
+use super::row_axes::Turn;
+use super::tables::{read_masses, read_node_list};
+use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::{SourceFile, Sources};
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::{InputFile, SeenFile};
+use flexbody_base::text::quotes::without_foreign_quotes;
+use flexbody_model::{
+    Damping, DofLabel, Elements, GeometricStiffness, GivenRows, LostRow, NodeAxes, NodeSet, Nodes, RawMatrix,
+    RawModel, RowMap, filled_rows,
+};
+use std::collections::{HashMap, HashSet};
+use std::path::{Path, PathBuf};
+
+/// Below this many significant digits a matrix is warned about.
+const FEW_DIGITS: u8 = 10;
+
+/// Reads one matrix: both triangles, whatever is stored.
+///
+/// # Errors
+/// FB101 to FB106 and FB301 to FB313, all that are found in the file.
+pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMatrix> {
+    read_opened(&InputFile::open_unread(&location.path)?, location.group.as_deref(), role, None)
+}
+
+/// Reads all files of a model and takes their fingerprints. The model is parsed, not yet checked: sizes,
+/// symmetry and mechanics are the business of [`flexbody_model`].
+///
+/// # Errors
+/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric
+/// stiffness, interfaces, mesh; FB132 for files that changed meanwhile, whatever else is wrong with them.
+pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
+    let mut opened = OpenFiles::new(files);
+    let read = read_opened_files(files, &opened);
+    opened.refuse_changed()?;
+    let (model, of_job) = read.map_err(|error| told_to_users(files, error))?;
+    of_job.iter().try_for_each(|(_, file)| file.refuse_changed())?;
+    opened.forget_bytes();
+    let given = files.clone();
+    Ok(RawModel { sources: Sources::later(move || sources(&given, &of_job, &opened)), ..model })
+}
+
+/// The error without quotes of files that the manifest or the deck names elsewhere on the machine.
+fn told_to_users(files: &ModelFiles, error: Error) -> Error {
+    let main = match (&files.manifest, &files.source) {
+        (Some(manifest), _) => manifest,
+        (None, ModelSource::Job(job)) => &job.path,
+        (None, ModelSource::Tables(_)) => return error,
+    };
+    let diagnostics = error.into_diagnostics().into_iter();
+    Error::new(diagnostics.map(|diagnostic| without_foreign_quotes(diagnostic, main)).collect())
+}
+
+/// Role of a file of a job, and the file.
+type JobFileRead = (&'static str, SeenFile);
+
+/// Reads the files of a model, and those of its job, which are named by it.
+fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel, Vec<JobFileRead>)> {
+    let parsed = Parsed::of(files, opened);
+    let mut diagnostics = Vec::new();
+    if let Some(path) = &files.manifest {
+        opened.get(path).map(|_| ()).unwrap_or_else(|found| collect(&mut diagnostics, found));
+    }
+    let matrices = match parsed.matrices {
+        Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
+        Matrices::Job(job) => take(&mut diagnostics, *job),
+    };
+    let no_rows = GivenRows::default();
+    let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);
+    let damping = parsed.damping.and_then(|damping| {
+        let damping = take(&mut diagnostics, damping)?;
+        take(&mut diagnostics, damping.try_map(|raw| by_rows_of_model(raw, rows)))
+    });
+    let geometric = parsed.geometric_stiffness.into_iter().filter_map(|one| {
+        let GeometricStiffness { load, matrix } = take(&mut diagnostics, one)?;
+        let matrix = take(&mut diagnostics, by_rows_of_model(matrix, rows))?;
+        Some(GeometricStiffness { load, matrix })
+    });
+    let geometric_stiffness = geometric.collect();
+    let places = Places::of(matrices.as_ref(), files.dimension);
+    let interfaces: Vec<NodeSet> = files
+        .interfaces
+        .iter()
+        .filter_map(|interface| take(&mut diagnostics, places.node_set(interface, opened, files)))
+        .collect();
+    let mesh_file = parsed.mesh.and_then(|mesh| take(&mut diagnostics, mesh));
+    let mesh = matrices.as_ref().map(|matrices| {
+        let from = mesh_file.as_ref().zip(files.mesh.as_deref());
+        MeshReading { nodes: &matrices.nodes, elements: &matrices.elements, path: &matrices.nodes_path }
+            .mesh(from)
+    });
+    let mesh = mesh.and_then(|mesh| take(&mut diagnostics, mesh));
+    diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
+    let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
+    else {
+        return Err(Error::new(diagnostics));
+    };
+    diagnostics.extend(matrices.diagnostics);
+    let (mesh, partly) = mesh.unwrap_or_default();
+    diagnostics.extend(partly);
+    let model = RawModel {
+        name: files.name.clone(),
+        dimension: files.dimension,
+        units: files.units.clone(),
+        stiffness: matrices.stiffness,
+        mass: matrices.mass,
+        nodes: matrices.nodes,
+        nodes_path: matrices.nodes_path,
+        mesh,
+        dofs: matrices.dofs,
+        dofs_path: matrices.dofs_path,
+        given_rows: matrices.given_rows,
+        interfaces,
+        damping,
+        geometric_stiffness,
+        allow_implausible: files.allow_implausible,
+        sources: Sources::default(),
+        diagnostics,
+    };
+    Ok((model, matrices.files))
+}
+
+/// Reads nodal masses, `node,mass`: what a multibody package would have imported.
+///
+/// # Errors
+/// FB101 to FB106, FB203 to FB205 and FB803.
+pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
+    read_masses(&InputFile::open(path)?).map_err(Error::new)
+}
+
+type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
+
+/// What stands in the files, each with what is wrong with it.
+struct Parsed {
+    matrices: Matrices,
+    mesh: Option<Found<NodeFile>>,
+    damping: Option<Found<Damping<RawMatrix>>>,
+    geometric_stiffness: Vec<Found<GeometricStiffness<RawMatrix>>>,
+}
+
+enum Matrices {
+    Tables(Box<ParsedTables>),
+    Job(Box<Found<ModelMatrices>>),
+}
+
+/// Matrices, nodes and labels of a model.
+struct ModelMatrices {
+    stiffness: RawMatrix,
+    mass: RawMatrix,
+    nodes: Nodes,
+    nodes_path: PathBuf,
+    dofs: Option<Vec<DofLabel>>,
+    dofs_path: PathBuf,
+    given_rows: GivenRows,
+    /// Node sets of a job.
+    sets: NodeSets,
+    /// Sets that cannot be resolved, and why.
+    unresolved: Unresolved,
+    /// What the part is drawn by.
+    elements: Elements,
+    /// Files of a job.
+    files: Vec<JobFileRead>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl ModelMatrices {
+    /// Nodes with stiffness or mass; `None` where the rows are not those of the nodes in turn and have no labels.
+    fn moving(&self, dimension: u8) -> Option<HashSet<i64>> {
+        let n = self.stiffness.matrix.n_cols();
+        let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], n);
+        let (d, nodes) = (usize::from(dimension), &self.nodes.ids);
+        let node_of = |row: usize| match &self.dofs {
+            Some(labels) => labels.get(row).map(|label| label.node),
+            None => Some(nodes[row / d]),
+        };
+        let known = self.dofs.is_some() || d * nodes.len() == n;
+        known.then(|| (0..n).filter(|&row| filled[row]).filter_map(node_of).collect())
+    }
+}
+
+impl From<JobModel> for ModelMatrices {
+    fn from(job: JobModel) -> Self {
+        let path = |role: &str| {
+            let file = job.files.iter().find(|(own, _)| *own == role).or(job.files.first());
+            file.map(|(_, file)| file.path.clone()).unwrap_or_default()
+        };
+        Self {
+            nodes_path: path("deck"),
+            dofs_path: path("dofs"),
+            stiffness: job.stiffness,
+            mass: job.mass,
+            nodes: job.nodes,
+            dofs: Some(job.dofs),
+            given_rows: job.given_rows,
+            sets: job.sets,
+            unresolved: job.unresolved,
+            elements: job.elements,
+            files: job.files,
+            diagnostics: job.diagnostics,
+        }
+    }
+}
+
+struct ParsedTables {
+    stiffness: Found<RawMatrix>,
+    mass: Found<RawMatrix>,
+    nodes: Found<NodeFile>,
+    dofs: Option<Found<Mapping>>,
+}
+
+impl ParsedTables {
+    /// The tables, if all of them could be read.
+    fn taken(self, files: &ModelFiles, diagnostics: &mut Vec<Diagnostic>) -> Option<ModelMatrices> {
+        let stiffness = take(diagnostics, self.stiffness);
+        let mass = take(diagnostics, self.mass);
+        let nodes = take(diagnostics, self.nodes);
+        let dofs = match self.dofs {
+            Some(dofs) => Some(take(diagnostics, dofs)?),
+            None => None,
+        };
+        let tables = files.tables().expect("tables were read");
+        let (stiffness, mass, nodes) = (stiffness?, mass?, nodes?);
+        let NodeFile { nodes, sets, unresolved, elements, followers, axes } = nodes;
+        let dofs_path = tables.dofs.clone().unwrap_or_default();
+        let dofs = match dofs {
+            Some(mapping) => Some(take(diagnostics, mapping.labels(stiffness.matrix.n_rows(), &dofs_path))?),
+            None => None,
+        };
+        let (mut stiffness, mut mass, mut given_rows) = (stiffness, mass, GivenRows::default());
+        if !followers.is_empty() || !axes.is_empty() {
+            let labels = dofs.clone().unwrap_or_else(|| in_order_of_nodes(&nodes, files.dimension));
+            take(diagnostics, refuse_followers(&followers, &labels, &tables.nodes))?;
+            ([stiffness, mass], given_rows) = take(diagnostics, turned([stiffness, mass], &labels, axes))?;
+        }
+        Some(ModelMatrices {
+            stiffness,
+            mass,
+            nodes,
+            nodes_path: tables.nodes.clone(),
+            dofs,
+            dofs_path,
+            given_rows,
+            sets,
+            unresolved,
+            elements,
+            files: Vec::new(),
+            diagnostics: Vec::new(),
+        })
+    }
+}
+
+impl Parsed {
+    fn of(files: &ModelFiles, opened: &OpenFiles) -> Self {
+        let matrix = |location: &MatrixLocation, role| {
+            let file = opened.unread(&location.path)?;
+            read_opened(file, location.group.as_deref(), role, files.keep_in.as_deref())
+                .map_err(Error::into_diagnostics)
+        };
+        let matrices = match &files.source {
+            ModelSource::Job(job) => Matrices::Job(Box::new(read_job(job).map(ModelMatrices::from))),
+            ModelSource::Tables(tables) => {
+                let ((stiffness, mass), (nodes, dofs)) = rayon::join(
+                    || {
+                        rayon::join(
+                            || matrix(&tables.stiffness, MatrixRole::Stiffness),
+                            || matrix(&tables.mass, MatrixRole::Mass),
+                        )
+                    },
+                    || {
+                        rayon::join(
+                            || read_node_file(opened.get(&tables.nodes)?, files.dimension),
+                            || tables.dofs.as_ref().map(|path| Mapping::read(opened.get(path)?)),
+                        )
+                    },
+                );
+                Matrices::Tables(Box::new(ParsedTables { stiffness, mass, nodes, dofs }))
+            }
+        };
+        let mesh = files.mesh.as_ref().map(|path| read_node_file(opened.get(path)?, files.dimension));
+        let damping = files.damping.as_ref();
+        let damping = damping.map(|d| d.borrowed().try_map(|place| matrix(place, MatrixRole::Damping)));
+        let geometric_stiffness = files.geometric_stiffness.iter().map(|one| {
+            let matrix = matrix(&one.matrix, MatrixRole::GeometricStiffness)?;
+            Ok(GeometricStiffness { load: one.load.clone(), matrix })
+        });
+        let geometric_stiffness = geometric_stiffness.collect();
+        Self { matrices, mesh, damping, geometric_stiffness }
+    }
+}
+
+/// Where the nodes of a model lie, and its sets, for interfaces that name these.
+struct Places<'m> {
+    matrices: Option<&'m ModelMatrices>,
+    /// Nodes with stiffness or mass, where rows are known.
+    moving: Option<HashSet<i64>>,
+}
+
+impl<'m> Places<'m> {
+    fn of(matrices: Option<&'m ModelMatrices>, dimension: u8) -> Self {
+        Self { matrices, moving: matrices.and_then(|matrices| matrices.moving(dimension)) }
+    }
+
+    /// The nodes of an interface. Without a model, whose files say why, regions and sets have none.
+    fn node_set(
+        &self,
+        interface: &InterfaceSource,
+        opened: &OpenFiles,
+        files: &ModelFiles,
+    ) -> Found<NodeSet> {
+        let mut outline = Vec::new();
+        let nodes = match &interface.nodes {
+            InterfaceNodes::Listed(nodes) => nodes.clone(),
+            InterfaceNodes::File(path) => read_node_list(opened.get(path)?)?,
+            InterfaceNodes::Set(name) => {
+                outline = self.members(name).map(<[i64]>::to_vec).unwrap_or_default();
+                self.of_set(interface, name, files)?
+            }
+            InterfaceNodes::Region(region) => {
+                let nodes = self.matrices.map_or(Vec::new(), |matrices| {
+                    let all =
+                        matrices.nodes.ids.iter().copied().zip(matrices.nodes.positions.iter().copied());
+                    region.nodes(all.filter(|(id, _)| self.moves(*id)))
+                });
+                self.refuse_empty(interface, nodes, "no node of the model lies in the region", files)?
+            }
+        };
+        let (name, coupling, reference) = (interface.name.clone(), interface.coupling, interface.reference);
+        Ok(NodeSet { name, nodes, coupling, reference, outline })
+    }
+
+    fn moves(&self, node: i64) -> bool {
+        self.moving.as_ref().is_none_or(|moving| moving.contains(&node))
+    }
+
+    /// Returns the members of a node set, with those that have no rows.
+    fn members(&self, name: &str) -> Option<&[i64]> {
+        let sets = &self.matrices?.sets;
+        let known = sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
+        let known = known.or_else(|| sets.iter().find(|(own, _)| comparable(own) == comparable(name)));
+        known.map(|(_, nodes)| nodes.as_slice())
+    }
+
+    fn of_set(&self, interface: &InterfaceSource, name: &str, files: &ModelFiles) -> Found<Vec<i64>> {
+        let Some(matrices) = self.matrices else { return Ok(Vec::new()) };
+        let refused = matrices.unresolved.iter().find(|(own, _)| comparable(own) == comparable(name));
+        if let Some((_, refused)) = refused {
+            return Err(vec![refused.clone().about(format!("interface `{}`", interface.name))]);
+        }
+        let Some(nodes) = self.members(name) else {
+            let names: Vec<&str> = matrices.sets.iter().map(|(own, _)| own.as_str()).take(20).collect();
+            let message = format!("interface `{}`: the model has no node set `{name}`", interface.name);
+            let help = match names.is_empty() {
+                true => {
+                    "the files of the model have no node sets: list the nodes, or give a region".to_owned()
+                }
+                false => format!("node sets: {}", names.join(", ")),
+            };
+            return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
+        };
+        // A set may list nodes without degrees of freedom, and some twice.
+        let mut seen = HashSet::new();
+        let nodes = nodes.iter().copied().filter(|id| self.moves(*id) && seen.insert(*id)).collect();
+        self.refuse_empty(
+            interface,
+            nodes,
+            &format!("no node of the set `{name}` has degrees of freedom"),
+            files,
+        )
+    }
+
+    fn refuse_empty(
+        &self,
+        interface: &InterfaceSource,
+        nodes: Vec<i64>,
+        why: &str,
+        files: &ModelFiles,
+    ) -> Found<Vec<i64>> {
+        if nodes.is_empty() && self.matrices.is_some() {
+            let message = format!("interface `{}`: {why}", interface.name);
+            return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message))]);
+        }
+        Ok(nodes)
+    }
+}
+
+fn said_in(files: &ModelFiles, diagnostic: Diagnostic) -> Diagnostic {
+    match (&files.manifest, &files.source) {
+        (Some(path), _) => diagnostic.in_file(path),
+        (None, ModelSource::Job(job)) => diagnostic.in_file(&job.path),
+        _ => diagnostic,
+    }
+}
+
+fn read_opened(
+    file: &InputFile,
+    group: Option<&str>,
+    role: MatrixRole,
+    keep_in: Option<&Path>,
+) -> Result<RawMatrix> {
+    let compression = Compression::of(file.bytes());
+    let reader = reader_for(file, compression)?;
+    if !reader.reads_by_itself() {
+        file.load()?;
+    }
+    let read = reader.read(&MatrixSource { file, compression, group, role, keep_in });
+    // What is wrong with a file that changed meanwhile may be wrong for this reason.
+    file.refuse_changed()?;
+    read
+}
+
+/// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass
+/// matrix enter results as they are, and exact short numbers are common there.
+fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
+    (stiffness.digits < FEW_DIGITS).then(|| {
+        let message =
+            format!("values of the stiffness matrix carry only {} significant digits", stiffness.digits);
+        Diagnostic::new(Code::MatrixDigits, message).in_file(&stiffness.path)
+    })
+}
+
+/// Labels of rows that follow the nodes of a table, each with its displacements.
+fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
+    let of_node = |&node: &i64| (1..=dimension).map(move |direction| DofLabel { node, direction });
+    nodes.ids.iter().flat_map(of_node).collect()
+}
+
+/// FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do not
+/// have these constraints.
+fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], deck: &Path) -> Found<()> {
+    let labels: HashSet<DofLabel> = labels.iter().copied().collect();
+    let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
+    let names: Vec<&str> = open.map(|(name, _)| name.as_str()).collect();
+    if names.is_empty() {
+        return Ok(());
+    }
+    let message =
+        format!("rows of the matrices follow others by constraints of the deck: {}", names.join(", "));
+    let diagnostic = Diagnostic::new(Code::DeckUnsupported, message).in_file(deck);
+    Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
+}
+
+/// K and M along the axes of the model, where rows stand along `axes` of nodes, and how others with these rows
+/// become the same.
+///
+/// # Errors
+/// FB404 for a rotated node that lacks directions which turn together.
+fn turned(
+    matrices: [RawMatrix; 2],
+    labels: &[DofLabel],
+    axes: HashMap<i64, NodeAxes>,
+) -> Found<([RawMatrix; 2], GivenRows)> {
+    let [stiffness, mass] = matrices;
+    let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
+    // Numbers of rows that differ are found later.
+    if !labels.iter().any(|label| axes.contains_key(&label.node)) || !has_rows(&stiffness) || !has_rows(&mass)
+    {
+        return Ok(([stiffness, mass], GivenRows::default()));
+    }
+    let turn = Turn::new(labels, &axes).map_err(|node| {
+        let message = format!(
+            "rows of node {node} stand along axes of its own, but not each of its directions is there once"
+        );
+        vec![Diagnostic::new(Code::DofIncomplete, message).in_file(&stiffness.path)]
+    })?;
+    let own = |raw: RawMatrix| turn.turned(raw).map_err(|diagnostic| vec![diagnostic]);
+    let matrices = [own(stiffness)?, own(mass)?];
+    let rows = (0..labels.len() as u32).collect();
+    let map = RowMap::new(turn.axes(), turn.axes(), rows);
+    Ok((matrices, GivenRows::new(vec![map], axes)))
+}
+
+/// A matrix that is given beside K and M, by the rows of the model.
+fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
+    let RawMatrix { matrix, digits, path } = raw;
+    match rows.matrix(matrix) {
+        Ok(matrix) => Ok(RawMatrix { matrix, digits, path }),
+        Err(LostRow) => {
+            let message = "the matrix has entries in rows that K and M leave empty";
+            let diagnostic = Diagnostic::new(Code::MatrixSizesDiffer, message).in_file(path);
+            Err(vec![diagnostic.with_help("leave these rows out of it, or give them stiffness and mass")])
+        }
+    }
+}
+
+fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {
+    found.map_err(|list| collect(diagnostics, list)).ok()
+}
+
+/// Adds what is not there yet: a file used twice is complained about once.
+fn collect(diagnostics: &mut Vec<Diagnostic>, found: Vec<Diagnostic>) {
+    for diagnostic in found {
+        if !diagnostics.contains(&diagnostic) {
+            diagnostics.push(diagnostic);
+        }
+    }
+}
+
+/// Every file of the model, opened once.
+struct OpenFiles {
+    files: Vec<(PathBuf, std::result::Result<InputFile, Diagnostic>)>,
+}
+
+impl OpenFiles {
+    fn new(files: &ModelFiles) -> Self {
+        let mut opened: Vec<(PathBuf, _)> = Vec::new();
+        for (_, path) in roles(files) {
+            if opened.iter().all(|(known, _)| known != path) {
+                opened.push((path.to_path_buf(), InputFile::open_unread(path)));
+            }
+        }
+        Self { files: opened }
+    }
+
+    /// A file whose bytes are in memory.
+    fn get(&self, path: &Path) -> Found<&InputFile> {
+        let file = self.unread(path)?;
+        file.load().map_err(|diagnostic| vec![diagnostic])?;
+        Ok(file)
+    }
+
+    fn unread(&self, path: &Path) -> Found<&InputFile> {
+        let (_, file) =
+            self.files.iter().find(|(known, _)| known == path).expect("every path of the model is opened");
+        file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
+    }
+
+    /// Files that could be opened.
+    fn all(&self) -> impl Iterator<Item = &InputFile> {
+        self.files.iter().filter_map(|(_, file)| file.as_ref().ok())
+    }
+
+    /// # Errors
+    /// FB132 for every file that is no longer the one that was opened.
+    fn refuse_changed(&self) -> Result<()> {
+        let changed: Vec<Diagnostic> = self.all().filter_map(|file| file.refuse_changed().err()).collect();
+        if changed.is_empty() { Ok(()) } else { Err(Error::new(changed)) }
+    }
+
+    fn forget_bytes(&mut self) {
+        self.files.iter_mut().filter_map(|(_, file)| file.as_mut().ok()).for_each(InputFile::forget_bytes);
+    }
+}
+
+/// Role and path of every file of the model, in the order of diagnostics and sources.
+fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
+    let mut roles: Vec<(&'static str, &Path)> = Vec::new();
+    roles.extend(files.manifest.as_deref().map(|path| ("manifest", path)));
+    if let Some(tables) = files.tables() {
+        roles.push((MatrixRole::Stiffness.name(), &tables.stiffness.path));
+        roles.push((MatrixRole::Mass.name(), &tables.mass.path));
+        roles.push(("nodes", &tables.nodes));
+        roles.extend(tables.dofs.as_deref().map(|path| ("dofs", path)));
+    }
+    roles.extend(files.mesh.as_deref().map(|path| ("mesh", path)));
+    let damping = files.damping.as_ref().and_then(Damping::matrix);
+    roles.extend(damping.map(|place| (MatrixRole::Damping.name(), place.path.as_path())));
+    let geometric = files.geometric_stiffness.iter().map(|one| one.matrix.path.as_path());
+    roles.extend(geometric.map(|path| (MatrixRole::GeometricStiffness.name(), path)));
+    roles.extend(files.interfaces.iter().filter_map(|interface| match &interface.nodes {
+        InterfaceNodes::File(path) => Some(("interface", path.as_path())),
+        _ => None,
+    }));
+    roles
+}
+
+/// Every file with its fingerprint: the manifest, those of a job, then the others. Those of which not all was read are
+/// read one after the other: whoever waits for [`Sources`] to be found must not be given other work by the pool, which
+/// may ask for the same.
+///
+/// # Errors
+/// FB101, FB132.
+fn sources(
+    files: &ModelFiles,
+    job: &[JobFileRead],
+    opened: &OpenFiles,
+) -> std::result::Result<Vec<SourceFile>, Diagnostic> {
+    let mut of_tables = Vec::new();
+    for (role, path) in roles(files) {
+        if let Some(file) = opened.all().find(|file| file.path() == path) {
+            let sha256 = file.sha256()?;
+            // The manifest was parsed before the other files were opened.
+            if role == "manifest" && files.manifest_sha256.as_ref().is_some_and(|parsed| *parsed != sha256) {
+                return Err(file.changed("its text is another one"));
+            }
+            of_tables.push(SourceFile::new(role, path, sha256));
+        }
+    }
+    let of_job = job.iter().map(|(role, file)| SourceFile::new(role, &file.path, file.sha256.clone()));
+    let (manifest, others): (Vec<_>, Vec<_>) =
+        of_tables.into_iter().partition(|source| source.role == "manifest");
+    Ok(manifest.into_iter().chain(of_job).chain(others).collect())
+}

@@ -1,0 +1,98 @@
+//! The registry of matrix formats, and which of them a file is of.
+
+use super::dmig::DmigPunch;
+use super::hdf5::Hdf5;
+use super::mat5::Mat5;
+use super::matrix_market::MatrixMarket;
+use super::output4::Output4;
+use super::petsc::Petsc;
+use super::reader::{HEAD, Reader};
+use super::scipy_npz::ScipyNpz;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::InputFile;
+use std::path::Path;
+
+/// Every matrix format that is understood.
+pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz, &Mat5, &Petsc, &Output4, &DmigPunch];
+
+/// The reader for a file: by its content, else by its extension.
+///
+/// # Errors
+/// FB102 when neither tells, with what the file seems to be.
+pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&'static dyn Reader> {
+    let head = compression.head(file, HEAD);
+    let by_content = READERS.iter().find(|reader| reader.recognises(&head));
+    let by_name = || {
+        let extension = extension(file.path());
+        READERS.iter().find(|reader| reader.extensions().contains(&extension.as_str()))
+    };
+    // A known format of others is better named than parsed as what its extension says.
+    let not_read = NOT_READ.iter().find(|(magic, ..)| head.starts_with(magic));
+    match (by_content, not_read) {
+        (Some(reader), _) => Ok(*reader),
+        (None, Some((_, what, help))) => {
+            let message = format!("file is {what}");
+            Err(Diagnostic::new(Code::FileFormatUnknown, message)
+                .in_file(file.path())
+                .with_help(*help)
+                .into())
+        }
+        (None, None) => by_name().copied().ok_or_else(|| {
+            let start = &head[..head.len().min(24)];
+            let message = format!("file begins with `{}`", start.escape_ascii());
+            Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).into()
+        }),
+    }
+}
+
+/// First bytes of files that people have and that are not read, what they are, and what to do.
+const NOT_READ: &[(&[u8], &str, &str)] = &[
+    (b"PK\x03\x04", "a zip archive", "unpack it"),
+    (
+        b"[row ",
+        "printed by MFEM's SparseMatrix::Print",
+        "write it by A.PrintMM(file), which is Matrix Market",
+    ),
+    (
+        b"% size ",
+        "printed by MFEM's SparseMatrix::PrintMatlab",
+        "write it by A.PrintMM(file), which is Matrix Market",
+    ),
+    (
+        b"**\n** GENERATION OF SUBSTRUCTURE",
+        "a substructure of Abaqus",
+        "give the deck that names it: flexbody convert job.inp",
+    ),
+    (
+        b"**\r\n** GENERATION OF SUBSTRUCTURE",
+        "a substructure of Abaqus",
+        "give the deck that names it: flexbody convert job.inp",
+    ),
+    (b"BZh", "compressed by bzip2", "unpack it, or compress it by gzip or zstd"),
+    (b"\xfd7zXZ", "compressed by xz", "unpack it, or compress it by gzip or zstd"),
+    (b"\x1f\x8b", "compressed twice", "unpack it once"),
+    (b"\x28\xb5\x2f\xfd", "compressed twice", "unpack it once"),
+];
+
+/// Extension in lower case, without that of the compression: `k.MTX.gz` gives `mtx`.
+fn extension(path: &Path) -> String {
+    let lower = |p: &Path| p.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
+    match lower(path).as_str() {
+        "gz" | "zst" => lower(&path.with_extension("")),
+        other => other.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compression_suffixes_are_not_the_format() {
+        for (path, expected) in [("a/K.MTX", "mtx"), ("K.mtx.gz", "mtx"), ("K.1.h5.zst", "h5"), ("K", "")] {
+            assert_eq!(extension(Path::new(path)), expected, "{path}");
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
+//! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
+
+use super::assemble::{Storage, assemble, check_size, push, refuse_beyond_memory, undeclared_triangle};
+use super::compressed::{Compressed, EntryCheck};
+use super::npy;
+use super::reader::{MatrixSource, Reader};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::memory::{left, refuse_beyond};
+use flexbody_model::RawMatrix;
+use std::io::{Cursor, Read};
+use std::path::Path;
+use zip::ZipArchive;
+
+/// The reader of SciPy's archives.
+pub(super) struct ScipyNpz;
+
+const HELP: &str = "write it again: scipy.sparse.save_npz(file, A.tocsc())";
+const MEMORY_HELP: &str = "use a larger machine";
+
+/// Bytes of an array that are unpacked before its header is known to be one: no header of NumPy is longer.
+const HEAD_BYTES: u64 = 1 << 17;
+
+const BOTH_TRIANGLES: &str = "save both triangles: A + scipy.sparse.tril(A, -1).T";
+
+impl Reader for ScipyNpz {
+    fn name(&self) -> &'static str {
+        "SciPy npz"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["npz"]
+    }
+
+    /// An archive whose first member is an array.
+    fn recognises(&self, head: &[u8]) -> bool {
+        let length = head.get(26..28).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
+        head.starts_with(b"PK\x03\x04")
+            && head.get(30..30 + length).is_some_and(|name| name.ends_with(b".npy"))
+    }
+
+    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+        let read = source.has_one_matrix("an archive of SciPy").and_then(|()| read(source));
+        read.map_err(|diagnostic| Error::from(diagnostic.in_file(source.file.path())))
+    }
+}
+
+fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic> {
+    let (mut archive, path) = (Archive::open(source.file.bytes())?, source.file.path());
+    let form = archive.member("format").ok().and_then(|bytes| npy::read_word(&bytes)).unwrap_or_default();
+    let shape = npy::read_integers(&archive.member("shape")?)?;
+    let &[rows, columns] = shape.as_slice() else {
+        return Err(Diagnostic::new(Code::MatrixKind, "`shape` is not two whole numbers").with_help(HELP));
+    };
+    // Before anything of that size is unpacked.
+    let entries = archive.count("data")?;
+    let n = check_size(rows.max(0) as u64, columns.max(0) as u64, entries)?;
+    refuse_beyond_memory(entries)?;
+    if form == "bsr" {
+        return blocks(&mut archive, n, path);
+    }
+    for name in ["indices", "row", "col"] {
+        if archive.has(name) {
+            same_count(entries, archive.count(name)?, name)?;
+        }
+    }
+    let data = npy::read(&archive.member("data")?)?;
+    let raw = match form.as_str() {
+        "coo" => coordinates(&mut archive, n, &data.values, path)?,
+        "csc" | "csr" => {
+            let indices = npy::read_integers(&archive.member("indices")?)?;
+            same_length(&data.values, &indices, "indices")?;
+            let pointers = npy::read_integers(&archive.member("indptr")?)?;
+            let compressed = Compressed {
+                n,
+                by_rows: form == "csr",
+                pointers: pointers.into_iter().map(|at| u64::try_from(at).unwrap_or(u64::MAX)).collect(),
+                pointers_name: "`indptr`",
+                entries: data.values.len(),
+                entry: &|k| (indices[k], data.values[k]),
+                help: HELP,
+                both_triangles: BOTH_TRIANGLES,
+            };
+            compressed.assemble(path)?
+        }
+        other => {
+            let message = format!("matrix is stored in the form `{}`", other.escape_default());
+            return Err(Diagnostic::new(Code::MatrixKind, message).with_help(HELP));
+        }
+    };
+    Ok(RawMatrix { digits: raw.digits.min(data.digits), ..raw })
+}
+
+/// A matrix in blocks of equal size: `data` (blocks x r x c), the block column of each in `indices`, where each
+/// block row begins in `indptr`.
+fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Result<RawMatrix, Diagnostic> {
+    let wrong = |code, message: String| Err(Diagnostic::new(code, message).with_help(HELP));
+    let npy::Blocks { count, rows, columns, values, digits } = npy::read_blocks(&archive.member("data")?)?;
+    if rows == 0 || columns == 0 || !n.is_multiple_of(rows) || !n.is_multiple_of(columns) {
+        return wrong(
+            Code::MatrixCount,
+            format!("blocks of {rows} x {columns} do not make up {n} rows and columns"),
+        );
+    }
+    let indices = npy::read_integers(&archive.member("indices")?)?;
+    let pointers = npy::read_integers(&archive.member("indptr")?)?;
+    if indices.len() != count {
+        return wrong(Code::MatrixCount, format!("{count} blocks have {} indices", indices.len()));
+    }
+    if pointers.len() != n / rows + 1 {
+        let message = format!(
+            "`indptr` has {} values, expected {} for {} block rows",
+            pointers.len(),
+            n / rows + 1,
+            n / rows
+        );
+        return wrong(Code::MatrixCount, message);
+    }
+    if !pointers.is_sorted() || pointers[0] != 0 || pointers[n / rows] != count as i64 {
+        let message = format!("`indptr` does not rise from 0 to {count}, the number of blocks");
+        return wrong(Code::MatrixSyntax, message);
+    }
+    let (mut pieces, mut check) = (Vec::new(), EntryCheck::new(n, HELP));
+    for (block_row, pair) in pointers.windows(2).enumerate() {
+        for block in pair[0] as usize..pair[1] as usize {
+            let own = &values[block * rows * columns..(block + 1) * rows * columns];
+            for (k, &value) in own.iter().enumerate() {
+                // Zeros fill the blocks up: they are no entries, and an index outside of the matrix is one all the same.
+                let row = (block_row * rows + k / columns) as i64;
+                let column =
+                    indices[block].saturating_mul(columns as i64).saturating_add((k % columns) as i64);
+                push(&mut pieces, check.entry(row, column, value)?);
+            }
+        }
+    }
+    let raw = match undeclared_triangle(check.sides, |_| BOTH_TRIANGLES.into()) {
+        Some(triangle) => return Err(triangle),
+        None => assemble(n, pieces, Storage::Full, 17, path)?,
+    };
+    Ok(RawMatrix { digits: raw.digits.min(digits), ..raw })
+}
+
+fn coordinates(
+    archive: &mut Archive<'_>,
+    n: usize,
+    values: &[f64],
+    path: &Path,
+) -> std::result::Result<RawMatrix, Diagnostic> {
+    let rows = npy::read_integers(&archive.member("row")?)?;
+    let columns = npy::read_integers(&archive.member("col")?)?;
+    same_length(values, &rows, "rows")?;
+    same_length(values, &columns, "columns")?;
+    let (mut pieces, mut check) = (Vec::new(), EntryCheck::new(n, HELP));
+    for ((&row, &column), &value) in rows.iter().zip(&columns).zip(values) {
+        push(&mut pieces, check.entry(row, column, value)?);
+    }
+    match undeclared_triangle(check.sides, |_| BOTH_TRIANGLES.into()) {
+        Some(triangle) => Err(triangle),
+        None => assemble(n, pieces, Storage::Full, 17, path),
+    }
+}
+
+/// Refuses indices that are not as many as there are values, before they are unpacked.
+fn same_count(entries: u64, indices: u64, name: &str) -> std::result::Result<(), Diagnostic> {
+    if entries == indices {
+        return Ok(());
+    }
+    let what = match name {
+        "row" => "rows",
+        "col" => "columns",
+        other => other,
+    };
+    let message = format!("{entries} values have {indices} {what}");
+    Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
+}
+
+fn same_length(values: &[f64], indices: &[i64], what: &str) -> std::result::Result<(), Diagnostic> {
+    if values.len() == indices.len() {
+        return Ok(());
+    }
+    let message = format!("{} values have {} {what}", values.len(), indices.len());
+    Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
+}
+
+struct Archive<'a>(ZipArchive<Cursor<&'a [u8]>>);
+
+impl<'a> Archive<'a> {
+    fn open(bytes: &'a [u8]) -> std::result::Result<Self, Diagnostic> {
+        ZipArchive::new(Cursor::new(bytes)).map(Self).map_err(|error| damaged(&error))
+    }
+
+    fn open_member(&mut self, name: &str) -> std::result::Result<impl Read + use<'_, 'a>, Diagnostic> {
+        self.0.by_name(&format!("{name}.npy")).map_err(|error| match error {
+            zip::result::ZipError::FileNotFound => {
+                let message = format!("archive has no array `{name}`: it is no sparse matrix of SciPy");
+                Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP)
+            }
+            error => damaged(&error),
+        })
+    }
+
+    /// The bytes of the array `name`, checked by its checksum.
+    fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
+        let mut member = self.open_member(name)?;
+        let mut bytes = Vec::new();
+        let mut take = |bytes: &mut Vec<u8>, most: u64| {
+            let more = most.saturating_sub(bytes.len() as u64);
+            member.by_ref().take(more).read_to_end(bytes).map_err(|error| damaged(&error)).map(|_| ())
+        };
+        take(&mut bytes, HEAD_BYTES)?;
+        // What is no array is refused by its begin; of an array no more is unpacked than its header announces.
+        if let Some(announced) = npy::announced_bytes(&bytes) {
+            let refused =
+                refuse_beyond(left(), announced as f64, &format!("the array `{name}`"), MEMORY_HELP);
+            refused.map_err(|error| error.first_error().clone())?;
+            take(&mut bytes, announced.saturating_add(1))?;
+        }
+        Ok(bytes)
+    }
+
+    fn has(&self, name: &str) -> bool {
+        self.0.index_for_name(&format!("{name}.npy")).is_some()
+    }
+
+    /// Number of values that the header of the array `name` announces.
+    fn count(&mut self, name: &str) -> std::result::Result<u64, Diagnostic> {
+        let mut member = self.open_member(name)?;
+        let mut bytes = Vec::new();
+        member.by_ref().take(HEAD_BYTES).read_to_end(&mut bytes).map_err(|error| damaged(&error))?;
+        npy::announced_values(&bytes)
+    }
+}
+
+fn damaged(error: &dyn std::fmt::Display) -> Diagnostic {
+    Diagnostic::new(Code::FileCompressionBroken, format!("archive is damaged: {error}")).with_help(HELP)
+}

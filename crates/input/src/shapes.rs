@@ -1,0 +1,133 @@
+//! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by
+//! content. Shapes come also by nodes, as FE programs write modes.
+
+use super::array::Array;
+use super::hdf5::Hdf5;
+use super::matrix_market::MatrixMarket;
+use super::mode_files::read_modes;
+use super::model_files::MatrixLocation;
+use super::reader::{HEAD, Reader};
+use super::{hdf5, matrix_market, npy};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::provenance::SourceFile;
+use flexbody_base::text::compression::Compression;
+use flexbody_base::text::input_file::InputFile;
+use flexbody_model::{RawModes, RawShapes};
+
+/// Shapes as a file has them.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ImportedColumns {
+    /// By matrix rows.
+    Rows(RawShapes),
+    /// By nodes, with eigenvalues.
+    Modes(RawModes),
+}
+
+/// Reads shapes by rows, of which there may be as many as one of `counts`, or by nodes. `role` names the file in
+/// the provenance.
+///
+/// # Errors
+/// Those of [`read_shapes`]; FB128 and FB306 for files of modes.
+pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<ImportedColumns> {
+    let file = InputFile::open_unread(&location.path)?;
+    match read_modes(&file, role).filter(|_| location.group.is_none()) {
+        Some(modes) => modes.map(ImportedColumns::Modes).map_err(Error::new),
+        None => read_shapes(location, counts, role).map(ImportedColumns::Rows),
+    }
+}
+
+/// Reads shapes or loads: an array n x k, or k x n, where n is one of `counts` (the numbers of rows that the files
+/// of a model have) and k is none. `role` names the file in the provenance.
+///
+/// # Errors
+/// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.
+pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<RawShapes> {
+    let file = InputFile::open_unread(&location.path)?;
+    let path = file.path();
+    let array = read(&file, location.group.as_deref());
+    file.refuse_changed()?;
+    let array = array.and_then(|array| oriented(array, counts).map_err(|diagnostic| vec![diagnostic]));
+    let (matrix, digits) =
+        array.map_err(|found| Error::new(found.into_iter().map(|d| d.in_file(path)).collect()))?;
+    let source = Some(SourceFile::new(role, path, file.sha256()?));
+    Ok(RawShapes { matrix, digits, path: path.to_path_buf(), source })
+}
+
+fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
+    let compression = Compression::of(file.bytes());
+    let head = compression.head(file, HEAD);
+    let packed = compression != Compression::None;
+    if !packed && Hdf5.recognises(&head) {
+        return hdf5::read_array(file, dataset);
+    }
+    if let Some(dataset) = dataset {
+        let message = format!("dataset `{dataset}` is named, but the file is not HDF5");
+        return Err(vec![Diagnostic::new(Code::Hdf5Layout, message).with_help("give the file alone")]);
+    }
+    if MatrixMarket.recognises(&head) {
+        return matrix_market::read_array(file, compression);
+    }
+    if !packed && npy::recognises(&head) {
+        file.load().map_err(|diagnostic| vec![diagnostic])?;
+        return npy::read(file.bytes()).map_err(|diagnostic| vec![diagnostic]);
+    }
+    let start = &head[..head.len().min(24)];
+    let what = if packed && (npy::recognises(&head) || Hdf5.recognises(&head)) {
+        "file is compressed as a whole".to_owned()
+    } else {
+        format!("file begins with `{}`", start.escape_ascii())
+    };
+    Err(vec![Diagnostic::new(Code::FileFormatUnknown, what).with_help(
+        "give a NumPy array (.npy), an HDF5 file (FILE.h5:/dataset) or a Matrix Market array (.mtx)",
+    )])
+}
+
+/// The array with one shape in each column, and its digits.
+fn oriented(array: Array, counts: &[usize]) -> std::result::Result<(Mat<f64>, u8), Diagnostic> {
+    let Array { rows, cols, row_major, values, digits } = array;
+    let upright = match (counts.contains(&rows), counts.contains(&cols)) {
+        (true, false) => true,
+        (false, true) => false,
+        (true, true) => {
+            let message = format!("array is {rows} x {cols}: its rows and its columns may be the shapes");
+            return Err(Diagnostic::new(Code::ShapesSize, message).with_help("give fewer shapes"));
+        }
+        (false, false) => {
+            let mut counts: Vec<String> = counts.iter().map(usize::to_string).collect();
+            counts.dedup();
+            let message = format!("array is {rows} x {cols}, the matrices have {} rows", counts.join(" or "));
+            return Err(Diagnostic::new(Code::ShapesSize, message));
+        }
+    };
+    let (n, k) = if upright { (rows, cols) } else { (cols, rows) };
+    // Shapes follow each other: row by row in an array of rows, column by column in one of columns.
+    let one_by_one = row_major != upright;
+    let at = |i: usize, j: usize| if one_by_one { j * n + i } else { i * k + j };
+    Ok((Mat::from_fn(n, k, |i, j| values[at(i, j)]), digits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_orientation_and_order_gives_the_same_columns() {
+        let value = |i: usize, j: usize| (10 * i + j) as f64;
+        let expected = Mat::from_fn(7, 2, value);
+        for (rows, cols) in [(7, 2), (2, 7)] {
+            let entry = |r: usize, c: usize| if rows == 7 { value(r, c) } else { value(c, r) };
+            for row_major in [true, false] {
+                let values =
+                    (0..14)
+                        .map(|at| {
+                            if row_major { entry(at / cols, at % cols) } else { entry(at % rows, at / rows) }
+                        })
+                        .collect();
+                let array = Array { rows, cols, row_major, values, digits: 17 };
+                assert_eq!(oriented(array, &[7]), Ok((expected.clone(), 17)));
+            }
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The three tables: nodes, labels of the matrix rows, nodes of an interface.
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::table::{BadRows, Column, Table, integer, printable};
+use flexbody_model::{DofLabel, Nodes};
+use std::collections::HashMap;
+
+type Found<T> = Result<T, Vec<Diagnostic>>;
+
+const fn column(name: &'static str, required: bool) -> Column {
+    Column { name, required }
+}
+
+/// Reads `node,x,y,z` (`dimension` 2: `node,x,y`, with z = 0 where there is a column z).
+pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
+    let plane = dimension == 2;
+    let columns = [column("node", true), column("x", true), column("y", true), column("z", !plane)];
+    let table = Table::open(file, &columns).map_err(|d| {
+        vec![if d.message() == "column `z` is missing" {
+            d.with_help("the first line names the columns: `node,x,y,z`; a plane model says `dimension = 2` in [model]")
+        } else {
+            d
+        }]
+    })?;
+    let has_z = table.has(3);
+    let rows = table.rows(|line, fields| {
+        let node = node_number(fields[0])?;
+        let mut position = [0.0; 3];
+        for (k, axis) in ["x", "y", "z"].iter().enumerate().take(if has_z { 3 } else { 2 }) {
+            position[k] = coordinate(node, axis, fields[k + 1])?;
+        }
+        if plane && position[2] != 0.0 {
+            let message = format!("node {node} has z = {} in a plane model", position[2]);
+            return Err(Diagnostic::new(Code::TableRow, message).with_help("plane models lie in z = 0"));
+        }
+        Ok((node, line, position))
+    })?;
+    no_duplicates(file, rows.iter().map(|&(node, line, _)| (node, line)))?;
+    Ok(Nodes { ids: rows.iter().map(|r| r.0).collect(), positions: rows.iter().map(|r| r.2).collect() })
+}
+
+/// Reads `node,dir` or `row,node,dir`; the labels come in the order of the matrix rows.
+pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
+    let columns = [column("node", true), column("dir", true), column("row", false)];
+    let table = Table::open(file, &columns)
+        .map_err(|d| vec![d.with_help("the first line names the columns: `node,dir` or `row,node,dir`")])?;
+    let numbered = table.has(2);
+    let rows = table.rows(|line, fields| {
+        let node = node_number(fields[0])?;
+        let direction = match integer(fields[1]) {
+            Some(direction @ 1..=6) => direction as u8,
+            _ => {
+                let message =
+                    format!("direction of node {node} is `{}`, expected 1 to 6", printable(fields[1]));
+                return Err(Diagnostic::new(Code::DofDirection, message));
+            }
+        };
+        let row = match (numbered, integer(fields[2])) {
+            (false, _) => 0,
+            (true, Some(row)) => row,
+            (true, None) => {
+                let message = format!("row number is `{}`", printable(fields[2]));
+                return Err(
+                    Diagnostic::new(Code::TableRow, message).with_help("rows are whole numbers from 0")
+                );
+            }
+        };
+        Ok((row, line, DofLabel { node, direction }))
+    })?;
+    if numbered { by_row(file, &rows) } else { Ok(rows.into_iter().map(|r| r.2).collect()) }
+}
+
+/// Puts labels into the order of their row numbers, which must be 0 to n - 1, each once.
+fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLabel>> {
+    let n = rows.len();
+    let mut at: Vec<Option<usize>> = vec![None; n];
+    let mut bad = BadRows::new(file.path());
+    let from_one = rows.iter().all(|r| r.0 >= 1) && rows.iter().any(|r| r.0 == n as i64);
+    for (k, &(row, line, _)) in rows.iter().enumerate() {
+        let slot = usize::try_from(row).ok().and_then(|row| at.get_mut(row));
+        let message = match slot {
+            Some(slot @ None) => {
+                *slot = Some(k);
+                continue;
+            }
+            Some(Some(first)) => format!("row {row} is given twice, first on line {}", rows[*first].1),
+            None => format!("row {row} is out of range, {n} rows are numbered 0 to {}", n - 1),
+        };
+        let diagnostic = Diagnostic::new(Code::DofRowOrder, message).at_line(line);
+        bad.add(if from_one {
+            diagnostic.with_help("the rows are numbered from 1: number them from 0")
+        } else {
+            diagnostic
+        });
+    }
+    bad.finish()?;
+    Ok(at.into_iter().flatten().map(|k| rows[k].2).collect())
+}
+
+/// Reads the column `node`.
+pub(super) fn read_node_list(file: &InputFile) -> Found<Vec<i64>> {
+    let table = Table::open(file, &[column("node", true)]).map_err(|d| vec![d])?;
+    let rows = table.rows(|line, fields| Ok((node_number(fields[0])?, line)))?;
+    no_duplicates(file, rows.iter().copied())?;
+    Ok(rows.into_iter().map(|r| r.0).collect())
+}
+
+/// Reads `node,mass`.
+pub(super) fn read_masses(file: &InputFile) -> Found<Vec<(i64, f64)>> {
+    let columns = [column("node", true), column("mass", true)];
+    let table = Table::open(file, &columns)
+        .map_err(|d| vec![d.with_help("the first line names the columns: `node,mass`")])?;
+    let rows = table.rows(|line, fields| {
+        let node = node_number(fields[0])?;
+        match fast_float2::parse::<f64, _>(fields[1]) {
+            Ok(mass) if mass.is_finite() => Ok((node, line, mass)),
+            _ => {
+                let message =
+                    format!("mass of node {node} is `{}`, expected a finite number", printable(fields[1]));
+                Err(Diagnostic::new(Code::LumpedMassTable, message))
+            }
+        }
+    })?;
+    no_duplicates(file, rows.iter().map(|&(node, line, _)| (node, line)))?;
+    Ok(rows.into_iter().map(|(node, _, mass)| (node, mass)).collect())
+}
+
+fn node_number(field: &[u8]) -> Result<i64, Diagnostic> {
+    integer(field).ok_or_else(|| {
+        Diagnostic::new(
+            Code::TableRow,
+            format!("node number is `{}`, expected a whole number", printable(field)),
+        )
+    })
+}
+
+fn coordinate(node: i64, axis: &str, field: &[u8]) -> Result<f64, Diagnostic> {
+    let message = || format!("{axis} of node {node} is `{}`", printable(field));
+    match fast_float2::parse::<f64, _>(field) {
+        Ok(value) if value.is_finite() => Ok(value),
+        Ok(_) => Err(Diagnostic::new(Code::CoordinateNotFinite, message())),
+        Err(_) => {
+            let diagnostic = Diagnostic::new(Code::TableRow, format!("{}, expected a number", message()));
+            Err(if field.contains(&b',') {
+                diagnostic.with_help("write numbers with a decimal point")
+            } else {
+                diagnostic
+            })
+        }
+    }
+}
+
+fn no_duplicates(file: &InputFile, nodes: impl Iterator<Item = (i64, usize)>) -> Found<()> {
+    let mut bad = BadRows::new(file.path());
+    let mut first: HashMap<i64, usize> = HashMap::with_capacity(nodes.size_hint().0);
+    for (node, line) in nodes {
+        if let Some(before) = first.insert(node, line) {
+            let message = format!("node {node} is given again, before on line {before}");
+            bad.add(Diagnostic::new(Code::NodeDuplicate, message).at_line(line));
+        }
+    }
+    bad.finish()
+}

@@ -1,0 +1,49 @@
+//! HDF5 files where the library was built without HDF5: recognised, and refused by name.
+
+use super::array::Array;
+use super::reader::{MatrixSource, Reader};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::text::input_file::{InputFile, is_hdf5};
+use flexbody_model::{Elements, Nodes, RawMatrix};
+
+/// In the place of the HDF5 reader.
+pub(super) struct Hdf5;
+
+impl Reader for Hdf5 {
+    fn name(&self) -> &'static str {
+        "HDF5"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn recognises(&self, head: &[u8]) -> bool {
+        is_hdf5(head)
+    }
+
+    fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix> {
+        Err(Error::from(left_out().in_file(source.file.path())))
+    }
+}
+
+/// In the place of reading an array of shapes.
+pub(super) fn read_array(_: &InputFile, _: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
+    Err(vec![left_out()])
+}
+
+/// Sets of node numbers by name.
+type NamedSets = Vec<(String, Vec<i64>)>;
+
+/// In the place of reading the nodes of an Exodus file.
+pub(super) fn read_exodus(
+    _: &InputFile,
+) -> std::result::Result<(Nodes, NamedSets, Elements), Vec<Diagnostic>> {
+    Err(vec![left_out()])
+}
+
+fn left_out() -> Diagnostic {
+    let message = "file is HDF5, which this build of flexbody leaves out";
+    Diagnostic::new(Code::FileFormatUnknown, message).with_help("build it with the feature `hdf5`")
+}

@@ -1,0 +1,15 @@
+//! Files of models that are read: formats, manifest, names, damages.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod bombs;
+mod input_fuzz;
+mod input_hdf5;
+mod input_readers;
+mod input_tables;
+mod mesh_files;
+mod model_files;
+mod node_files;
+mod open_matrices;
+mod plausibility;
+mod rotated_nodes;

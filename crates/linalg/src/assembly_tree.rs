@@ -1,0 +1,386 @@
+//! Elimination order and structure of the factor: supernodes on the graph with one vertex per node of the
+//! model, found once for every shift. Positions are places in the elimination order, counted in vertices.
+//!
+//! The structure of column j is that of the matrix below the diagonal, united with those of its children in
+//! the elimination tree without j (Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134). Columns of equal structure
+//! form supernodes; small ones are amalgamated with their parents, where few explicit zeros buy larger dense
+//! blocks (Ashcraft and Grimes, ACM TOMS 15 (1989) 291, with the thresholds of CHOLMOD).
+
+use std::ops::Range;
+
+/// No parent: the root of a tree.
+const NONE: u32 = u32::MAX;
+
+/// Adjacency lists of a graph without self loops.
+#[derive(Debug)]
+pub(crate) struct Graph {
+    /// Begin of each vertex's neighbours; one more at the end.
+    pub pointers: Vec<i32>,
+    /// Neighbours.
+    pub neighbours: Vec<i32>,
+}
+
+impl Graph {
+    /// Number of vertices.
+    pub(crate) fn len(&self) -> usize {
+        self.pointers.len() - 1
+    }
+
+    fn neighbours(&self, vertex: usize) -> &[i32] {
+        &self.neighbours[self.pointers[vertex] as usize..self.pointers[vertex + 1] as usize]
+    }
+}
+
+/// The supernodes in elimination order: children before parents, every subtree contiguous.
+#[derive(Debug)]
+pub(crate) struct AssemblyTree {
+    /// Vertex at each position.
+    order: Vec<u32>,
+    /// Position of each vertex.
+    position: Vec<u32>,
+    /// First position of each supernode; one more at the end.
+    begin: Vec<u32>,
+    /// Begin of each supernode's rows; one more at the end.
+    rows_at: Vec<usize>,
+    /// Positions below the columns of each supernode, ascending.
+    rows: Vec<u32>,
+    /// For each of them, its place in the front of the parent.
+    places: Vec<u32>,
+    parent: Vec<u32>,
+    children_at: Vec<u32>,
+    children: Vec<u32>,
+}
+
+impl AssemblyTree {
+    /// Structure of the factor of a matrix with this graph, eliminated in `order` up to postordering.
+    pub(crate) fn new(graph: &Graph, order: &[u32], block: usize) -> Self {
+        let columns = EliminationTree::new(graph, order);
+        let fundamental = Supernode::fundamental(graph, &columns);
+        Self::assemble(&columns, amalgamate(fundamental, block))
+    }
+
+    /// Numbers the supernodes in postorder and their columns with them.
+    fn assemble(columns: &EliminationTree, supernodes: Vec<Supernode>) -> Self {
+        let count = supernodes.len();
+        let vertices = columns.order.len();
+        let mut children: Vec<Vec<u32>> = vec![Vec::new(); count];
+        let mut roots = Vec::new();
+        for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| !s.columns.is_empty()) {
+            match s.parent {
+                NONE => roots.push(i as u32),
+                parent => children[parent as usize].push(i as u32),
+            }
+        }
+        sort_for_memory(&supernodes, &mut children);
+        let sequence = postorder(&roots, |s| &children[s as usize]);
+        let mut number = vec![NONE; count];
+        for (new, &old) in sequence.iter().enumerate() {
+            number[old as usize] = new as u32;
+        }
+        let mut renumbered = vec![NONE; vertices];
+        let (mut order, mut begin) = (Vec::with_capacity(vertices), vec![0]);
+        for &s in &sequence {
+            for &column in &supernodes[s as usize].columns {
+                renumbered[column as usize] = order.len() as u32;
+                order.push(columns.order[column as usize]);
+            }
+            begin.push(order.len() as u32);
+        }
+        let mut position = vec![0; vertices];
+        for (place, &vertex) in order.iter().enumerate() {
+            position[vertex as usize] = place as u32;
+        }
+        let (mut rows, mut rows_at) = (Vec::new(), vec![0]);
+        let mut parent = Vec::with_capacity(sequence.len());
+        for &s in &sequence {
+            let s = &supernodes[s as usize];
+            let start = rows.len();
+            rows.extend(s.rows.iter().map(|&row| renumbered[row as usize]));
+            rows[start..].sort_unstable();
+            rows_at.push(rows.len());
+            parent.push(if s.parent == NONE { NONE } else { number[s.parent as usize] });
+        }
+        let (children_at, children) = children_of(&parent);
+        let mut tree =
+            Self { order, position, begin, rows_at, rows, places: Vec::new(), parent, children_at, children };
+        tree.places = (0..tree.len()).flat_map(|s| tree.places_in_parent(s)).collect();
+        tree
+    }
+
+    fn places_in_parent(&self, s: usize) -> Vec<u32> {
+        let Some(parent) = self.parent(s) else { return Vec::new() };
+        let columns = self.columns(parent);
+        let below = self.rows(parent);
+        let mut at = 0;
+        let place = |&row: &u32| {
+            if (row as usize) < columns.end {
+                return row - columns.start as u32;
+            }
+            while below[at] != row {
+                at += 1;
+            }
+            (columns.len() + at) as u32
+        };
+        self.rows(s).iter().map(place).collect()
+    }
+
+    /// Rows of the front of `s` that are eliminated, and those below them, with `block` rows per vertex.
+    pub(crate) fn front(&self, s: usize, block: usize) -> (usize, usize) {
+        (self.columns(s).len() * block, self.rows(s).len() * block)
+    }
+
+    /// Number of supernodes.
+    pub(crate) fn len(&self) -> usize {
+        self.parent.len()
+    }
+
+    /// Positions of the columns of a supernode.
+    pub(crate) fn columns(&self, s: usize) -> Range<usize> {
+        self.begin[s] as usize..self.begin[s + 1] as usize
+    }
+
+    /// Positions of the rows below the columns of a supernode, ascending.
+    pub(crate) fn rows(&self, s: usize) -> &[u32] {
+        &self.rows[self.rows_at[s]..self.rows_at[s + 1]]
+    }
+
+    /// Places of those rows in the front (columns, then rows) of the parent.
+    pub(crate) fn places(&self, s: usize) -> &[u32] {
+        &self.places[self.rows_at[s]..self.rows_at[s + 1]]
+    }
+
+    /// The supernode that takes the contribution of `s`.
+    pub(crate) fn parent(&self, s: usize) -> Option<usize> {
+        (self.parent[s] != NONE).then_some(self.parent[s] as usize)
+    }
+
+    /// The supernodes that contribute to `s`, ascending.
+    pub(crate) fn children(&self, s: usize) -> &[u32] {
+        &self.children[self.children_at[s] as usize..self.children_at[s + 1] as usize]
+    }
+
+    /// Vertex at each position.
+    pub(crate) fn order(&self) -> &[u32] {
+        &self.order
+    }
+
+    /// Position of each vertex.
+    pub(crate) fn position(&self) -> &[u32] {
+        &self.position
+    }
+}
+
+/// The elimination tree of single columns, renumbered in postorder.
+struct EliminationTree {
+    /// Vertex at each position.
+    order: Vec<u32>,
+    position: Vec<u32>,
+    parent: Vec<u32>,
+}
+
+impl EliminationTree {
+    fn new(graph: &Graph, order: &[u32]) -> Self {
+        let n = graph.len();
+        let mut position = vec![0u32; n];
+        for (place, &vertex) in order.iter().enumerate() {
+            position[vertex as usize] = place as u32;
+        }
+        // Liu's algorithm with path compression.
+        let (mut parent, mut ancestor) = (vec![NONE; n], vec![NONE; n]);
+        for j in 0..n as u32 {
+            for &neighbour in graph.neighbours(order[j as usize] as usize) {
+                let mut i = position[neighbour as usize];
+                while i < j {
+                    let next = std::mem::replace(&mut ancestor[i as usize], j);
+                    if next == NONE {
+                        parent[i as usize] = j;
+                        break;
+                    }
+                    i = next;
+                }
+            }
+        }
+        let (at, children) = children_of(&parent);
+        let roots: Vec<u32> = (0..n as u32).filter(|&j| parent[j as usize] == NONE).collect();
+        let sequence = postorder(&roots, |j| &children[at[j as usize] as usize..at[j as usize + 1] as usize]);
+        let mut number = vec![NONE; n];
+        for (new, &old) in sequence.iter().enumerate() {
+            number[old as usize] = new as u32;
+        }
+        let renumbered = |p: u32| if p == NONE { NONE } else { number[p as usize] };
+        Self {
+            order: sequence.iter().map(|&old| order[old as usize]).collect(),
+            position: position.iter().map(|&old| number[old as usize]).collect(),
+            parent: sequence.iter().map(|&old| renumbered(parent[old as usize])).collect(),
+        }
+    }
+}
+
+/// Columns of equal structure. One without columns has been amalgamated.
+struct Supernode {
+    columns: Vec<u32>,
+    /// Rows below the last column, in no order.
+    rows: Vec<u32>,
+    parent: u32,
+    /// Explicit zeros that amalgamation has let in, counted in vertices.
+    zeros: f64,
+}
+
+impl Supernode {
+    /// Maximal runs of columns, each the only child of the next and with the same structure.
+    fn fundamental(graph: &Graph, columns: &EliminationTree) -> Vec<Self> {
+        let n = columns.order.len();
+        let (children_at, children) = children_of(&columns.parent);
+        let mut supernodes: Vec<Self> = Vec::new();
+        let mut supernode_of = vec![NONE; n];
+        let mut seen = vec![NONE; n];
+        for j in 0..n {
+            let mut rows: Vec<u32> = Vec::new();
+            seen[j] = j as u32;
+            let mut add = |row: u32| {
+                if seen[row as usize] != j as u32 {
+                    seen[row as usize] = j as u32;
+                    rows.push(row);
+                }
+            };
+            for &neighbour in graph.neighbours(columns.order[j] as usize) {
+                let row = columns.position[neighbour as usize];
+                if row > j as u32 {
+                    add(row);
+                }
+            }
+            let below = &children[children_at[j] as usize..children_at[j + 1] as usize];
+            for &child in below {
+                supernodes[supernode_of[child as usize] as usize].rows.iter().for_each(|&row| add(row));
+            }
+            if let &[only] = below {
+                let index = supernode_of[only as usize];
+                let supernode = &mut supernodes[index as usize];
+                if supernode.rows.len() == rows.len() + 1 {
+                    supernode.columns.push(j as u32);
+                    supernode.rows = rows;
+                    supernode_of[j] = index;
+                    continue;
+                }
+            }
+            for &child in below {
+                supernodes[supernode_of[child as usize] as usize].parent = supernodes.len() as u32;
+            }
+            supernode_of[j] = supernodes.len() as u32;
+            rows.shrink_to_fit();
+            supernodes.push(Self { columns: vec![j as u32], rows, parent: NONE, zeros: 0.0 });
+        }
+        supernodes
+    }
+
+    /// Vertices of the factor: the triangle of `width` columns with `below` rows under it.
+    fn size(width: usize, below: usize) -> f64 {
+        let width = width as f64;
+        width * (0.5 * (width + 1.0) + below as f64)
+    }
+}
+
+/// Merges supernodes into their parents while explicit zeros stay a small part of the block.
+fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
+    let mut children: Vec<Vec<u32>> = vec![Vec::new(); supernodes.len()];
+    for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| s.parent != NONE) {
+        children[s.parent as usize].push(i as u32);
+    }
+    for s in 0..supernodes.len() {
+        let mut candidates = std::mem::take(&mut children[s]);
+        // The child with the most rows shares most of its structure with the parent.
+        candidates.sort_by_key(|&c| (std::cmp::Reverse(supernodes[c as usize].rows.len()), c));
+        let mut kept = Vec::new();
+        for c in candidates {
+            let (child, parent) = (&supernodes[c as usize], &supernodes[s]);
+            let width = child.columns.len() + parent.columns.len();
+            let merged = Supernode::size(width, parent.rows.len());
+            let zeros = child.zeros + parent.zeros + merged
+                - Supernode::size(child.columns.len(), child.rows.len())
+                - Supernode::size(parent.columns.len(), parent.rows.len());
+            let tolerated = match width * block {
+                ..=4 => 1.0,
+                5..=16 => 0.8,
+                17..=48 => 0.1,
+                _ => 0.05,
+            };
+            if zeros > tolerated * merged {
+                kept.push(c);
+                continue;
+            }
+            let mut columns = std::mem::take(&mut supernodes[c as usize].columns);
+            supernodes[c as usize].rows = Vec::new();
+            columns.append(&mut supernodes[s].columns);
+            supernodes[s].columns = columns;
+            supernodes[s].zeros = zeros;
+            for grandchild in std::mem::take(&mut children[c as usize]) {
+                supernodes[grandchild as usize].parent = s as u32;
+                kept.push(grandchild);
+            }
+        }
+        children[s] = kept;
+    }
+    for s in &mut supernodes {
+        s.columns.sort_unstable();
+    }
+    supernodes
+}
+
+/// Puts children first whose subtree needs most memory beyond what they leave (Liu, ACM TOMS 12 (1986) 249).
+fn sort_for_memory(supernodes: &[Supernode], children: &mut [Vec<u32>]) {
+    let mut peak = vec![0.0f64; supernodes.len()];
+    let left = |s: u32| Supernode::size(supernodes[s as usize].rows.len(), 0);
+    // Parents come after their children in this numbering.
+    for s in 0..supernodes.len() {
+        children[s].sort_by(|&a, &b| {
+            let need = |c: u32| peak[c as usize] - left(c);
+            need(b).total_cmp(&need(a)).then(a.cmp(&b))
+        });
+        let mut held = 0.0;
+        let mut most = 0.0f64;
+        for &c in &children[s] {
+            most = most.max(held + peak[c as usize]);
+            held += left(c);
+        }
+        let front = supernodes[s].columns.len() + supernodes[s].rows.len();
+        peak[s] = most.max(held + Supernode::size(front, 0));
+    }
+}
+
+/// Children lists in compressed form, ascending.
+fn children_of(parent: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let n = parent.len();
+    let mut at = vec![0u32; n + 1];
+    for &p in parent.iter().filter(|&&p| p != NONE) {
+        at[p as usize + 1] += 1;
+    }
+    for j in 0..n {
+        at[j + 1] += at[j];
+    }
+    let mut next = at.clone();
+    let mut children = vec![0; at[n] as usize];
+    for (j, &p) in parent.iter().enumerate().filter(|(_, p)| **p != NONE) {
+        children[next[p as usize] as usize] = j as u32;
+        next[p as usize] += 1;
+    }
+    (at, children)
+}
+
+/// Children before parents, without recursion: trees of slender bodies are as deep as they are long.
+fn postorder<'a>(roots: &[u32], children: impl Fn(u32) -> &'a [u32]) -> Vec<u32> {
+    let mut sequence = Vec::new();
+    let mut stack: Vec<(u32, usize)> = Vec::new();
+    for &root in roots {
+        stack.push((root, 0));
+        while let Some((vertex, next)) = stack.last_mut() {
+            if let Some(&child) = children(*vertex).get(*next) {
+                *next += 1;
+                stack.push((child, 0));
+            } else {
+                sequence.push(*vertex);
+                stack.pop();
+            }
+        }
+    }
+    sequence
+}

@@ -1,0 +1,358 @@
+//! K - sigma M = L B L' with pivoting inside the panels of each front, kept to solve with: the dynamic
+//! stiffness at a frequency; and in single precision, to count with.
+
+use super::Pencil;
+use super::contiguous::contiguous_mut;
+use super::factor::{Analysis, COLUMNS, Solve, substitute};
+use super::front::{PANEL, ROWS, Real, Trapezoid};
+use super::inertia::{Blocks, Contribution, Inertia, eliminate_front};
+use super::random::normal;
+use super::substitution::{
+    WORTH_TASKS, solve_lower, solve_transposed, subtract_product, subtract_transposed,
+};
+use super::tall::{Tall, column_norms, subtract_columns};
+use faer::MatMut;
+use faer::prelude::ReborrowMut;
+use rayon::prelude::*;
+use std::convert::Infallible;
+
+/// Factor of the indefinite matrix K - sigma M with numbers of type `T`. It is solved with in double
+/// precision: what it is off from the matrix is the rounding of the factorisation alone.
+pub struct Indefinite<'a, T = f64> {
+    analysis: &'a Analysis,
+    sigma: f64,
+    /// L, and B and the order of the rows in each leading square.
+    fronts: Vec<(Trapezoid<T>, Vec<Blocks<T>>)>,
+    /// Scale of each row.
+    scale: Vec<f64>,
+    inertia: Inertia,
+}
+
+impl<'a, T: Real> Indefinite<'a, T> {
+    /// Factors K - sigma M. Whether the factor is any good its [`Inertia`] tells: no zero pivot, and a small
+    /// backward error; or [`perturbation`](Self::perturbation).
+    pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
+        let tree = &analysis.tree;
+        let matrix = analysis.scaled(pencil, sigma);
+        let mut fronts: Vec<_> = (0..tree.len()).map(|_| None).collect();
+        let visit = |s: usize, slot: &mut Option<_>, children: Vec<Contribution<T>>| {
+            let (eliminated, handed_on) = eliminate_front(analysis, &matrix, s, children);
+            *slot = Some((eliminated.counts(), eliminated.into_factor()));
+            Ok::<_, Infallible>(handed_on)
+        };
+        let Ok(()) = analysis.walk.up(tree, &mut fronts, &visit);
+        let (counts, fronts): (Vec<_>, Vec<_>) = fronts.into_iter().flatten().unzip();
+        let inertia = Inertia::of_fronts::<T>(counts);
+        Self { analysis, sigma, fronts, scale: matrix.scale, inertia }
+    }
+
+    /// Signs of the pivots, and the backward error of the factorisation.
+    pub fn inertia(&self) -> Inertia {
+        self.inertia
+    }
+
+    /// Replaces X (n x k) by (K - sigma M)^-1 X.
+    pub fn solve_in_place(&self, mut x: MatMut<'_, f64>) {
+        let forward = |s: usize, front: &mut [[f64; COLUMNS]]| forward(&self.fronts[s], front);
+        let backward = |s: usize, front: &mut [[f64; COLUMNS]]| backward(&self.fronts[s], front);
+        let mut start = 0;
+        while start < x.ncols() {
+            let width = COLUMNS.min(x.ncols() - start);
+            substitute(self.analysis, &self.scale, x.rb_mut().subcols_mut(start, width), forward, backward);
+            start += width;
+        }
+    }
+
+    /// Whether K - sigma M has the inertia of this factor in spite of its rounding; the number that tells.
+    ///
+    /// With A the matrix and F the product of the factors, both scaled to a diagonal of about one, and
+    /// G = I - F^-1 A: a matrix (1 - t) F + t A between the two is singular only where 1/t is an eigenvalue
+    /// of G. So A has the inertia of F if no eigenvalue of G reaches one, which no norm of a power of G less
+    /// than one permits. The mean square of G^p z over normal vectors z has the square of the Frobenius norm
+    /// of G^p as its mean: were that one, the mean square over `COLUMNS` vectors would be less than 1 /
+    /// `MARGIN`^2 with a probability of 10^-15. Powers tell more than G, whose norm comes from what it
+    /// turns into the modes next to sigma from all others, and is much larger than its eigenvalues.
+    ///
+    /// The norm that was measured, times `MARGIN`; `None` where none of the powers is small enough.
+    pub fn perturbation(&self, pencil: &Pencil<'_>) -> Option<f64> {
+        let n = pencil.n();
+        let [mut z, mut x, mut product, mut heavy] = [(); 4].map(|()| Tall::zeros(n, COLUMNS));
+        for_columns(&mut z, |i, j, z| *z = normal(i as u64, j as u64));
+        let mut before = f64::INFINITY;
+        for _ in 0..POWERS {
+            let (given, scale) = (z.as_ref(), &self.scale);
+            for_columns(&mut x, |i, j, x| *x = scale[i] * given[(i, j)]);
+            pencil.stiffness_times(x.as_ref(), product.as_mut());
+            pencil.mass_times(x.as_ref(), heavy.as_mut());
+            subtract_columns(product.as_mut(), &[self.sigma; COLUMNS], heavy.as_ref());
+            self.solve_in_place(product.as_mut());
+            let solved = product.as_ref();
+            for_columns(&mut z, |i, j, z| *z -= solved[(i, j)] / scale[i]);
+            let squares = column_norms(z.as_ref()).into_iter().map(|norm| norm * norm);
+            let bound = MARGIN * (squares.sum::<f64>() / COLUMNS as f64).sqrt();
+            if bound < 1.0 {
+                return Some(bound);
+            }
+            // Not a number falls neither.
+            let falls = bound < FALLING * before;
+            if !falls {
+                return None;
+            }
+            before = bound;
+        }
+        None
+    }
+}
+
+impl Solve for Indefinite<'_> {
+    fn shift(&self) -> f64 {
+        -self.sigma
+    }
+
+    fn solve_in_place(&self, x: MatMut<'_, f64>) {
+        Self::solve_in_place(self, x);
+    }
+}
+
+/// Calls `change` with row, column and entry of a block, its columns side by side.
+fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync) {
+    let columns: Vec<_> = block.as_mut().col_iter_mut().map(contiguous_mut).collect();
+    columns.into_par_iter().enumerate().for_each(|(j, column)| {
+        column.iter_mut().enumerate().for_each(|(i, entry)| change(i, j, entry));
+    });
+}
+
+/// See [`Indefinite::perturbation`]: the probability that the mean square of eight normal numbers is less
+/// than 10^-4 is 10^-15.
+const MARGIN: f64 = 100.0;
+
+/// Powers of G that are looked at, as long as each is so much smaller than the one before.
+const POWERS: usize = 12;
+const FALLING: f64 = 0.5;
+
+/// Rows of L that are brought to double precision together: they stay in the nearest cache.
+const TOGETHER: usize = 32;
+
+/// Calls `work` with a few rows of L in double precision, as many rows of `below` each time.
+fn for_rows<T: Real, B>(
+    l: &[T],
+    width: usize,
+    below: impl Iterator<Item = B>,
+    mut work: impl FnMut(&[f64], B),
+) {
+    let mut wide = Vec::with_capacity(TOGETHER * width);
+    for (l, below) in l.chunks(TOGETHER * width).zip(below) {
+        work(T::all_wide(l, &mut wide), below);
+    }
+}
+
+/// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows
+/// below.
+fn forward<T: Real, const K: usize>(
+    (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
+    values: &mut [[f64; K]],
+) {
+    for (p, block) in blocks.iter().enumerate() {
+        let (first, width) = (p * PANEL, columns.panel_width(p));
+        let (own, below) = values[first..].split_at_mut(width);
+        let mut y: Vec<[f64; K]> = block.order.iter().map(|&row| own[row]).collect();
+        let (triangle, l) = columns.panels[p].split_at(width * width);
+        solve_lower(T::all_wide(triangle, &mut Vec::new()), &mut y);
+        own.copy_from_slice(&y);
+        let piece = |l: &[T], below: &mut [[f64; K]]| {
+            for_rows(l, width, below.chunks_mut(TOGETHER), |l, below| subtract_product(l, &y, below));
+        };
+        if l.len() < WORTH_TASKS {
+            piece(l, below);
+        } else {
+            let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks_mut(ROWS));
+            pieces.for_each(|(l, below)| piece(l, below));
+        }
+    }
+}
+
+/// Leading rows x with B L' x = y, back in the order of the front; the rows below are known.
+fn backward<T: Real, const K: usize>(
+    (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
+    values: &mut [[f64; K]],
+) {
+    for (p, block) in blocks.iter().enumerate().rev() {
+        let (first, width) = (p * PANEL, columns.panel_width(p));
+        let (own, below) = values[first..].split_at_mut(width);
+        let mut y = own.to_vec();
+        let mut column = vec![0.0; width];
+        for k in 0..K {
+            column.iter_mut().zip(&y).for_each(|(to, from)| *to = from[k]);
+            block.divide(&mut column);
+            y.iter_mut().zip(&column).for_each(|(to, from)| to[k] = *from);
+        }
+        let piece = |l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]| {
+            for_rows(l, width, below.chunks(TOGETHER), |l, below| subtract_transposed(l, below, y));
+        };
+        let (triangle, l) = columns.panels[p].split_at(width * width);
+        if l.len() < WORTH_TASKS {
+            piece(l, below, &mut y);
+        } else {
+            let pieces = l.par_chunks(ROWS * width).zip(below.par_chunks(ROWS));
+            let parts = pieces.map(|(l, below)| {
+                let mut part = vec![[0.0; K]; width];
+                piece(l, below, &mut part);
+                part
+            });
+            for part in parts.collect::<Vec<_>>() {
+                for (y, part) in y.iter_mut().zip(&part) {
+                    y.iter_mut().zip(part).for_each(|(y, part)| *y += part);
+                }
+            }
+        }
+        solve_transposed(T::all_wide(triangle, &mut Vec::new()), &mut y);
+        for (&row, x) in block.order.iter().zip(&y) {
+            own[row] = *x;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{CscMatrix, SymmetricMatrix, symmetric_eigen};
+    use faer::Mat;
+
+    /// A chain of `n` masses with springs of changing stiffness along it and, every seventh, one to a mass
+    /// far away.
+    fn chain(n: usize) -> [SymmetricMatrix; 2] {
+        let (mut k, mut m) = (Vec::new(), Vec::new());
+        let mut spring = |i: usize, j: usize, c: f64| {
+            let (i, j) = (i as u32, j as u32);
+            k.extend([(i, i, c), (j, j, c), (i, j, -c), (j, i, -c)]);
+        };
+        for i in 0..n - 1 {
+            spring(i, i + 1, 1.0 + (i % 5) as f64);
+            if i % 7 == 0 && i + 13 < n {
+                spring(i, i + 13, 0.3);
+            }
+        }
+        for i in 0..n {
+            m.push((i as u32, i as u32, 1.0 + (i % 3) as f64));
+        }
+        [k, m].map(|t| SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &t)))
+    }
+
+    /// Solutions fulfil their equations between, below and above all eigenvalues, with one and several panels
+    /// in a front.
+    #[test]
+    fn solutions_fulfil_their_equations() {
+        for (n, block) in [(1, 1), (9, 3), (90, 1), (300, 2)] {
+            // With a front of all rows: nothing is sparse.
+            for full in [false, true] {
+                let [mut k, m] = chain(n.max(2));
+                let n = m.n();
+                if full {
+                    let all: Vec<_> = (0..n as u32)
+                        .flat_map(|i| (0..n as u32).map(move |j| (i, j, 1.0 / f64::from(1 + i + j))))
+                        .chain((0..n).flat_map(|j| {
+                            let (rows, values) = k.row(j);
+                            rows.iter().zip(values).map(|(&i, &v)| (i, j as u32, v)).collect::<Vec<_>>()
+                        }))
+                        .collect();
+                    k = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &all));
+                }
+                let spread: Vec<_> = (0..n)
+                    .flat_map(|j| {
+                        let (rows, values) = k.row(j);
+                        let pairs = rows.iter().zip(values);
+                        pairs
+                            .flat_map(|(&i, &v)| (0..block).map(move |b| (i, b, v)))
+                            .map(move |(i, b, v)| (i * block as u32 + b as u32, (j * block + b) as u32, v))
+                            .collect::<Vec<_>>()
+                    })
+                    .collect();
+                let k = SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n * block, n * block, &spread));
+                let pencil = Pencil::new(&k, &m, block);
+                let analysis = Analysis::new(&pencil).expect("small");
+                for sigma in [0.0731, 1.37, 5.91, 400.0] {
+                    let factor = Indefinite::<f64>::new(&analysis, &pencil, sigma);
+                    let b = Mat::from_fn(n * block, 11, |i, j| ((i * 31 + j * 17) % 23) as f64 - 11.0);
+                    let mut x = b.clone();
+                    factor.solve_in_place(x.as_mut());
+                    let product = pencil.apply_stiffness(x.as_ref())
+                        - pencil.apply_mass(x.as_ref()) * faer::Scale(sigma);
+                    let scale = 100.0 * (1.0 + sigma) * x.norm_max() + b.norm_max();
+                    assert!((&product - &b).norm_max() < 1e-13 * scale, "{n} {block} {full} {sigma}");
+                    // The count of another path.
+                    assert_eq!(factor.inertia(), Inertia::new(&analysis, &pencil, sigma));
+                    let dense = Mat::from_fn(n, n, |i, j| {
+                        let at = |a: &SymmetricMatrix| a.as_csc().get(i, j);
+                        let root = |i: usize| m.as_csc().get(i, i).sqrt();
+                        (k.as_csc().get(i * block, j * block) - sigma * at(&m)) / root(i) / root(j)
+                    });
+                    let eigen = symmetric_eigen(dense.as_ref()).expect("finite");
+                    let negative = eigen.values.iter().filter(|v| **v < 0.0).count();
+                    assert_eq!(factor.inertia().negative, block * negative, "{n} {block} {full} {sigma}");
+                }
+            }
+        }
+    }
+
+    /// Eigenvalues of the chain, ascending.
+    fn eigenvalues([k, m]: &[SymmetricMatrix; 2]) -> Vec<f64> {
+        let root = |i: usize| m.as_csc().get(i, i).sqrt();
+        let dense = Mat::from_fn(k.n(), k.n(), |i, j| k.as_csc().get(i, j) / root(i) / root(j));
+        symmetric_eigen(dense.as_ref()).expect("finite").values
+    }
+
+    /// A count in single precision is never sure of a wrong number, is sure where the shift is well between
+    /// two eigenvalues, and unsure where rounding moves one across.
+    #[test]
+    fn counts_in_single_precision_know_how_far_they_go() {
+        for n in [40, 700] {
+            let matrices = chain(n);
+            let eigenvalues = eigenvalues(&matrices);
+            let pencil = Pencil::new(&matrices[0], &matrices[1], 1);
+            let analysis = Analysis::new(&pencil).expect("small");
+            let (mut sure, mut unsure) = (0, 0);
+            for at in [0, 1, 3, n / 8, n / 2] {
+                let (below, above) = (eigenvalues[at], eigenvalues[at + 1]);
+                for part in [0.5, 1e-2, 1e-4, 1e-6, 1e-8] {
+                    for sigma in [below + part * (above - below), above - part * (above - below)] {
+                        let factor = Indefinite::<f32>::new(&analysis, &pencil, sigma);
+                        let counted = factor.inertia().negative;
+                        match factor.perturbation(&pencil) {
+                            Some(rounding) => {
+                                assert_eq!(counted, at + 1, "{n} rows, {sigma:e}: {rounding}");
+                                sure += 1;
+                            }
+                            None => {
+                                assert!(part < 0.1, "{n} rows, {sigma:e}: unsure in the middle of a gap");
+                                unsure += 1;
+                            }
+                        }
+                    }
+                }
+            }
+            assert!(sure >= 10 && unsure >= 5, "{n} rows: {sure} sure, {unsure} unsure");
+        }
+    }
+
+    /// What is measured is the rounding of the factor: none of it in double precision, and in single as much
+    /// as the spectrum of I - F^-1 A has, which dense algebra finds.
+    #[test]
+    fn the_rounding_of_a_count_is_measured() {
+        let matrices = chain(60);
+        let pencil = Pencil::new(&matrices[0], &matrices[1], 1);
+        let analysis = Analysis::new(&pencil).expect("small");
+        let sigma = 1.37;
+        let double = Indefinite::<f64>::new(&analysis, &pencil, sigma);
+        assert!(double.perturbation(&pencil).expect("sure") < 1e-9);
+        let single = Indefinite::<f32>::new(&analysis, &pencil, sigma);
+        let measured = single.perturbation(&pencil).expect("sure") / MARGIN;
+        let scale = |i: usize| single.scale[i];
+        let unit = Mat::from_fn(60, 60, |i, j| if i == j { scale(i) } else { 0.0 });
+        let mut g =
+            pencil.apply_stiffness(unit.as_ref()) - pencil.apply_mass(unit.as_ref()) * faer::Scale(sigma);
+        single.solve_in_place(g.as_mut());
+        let g = Mat::from_fn(60, 60, |i, j| f64::from(u8::from(i == j)) - g[(i, j)] / scale(i));
+        let true_norm = g.norm_l2();
+        assert!(measured > 0.3 * true_norm && measured < 3.0 * true_norm, "{measured:e} {true_norm:e}");
+    }
+}

@@ -1,0 +1,244 @@
+//! Corrections of approximate modes: conjugate gradients for (K - theta M) t = r on what is M-orthogonal to the
+//! mode itself, with cycles as preconditioner (the correction equation of Sleijpen and van der Vorst, SIAM J.
+//! Matrix Anal. Appl. 17 (1996) 401). [`Deflation`] keeps off the modes below and treats those above, so that
+//! K - theta M is positive definite on what is left.
+
+use super::blocks::{BlockMatrix, Rows, WIDTH};
+use super::deflation::Deflation;
+use super::smoother::products;
+use crate::contiguous_mut;
+use faer::MatMut;
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Nodes per parallel task.
+const NODES: usize = 512;
+
+/// Steps that a column is waited for at the most.
+const MOST_STEPS: usize = 6;
+
+/// Part of its error that a first step is expected to leave.
+const LEFT_AT_FIRST: f64 = 0.2;
+
+/// Part of the error below which single precision gains nothing more.
+const NOTHING_LEFT: f64 = 1e-4;
+
+/// What is asked of a correction.
+#[derive(Debug, Clone, Copy)]
+pub struct Aim {
+    /// The pair that is corrected, by its number among those that are [near](super::Near).
+    pub pair: usize,
+    /// Part of the error of the correction that may be left.
+    pub left: f64,
+}
+
+/// K + tau M and M in units of single precision.
+pub(super) struct SmallPencil<'a, const B: usize> {
+    /// (K + tau M) / size.
+    pub a: &'a BlockMatrix<B, B>,
+    /// M / heaviest, beside the blocks of `a`.
+    pub mass: &'a [f32],
+    pub tau: f64,
+    /// heaviest / size.
+    pub ratio: f64,
+}
+
+/// The equations of corrections.
+pub(super) struct Corrections<'a, F, const B: usize> {
+    pub pencil: SmallPencil<'a, B>,
+    /// Solves with `a`, roughly.
+    pub cycle: F,
+    pub deflation: Deflation<'a>,
+    /// The eigenvalues of the pairs.
+    pub eigenvalues: &'a [f64],
+}
+
+/// A column that is worked on.
+#[derive(Debug, Clone, Copy)]
+struct Slot {
+    column: usize,
+    aim: Aim,
+    steps: usize,
+    /// r'z at first, and last.
+    first: f64,
+    last: f64,
+    /// Whether the aim is reached, or not waited for any more.
+    is_reached: bool,
+    /// Whether more steps gain anything.
+    is_at_end: bool,
+}
+
+/// Columns in work, and those that wait.
+struct Work<'a, const B: usize> {
+    /// The forces, which their corrections replace.
+    columns: Vec<&'a mut [f64]>,
+    waiting: std::iter::Rev<Range<usize>>,
+    slots: [Option<Slot>; WIDTH],
+    /// What is unbalanced yet, the solution so far, the direction of the last step.
+    r: Vec<Rows<B>>,
+    t: Vec<Rows<B>>,
+    p: Vec<Rows<B>>,
+}
+
+impl<F, const B: usize> Corrections<'_, F, B>
+where
+    F: Fn(&[Rows<B>]) -> Vec<Rows<B>>,
+{
+    /// Replaces each force, of about unit size, by its correction. Columns work beside each other; those that
+    /// have reached their aim go on as long as others are waited for, since that costs nothing. The columns of
+    /// cycles that it took.
+    pub(super) fn solve(&self, aims: &[Aim], forces: MatMut<'_, f64>) -> u64 {
+        let mut work = Work::new(self.pencil.a.n_rows(), forces);
+        let mut columns = 0;
+        loop {
+            work.fill(aims);
+            let active = work.slots.iter().flatten().count();
+            if active == 0 {
+                return columns;
+            }
+            columns += active as u64;
+            self.step(&mut work);
+            work.hand_out();
+        }
+    }
+
+    /// A step of conjugate gradients for all columns in work.
+    fn step(&self, work: &mut Work<'_, B>) {
+        let pairs = work.slots.map(|slot| slot.map(|slot| slot.aim.pair));
+        let mut z = (self.cycle)(&work.r);
+        self.deflation.project(&mut z, &pairs);
+        let rz = products(&work.r, &z);
+        work.turn(&z, &rz);
+        let q = self.applied(&work.p, &pairs);
+        let pq = products(&work.p, &q);
+        work.advance(&q, &rz, &pq);
+    }
+
+    /// (K - theta M) p / size.
+    fn applied(&self, p: &[Rows<B>], pairs: &[Option<usize>; WIDTH]) -> Vec<Rows<B>> {
+        let SmallPencil { a, mass, tau, ratio } = self.pencil;
+        let theta =
+            pairs.map(|pair| pair.map_or(0.0, |pair| ((self.eigenvalues[pair] + tau) * ratio) as f32));
+        a.apply_pencil(mass, &theta, p)
+    }
+}
+
+impl<'a, const B: usize> Work<'a, B> {
+    fn new(nodes: usize, forces: MatMut<'a, f64>) -> Self {
+        let columns: Vec<_> = forces.col_iter_mut().map(contiguous_mut).collect();
+        // The highest first, which take the most steps.
+        let waiting = (0..columns.len()).rev();
+        let [r, t, p] = [(); 3].map(|()| vec![[[0.0; WIDTH]; B]; nodes]);
+        Self { columns, waiting, slots: [None; WIDTH], r, t, p }
+    }
+
+    /// Gives free slots to columns that wait.
+    fn fill(&mut self, aims: &[Aim]) {
+        let Self { columns, waiting, slots, r, t, p } = self;
+        let mut fresh: Vec<(usize, &[f64])> = Vec::new();
+        for (w, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| slot.is_none()) {
+            let Some(column) = waiting.next() else { break };
+            let aim = aims[column];
+            *slot = Some(Slot {
+                column,
+                aim,
+                steps: 0,
+                first: 0.0,
+                last: 0.0,
+                is_reached: false,
+                is_at_end: false,
+            });
+            fresh.push((w, &*columns[column]));
+        }
+        if fresh.is_empty() {
+            return;
+        }
+        let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES);
+        blocks.for_each(|(node, ((r, t), p))| {
+            for &(w, force) in &fresh {
+                for b in 0..B {
+                    r[b][w] = force[node * B + b] as f32;
+                    (t[b][w], p[b][w]) = (0.0, 0.0);
+                }
+            }
+        });
+    }
+
+    /// The direction of the next step: p <- z + beta p.
+    fn turn(&mut self, z: &[Rows<B>], rz: &[f64; WIDTH]) {
+        let mut beta = [0.0f32; WIDTH];
+        for ((slot, &rz), beta) in self.slots.iter_mut().zip(rz).zip(&mut beta) {
+            let Some(slot) = slot else { continue };
+            let mut left = LEFT_AT_FIRST;
+            if slot.steps == 0 {
+                slot.first = rz;
+            } else {
+                *beta = (rz / slot.last) as f32;
+                // As it will be after this step, if it gains what the one before did.
+                left = (rz / slot.first).sqrt() * (rz / slot.last).sqrt();
+            }
+            slot.last = rz;
+            slot.steps += 1;
+            slot.is_reached |= left <= slot.aim.left || slot.steps >= MOST_STEPS;
+            slot.is_at_end = left <= NOTHING_LEFT;
+        }
+        // What is no number is left out.
+        let is_number = rz.map(f64::is_finite);
+        self.p.par_iter_mut().zip(z).with_min_len(NODES).for_each(|(p, z)| {
+            for b in 0..B {
+                for w in 0..WIDTH {
+                    p[b][w] = if is_number[w] { z[b][w] + beta[w] * p[b][w] } else { 0.0 };
+                }
+            }
+        });
+    }
+
+    /// The step along p, with q = (K - theta M) p: a column whose matrix shows itself indefinite ends.
+    fn advance(&mut self, q: &[Rows<B>], rz: &[f64; WIDTH], pq: &[f64; WIDTH]) {
+        let mut alpha = [0.0f32; WIDTH];
+        for (w, slot) in self.slots.iter_mut().enumerate() {
+            let Some(slot) = slot else { continue };
+            if rz[w] > 0.0 && pq[w] > 0.0 {
+                alpha[w] = (rz[w] / pq[w]) as f32;
+                continue;
+            }
+            // What the cycle alone makes is a correction too.
+            alpha[w] = f32::from(u8::from(slot.steps == 1));
+            (slot.is_reached, slot.is_at_end) = (true, true);
+        }
+        let blocks = self.t.par_iter_mut().zip(&mut self.r).zip(&self.p).zip(q).with_min_len(NODES);
+        blocks.for_each(|(((t, r), p), q)| {
+            for b in 0..B {
+                for w in 0..WIDTH {
+                    t[b][w] += alpha[w] * p[b][w];
+                    r[b][w] -= alpha[w] * q[b][w];
+                }
+            }
+        });
+    }
+
+    /// Hands out the columns that nothing more is gained for, those that have reached their aim where others
+    /// wait for their place, and all when all have.
+    fn hand_out(&mut self) {
+        let is_last = self.waiting.len() == 0 && self.slots.iter().flatten().all(|slot| slot.is_reached);
+        let has_others = self.waiting.len() > 0;
+        let ends = |slot: &Slot| is_last || slot.is_at_end || (slot.is_reached && has_others);
+        let Self { columns, slots, r, t, p, .. } = self;
+        let mut ended = Vec::new();
+        for (w, slot) in slots.iter_mut().enumerate() {
+            let Some(Slot { column, .. }) = slot.take_if(|slot| ends(slot)) else { continue };
+            columns[column].par_chunks_mut(B).zip(&*t).with_min_len(NODES).for_each(|(own, t)| {
+                own.iter_mut().zip(t).for_each(|(own, t)| *own = f64::from(t[w]));
+            });
+            ended.push(w);
+        }
+        if ended.is_empty() || is_last {
+            return;
+        }
+        r.par_iter_mut().zip(p).with_min_len(NODES).for_each(|(r, p)| {
+            for &w in &ended {
+                (0..B).for_each(|b| (r[b][w], p[b][w]) = (0.0, 0.0));
+            }
+        });
+    }
+}

@@ -1,0 +1,107 @@
+//! Projection off the modes that are there, in single precision.
+
+use super::blocks::{Rows, WIDTH};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, MatRef, Par};
+use rayon::prelude::*;
+
+/// Rows per partial product.
+const ROWS: usize = 4096;
+
+/// Distance of two eigenvalues, beside one of them, up to which (K - theta M)-orthogonality to the other mode
+/// would divide by too little.
+const NEAR: f64 = 0.1;
+
+/// The modes that corrections are kept apart from.
+pub struct Near<'a> {
+    /// Rigid modes, M-orthonormal, and M times them.
+    pub rigid: [MatRef<'a, f64>; 2],
+    /// Approximate modes, M-orthonormal.
+    pub modes: MatRef<'a, f64>,
+    /// K times the approximate modes.
+    pub k_modes: MatRef<'a, f64>,
+    /// M times the approximate modes.
+    pub m_modes: MatRef<'a, f64>,
+    /// Their eigenvalues, ascending.
+    pub eigenvalues: &'a [f64],
+}
+
+/// They, in single precision.
+pub(super) struct Deflation<'a> {
+    rigid: usize,
+    eigenvalues: &'a [f64],
+    /// Rigid and approximate modes, with a largest entry of one.
+    x: Mat<f32>,
+    /// M times them, and K / `unit` times the approximate ones, divided by what `x` is multiplied by.
+    mx: Mat<f32>,
+    kx: Mat<f32>,
+    unit: f64,
+}
+
+impl<'a> Deflation<'a> {
+    pub(super) fn new(near: &Near<'a>) -> Self {
+        let [rigid, m_rigid] = near.rigid;
+        let sizes: Vec<f64> =
+            [rigid, near.modes].iter().flat_map(|x| x.col_iter()).map(|x| x.norm_max()).collect();
+        let highest = near.eigenvalues.last().copied().unwrap_or(0.0);
+        let unit = if highest > 0.0 { highest } else { 1.0 };
+        Self {
+            rigid: rigid.ncols(),
+            eigenvalues: near.eigenvalues,
+            x: narrow(&[rigid, near.modes], &sizes, |size| 1.0 / size),
+            mx: narrow(&[m_rigid, near.m_modes], &sizes, |size| size),
+            kx: narrow(&[near.k_modes], &sizes[rigid.ncols()..], |size| size / unit),
+            unit,
+        }
+    }
+
+    /// Makes each column z, which belongs to the pair given for it, with eigenvalue theta, M-orthogonal to the
+    /// rigid modes, to the mode of that pair and to those near it, and (K - theta M)-orthogonal to the other
+    /// modes: what is left to solve for is then right along them too, where M-orthogonality would leave out what
+    /// couples them to the correction (deflated conjugate gradients: Saad, Yeung, Erhel and Guyomarc'h, SIAM J.
+    /// Sci. Comput. 21 (2000) 1909).
+    pub(super) fn project<const B: usize>(&self, z: &mut [Rows<B>], pairs: &[Option<usize>; WIDTH]) {
+        let nodes = ROWS / B;
+        let products = |(chunk, z): (usize, &[Rows<B>])| {
+            let (start, rows) = (chunk * nodes * B, z.len() * B);
+            let z = MatRef::from_row_major_slice(z.as_flattened().as_flattened(), rows, WIDTH);
+            [&self.mx, &self.kx].map(|block| {
+                let mut part = Mat::zeros(block.ncols(), WIDTH);
+                let block = block.as_ref().subrows(start, rows).transpose();
+                matmul(part.as_mut(), Accum::Replace, block, z, 1.0, Par::Seq);
+                part
+            })
+        };
+        let parts: Vec<[Mat<f32>; 2]> = z.par_chunks(nodes).enumerate().map(products).collect();
+        let sum = |block: usize, i: usize, w: usize| -> f64 {
+            parts.iter().map(|part| f64::from(part[block][(i, w)])).sum()
+        };
+        let along = Mat::from_fn(self.x.ncols(), WIDTH, |i, w| {
+            let (heavy, mode) = (sum(0, i, w), i.checked_sub(self.rigid));
+            let conjugate = mode.zip(pairs[w]).and_then(|(mode, pair)| {
+                let theta = self.eigenvalues[pair];
+                let distance = self.eigenvalues[mode] - theta;
+                let is_apart = mode != pair && distance.abs() > NEAR * theta.abs();
+                is_apart.then(|| (self.unit * sum(1, mode, w) - theta * heavy) / distance)
+            });
+            conjugate.unwrap_or(heavy) as f32
+        });
+        z.par_chunks_mut(nodes).enumerate().for_each(|(chunk, z)| {
+            let (start, rows) = (chunk * nodes * B, z.len() * B);
+            let z = MatMut::from_row_major_slice_mut(z.as_flattened_mut().as_flattened_mut(), rows, WIDTH);
+            matmul(z, Accum::Add, self.x.as_ref().subrows(start, rows), along.as_ref(), -1.0, Par::Seq);
+        });
+    }
+}
+
+/// The columns of the blocks, each multiplied by what `scale` makes of its size; zeros for columns of zeros.
+fn narrow(blocks: &[MatRef<'_, f64>], sizes: &[f64], scale: impl Fn(f64) -> f64 + Sync) -> Mat<f32> {
+    let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
+    let mut own = Mat::zeros(blocks[0].nrows(), columns.len());
+    let pairs: Vec<_> = own.col_iter_mut().zip(columns).zip(sizes).collect();
+    pairs.into_par_iter().for_each(|((to, from), &size)| {
+        let scale = if size > 0.0 { scale(size) } else { 0.0 };
+        to.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = (scale * from) as f32);
+    });
+    own
+}

@@ -1,0 +1,206 @@
+//! The matrix of a level and the Chebyshev iteration that damps what a coarser level cannot see (Adams,
+//! Brezina, Hu and Tuminaro, J. Comput. Phys. 188 (2003) 593), preconditioned by the blocks of the nodes.
+
+use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
+use crate::symmetric_eigen;
+use faer::Mat;
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+
+/// Nodes per parallel task.
+const NODES: usize = 1024;
+
+/// Lanczos steps that bound the spectrum, and by how much their result is raised.
+const LANCZOS_STEPS: usize = 10;
+const RAISED: f64 = 1.05;
+
+/// Lower end of the part of the spectrum that is damped, beside its upper end.
+const DAMPED_FROM: f64 = 0.12;
+
+/// A symmetric positive definite A with the inverses of its diagonal blocks.
+#[derive(Debug)]
+pub(super) struct Smoother<const B: usize> {
+    a: BlockMatrix<B, B>,
+    inverse: Vec<[[f32; B]; B]>,
+    /// An upper bound, nearly, of the eigenvalues of D^-1 A.
+    pub largest: f32,
+}
+
+impl<const B: usize> Smoother<B> {
+    /// `None` where D^-1 A has no largest eigenvalue.
+    pub(super) fn new(a: BlockMatrix<B, B>, inverse: Vec<[[f32; B]; B]>) -> Option<Self> {
+        let mut own = Self { a, inverse, largest: 0.0 };
+        own.largest = (RAISED * own.largest_eigenvalue()?) as f32;
+        Some(own)
+    }
+
+    pub(super) fn nodes(&self) -> usize {
+        self.a.n_rows()
+    }
+
+    pub(super) fn matrix(&self) -> &BlockMatrix<B, B> {
+        &self.a
+    }
+
+    /// D^-1 x of a node.
+    #[inline(always)]
+    fn divided(&self, node: usize, x: &Rows<B>) -> Rows<B> {
+        let inverse = &self.inverse[node];
+        let mut y = [[0.0; WIDTH]; B];
+        for i in 0..B {
+            for j in 0..B {
+                for w in 0..WIDTH {
+                    y[i][w] += inverse[i][j] * x[j][w];
+                }
+            }
+        }
+        y
+    }
+
+    /// The largest eigenvalue of D^-1 A, nearly: Lanczos steps in the inner product of D, from a random vector
+    /// in each column.
+    fn largest_eigenvalue(&self) -> Option<f64> {
+        let start = |node: usize| -> Rows<B> {
+            std::array::from_fn(|b| std::array::from_fn(|w| noise((node * B + b) * WIDTH + w)))
+        };
+        // u = D v, and the one of the step before.
+        let mut u: Vec<Rows<B>> = (0..self.nodes()).map(start).collect();
+        let mut u_before = vec![[[0.0; WIDTH]; B]; u.len()];
+        let (mut diagonals, mut lengths) = (Vec::new(), Vec::new());
+        for _ in 0..LANCZOS_STEPS {
+            let mut v: Vec<Rows<B>> =
+                u.par_iter().with_min_len(NODES).enumerate().map(|(node, u)| self.divided(node, u)).collect();
+            let length = products(&v, &u).map(f64::sqrt);
+            let scale = length.map(|length| if length > 0.0 { (1.0 / length) as f32 } else { 0.0 });
+            [&mut u, &mut v].into_iter().for_each(|x| scale_columns(x, &scale));
+            let mut next = self.a.apply(&v, |_, av| *av);
+            let along = products(&v, &next);
+            let own = along.map(|along| along as f32);
+            // The first has none before it.
+            let before = length.map(|length| if diagonals.is_empty() { 0.0 } else { length as f32 });
+            next.par_iter_mut().with_min_len(NODES).enumerate().for_each(|(node, next)| {
+                for b in 0..B {
+                    for w in 0..WIDTH {
+                        next[b][w] -= own[w] * u[node][b][w] + before[w] * u_before[node][b][w];
+                    }
+                }
+            });
+            diagonals.push(along);
+            lengths.push(length);
+            u_before = std::mem::replace(&mut u, next);
+        }
+        let of_column = |w: usize| {
+            let entry = |i: usize, j: usize| match i.abs_diff(j) {
+                0 => diagonals[i][w],
+                1 => lengths[i.max(j)][w],
+                _ => 0.0,
+            };
+            let tridiagonal = Mat::from_fn(LANCZOS_STEPS, LANCZOS_STEPS, entry);
+            symmetric_eigen(tridiagonal.as_ref())?.values.last().copied()
+        };
+        let found: Vec<f64> = (0..WIDTH).filter_map(of_column).collect();
+        let largest = found.iter().copied().fold(0.0, f64::max);
+        (found.len() == WIDTH && largest > 0.0 && largest.is_finite()).then_some(largest)
+    }
+
+    /// Two steps of the iteration for A x = b from x = 0.
+    pub(super) fn smoothed_from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
+        let (arch, scale) = (Arch::new(), self.steps().first);
+        let first = |(node, b)| arch.dispatch(FirstStep { smoother: self, scale, node, b });
+        let x: Vec<Rows<B>> = b.par_iter().with_min_len(NODES).enumerate().map(first).collect();
+        self.second_step(b, &x, |node| x[node])
+    }
+
+    /// Two steps of the iteration for A x = b.
+    pub(super) fn smooth(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
+        let scale = self.steps().first;
+        let once = self.a.apply(x, |node, ax| {
+            let force = self.divided(node, &minus(&b[node], ax));
+            std::array::from_fn(|i| std::array::from_fn(|w| x[node][i][w] + scale * force[i][w]))
+        });
+        self.second_step(b, &once, |node| minus(&once[node], &x[node]))
+    }
+
+    /// x + kept d + turned D^-1 (b - A x) for the step d of each node that led to x.
+    fn second_step(
+        &self,
+        b: &[Rows<B>],
+        x: &[Rows<B>],
+        step: impl Fn(usize) -> Rows<B> + Sync,
+    ) -> Vec<Rows<B>> {
+        let Steps { kept, second, .. } = self.steps();
+        self.a.apply(x, |node, ax| {
+            let (force, d) = (self.divided(node, &minus(&b[node], ax)), step(node));
+            let moved = |i: usize, w: usize| x[node][i][w] + kept * d[i][w] + second * force[i][w];
+            std::array::from_fn(|i| std::array::from_fn(|w| moved(i, w)))
+        })
+    }
+
+    /// Factors of the Chebyshev iteration on the part of the spectrum that is damped.
+    fn steps(&self) -> Steps {
+        let high = f64::from(self.largest);
+        let low = DAMPED_FROM * high;
+        let (middle, half) = (0.5 * (high + low), 0.5 * (high - low));
+        let rho = 1.0 / (2.0 * middle / half - half / middle);
+        Steps {
+            first: (1.0 / middle) as f32,
+            kept: (rho * half / middle) as f32,
+            second: (2.0 * rho / half) as f32,
+        }
+    }
+
+    /// b - A x.
+    pub(super) fn residual(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
+        self.a.apply(x, |node, ax| minus(&b[node], ax))
+    }
+}
+
+/// scale D^-1 b of a node.
+struct FirstStep<'a, const B: usize> {
+    smoother: &'a Smoother<B>,
+    scale: f32,
+    node: usize,
+    b: &'a Rows<B>,
+}
+
+impl<const B: usize> WithSimd for FirstStep<'_, B> {
+    type Output = Rows<B>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> Rows<B> {
+        let mut x = self.smoother.divided(self.node, self.b);
+        x.iter_mut().flatten().for_each(|value| *value *= self.scale);
+        x
+    }
+}
+
+/// Factors of the first step, of what is kept of it in the second, and of the second.
+struct Steps {
+    first: f32,
+    kept: f32,
+    second: f32,
+}
+
+#[inline(always)]
+fn minus<const B: usize>(b: &Rows<B>, ax: &Rows<B>) -> Rows<B> {
+    std::array::from_fn(|i| std::array::from_fn(|w| b[i][w] - ax[i][w]))
+}
+
+/// Products of the columns of two blocks: sums of fixed pieces, one after the other.
+pub(super) fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WIDTH] {
+    let piece = |(x, y): (&[Rows<B>], &[Rows<B>])| {
+        let mut sums = [0.0; WIDTH];
+        for (x, y) in x.iter().flatten().zip(y.iter().flatten()) {
+            (0..WIDTH).for_each(|w| sums[w] += f64::from(x[w]) * f64::from(y[w]));
+        }
+        sums
+    };
+    let pieces: Vec<[f64; WIDTH]> = x.par_chunks(NODES).zip(y.par_chunks(NODES)).map(piece).collect();
+    pieces.iter().fold([0.0; WIDTH], |all, own| std::array::from_fn(|w| all[w] + own[w]))
+}
+
+fn scale_columns<const B: usize>(x: &mut [Rows<B>], scale: &[f32; WIDTH]) {
+    x.par_iter_mut().with_min_len(NODES).flatten_iter().for_each(|row| {
+        row.iter_mut().zip(scale).for_each(|(x, scale)| *x *= scale);
+    });
+}

@@ -1,0 +1,301 @@
+//! What must hold before any work is done on a model: each failure named with its facts.
+
+use super::assemble::assemble;
+use super::assembled::Assembled;
+use super::connections::check_connections;
+use super::density::{Densities, check_density};
+use super::exchanged::check_exchanged_matrices;
+use super::load_checks::missing_components;
+use super::local_mass::{LocalMass, SoundSpeed, check_exchanged, check_speed};
+use super::mass_structure::{MassForm, mass_form};
+use super::node_pairs::check_mass_pairs;
+use super::rigid::{centre_and_length, extents, rigid_residuals};
+use super::rigid_motion::{check_inertia, check_rigid_motion};
+use super::stress::check_stress;
+use super::tolerance::{block_tolerance, rounding};
+use super::unplaced_rows::{check_massless, misplaced, recover};
+use super::wording::name_some;
+use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawModel};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Result, stop_on_error};
+use flexbody_linalg::{CoupledRows, Pencil, SymmetricMatrix, largest};
+
+/// A model that passed, with the warnings and notes on the way.
+#[derive(Debug, Clone)]
+pub struct CheckedModel {
+    /// The model.
+    pub model: FeModel,
+    /// Warnings and notes, in the order found.
+    pub diagnostics: Vec<Diagnostic>,
+    /// What they say of the place and the size of the mass was judged by.
+    pub plausibility: Plausibility,
+}
+
+/// How the mass fits the stiffness and the positions; in the units of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plausibility {
+    /// Pairs of nodes that the mass couples.
+    pub mass_pairs: usize,
+    /// Those of them that the stiffness does not couple.
+    pub foreign_pairs: usize,
+    /// Pairs of nodes whose masses fit their stiffness only when exchanged.
+    pub exchanged_pairs: usize,
+    /// Speeds of sound; none where no motion stretches the body.
+    pub sound_speed: Option<SoundSpeed>,
+    /// Densities of solid elements; none where too few are recognised.
+    pub densities: Option<Densities>,
+}
+
+impl FeModel {
+    /// Checks a model as a reader delivered it, and brings it into the internal order.
+    ///
+    /// # Errors
+    /// See [`check`].
+    pub fn from_raw(raw: RawModel) -> Result<CheckedModel> {
+        check(raw)
+    }
+
+    /// The same for a model whose modes are to be computed: the order of elimination, which takes as long as
+    /// the checks but has one thread, is looked for beside them.
+    ///
+    /// # Errors
+    /// See [`check`].
+    pub fn from_raw_ordered(raw: RawModel) -> Result<CheckedModel> {
+        check_with(raw, Ordering::Beside)
+    }
+}
+
+/// Checks `raw` and brings it into the internal order.
+///
+/// # Errors
+/// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and
+/// rigid motion.
+pub fn check(raw: RawModel) -> Result<CheckedModel> {
+    check_with(raw, Ordering::Later)
+}
+
+fn check_with(raw: RawModel, ordering: Ordering) -> Result<CheckedModel> {
+    let (assembled, found) = assemble(raw)?;
+    finish(assembled, None, found, ordering)
+}
+
+/// When the order of elimination is looked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ordering {
+    /// Beside the checks.
+    Beside,
+    /// When it is needed.
+    Later,
+}
+
+/// The checks of a body: its mass, its connections, its rigid motion; and beside them the order of elimination.
+pub(super) fn finish(
+    body: Assembled,
+    number: Option<BodyNumber>,
+    found: Vec<Diagnostic>,
+    ordering: Ordering,
+) -> Result<CheckedModel> {
+    let coupled = match ordering {
+        Ordering::Beside => coupled_rows(&body),
+        Ordering::Later => None,
+    };
+    let (elimination, checked) =
+        rayon::join(|| coupled.and_then(CoupledRows::analyse), || check_body(body, number, found));
+    let mut checked = checked?;
+    checked.model.set_elimination(elimination);
+    Ok(checked)
+}
+
+/// Which rows the pencil of a body couples; `None` where they are too many to be ordered.
+fn coupled_rows(body: &Assembled) -> Option<CoupledRows> {
+    let (stiffness, mass) = (&body.stiffness, &body.mass);
+    if body.rows.are_plain() {
+        CoupledRows::of_nodes(stiffness, mass, body.rows.dimension)
+    } else {
+        CoupledRows::new(&Pencil::new(stiffness, mass, 1))
+    }
+}
+
+/// The checks alone.
+fn check_body(
+    mut body: Assembled,
+    number: Option<BodyNumber>,
+    mut found: Vec<Diagnostic>,
+) -> Result<CheckedModel> {
+    found.extend(check_exchanged_matrices(&body));
+    stop_on_error(&mut found)?;
+    let [mass_pairs, foreign_pairs] = check_mass_pairs(&body, &mut found);
+    stop_on_error(&mut found)?;
+    let form = form_of_mass(&body, &mut found);
+    check_connections(&body, &mut found);
+    let rigid_residual = check_rigid_motions(&mut body, &mut found)?;
+    stop_on_error(&mut found)?;
+    let mut form = form.expect("a missing mass comes with an error");
+    // Vectors that rigid motion moves have no x of their own in the formulas for Ms.
+    form.commutes &= body.rows.are_still();
+    if !form.commutes {
+        check_inertia(&body, rounding(body.raw.mass.digits, 3).max(1e-9), &mut found);
+        stop_on_error(&mut found)?;
+    }
+    let diagonal_mass = is_diagonal(&body.mass);
+    note_structure(&body, diagonal_mass, &mut found);
+    let plausibility = Plausibility {
+        mass_pairs,
+        foreign_pairs,
+        ..check_local_mass(&body, &form, diagonal_mass, &mut found)
+    };
+    stop_on_error(&mut found)?;
+    let mass_rounding = block_tolerance(body.raw.mass.digits);
+    let mass_path = body.raw.mass.path.clone();
+    let stress_files = std::mem::take(&mut body.raw.geometric_stiffness);
+    let [first, second] = [form.worst.0, form.worst.1].map(|row| body.rows.label(&body.nodes, row));
+    let mut model = FeModel::new(body, form, rigid_residual, diagonal_mass, number);
+    model.find_fixed_mass(mass_rounding);
+    let kept = mass_that_does_not_turn(&model, mass_rounding, [first, second]);
+    found.extend(kept.map(|note| note.in_file(&mass_path)));
+    check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
+    stop_on_error(&mut found)?;
+    // Now, while the ordering library has not ended; the files need not stay open.
+    model.find_sources()?;
+    Ok(CheckedModel { model, diagnostics: found, plausibility })
+}
+
+/// What kind of mass it is; `None` with a diagnostic when it is that of no body.
+fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassForm> {
+    let form = mass_form(&body.mass, &body.rows, block_tolerance(body.raw.mass.digits));
+    form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
+}
+
+/// How every row moves with the rigid body, and whether K and the other matrices leave it free. Returns the
+/// residual of K.
+///
+/// # Errors
+/// Rows without a place whose motion K does not tell, with all that was found before.
+fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Result<f64> {
+    if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+        stop_on_error(found)?;
+    }
+    let label = |row: usize| body.rows.label(&body.nodes, row);
+    if let Some(diagnostic) = misplaced(&body.rows) {
+        found.push(diagnostic.in_file(&body.raw.nodes_path));
+    }
+    if let Err(diagnostic) = check_massless(&body.stiffness, &body.mass, label) {
+        found.push(diagnostic.in_file(&body.raw.stiffness.path));
+    }
+    let written = body.raw.stiffness.digits;
+    let limits = (rounding(written, 1).max(1e-9), rounding(written, 3).max(1e-6));
+    let rigid_residual = check_rigid_motion(body, limits, found);
+    check_rigid_damping(body, found);
+    found.extend(missing_components(&body.geometric_stiffness, body.rows.dimension));
+    Ok(rigid_residual)
+}
+
+/// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted
+/// here.
+fn check_local_mass(
+    body: &Assembled,
+    form: &MassForm,
+    diagonal_mass: bool,
+    found: &mut Vec<Diagnostic>,
+) -> Plausibility {
+    let local = LocalMass::new(body, &form.scalar);
+    // Lumping has moved mass between the nodes of an element.
+    let exchanged_pairs = if diagonal_mass { 0 } else { check_exchanged(body, &local, found) };
+    let before = found.len();
+    let densities = Densities::new(body, &local, diagonal_mass);
+    let density = check_density(body, densities, &local, found);
+    if found.len() == before {
+        check_plausibility(&form.scalar, &body.nodes, &body.raw, found);
+    }
+    check_speed(body, &local, density, found);
+    let sound_speed = local.sound_speed(body.rows.dimension);
+    Plausibility { mass_pairs: 0, foreign_pairs: 0, exchanged_pairs, sound_speed, densities }
+}
+
+fn is_diagonal(m: &SymmetricMatrix) -> bool {
+    (0..m.n()).all(|i| m.row(i).0.iter().all(|&j| j as usize == i))
+}
+
+/// What kind of mass and of rows the body has, where it is not the plain one.
+fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
+    let (raw, rows) = (&body.raw, &body.rows);
+    if diagonal_mass {
+        let message = "mass matrix is diagonal: it was lumped before it came here";
+        found.push(Diagnostic::new(Code::MassDiagonal, message).in_file(&raw.mass.path));
+    }
+    let [vectors, others] = rows.without_place();
+    if !(vectors.is_empty() && others.is_empty()) {
+        let labels: Vec<DofLabel> =
+            vectors.clone().chain(others.clone()).map(|row| rows.label(&body.nodes, row)).collect();
+        let message = format!(
+            "{} rows have no coordinates: {} in {} vectors with mass, {} massless and condensed: {}",
+            labels.len(),
+            vectors.len(),
+            rows.vectors(),
+            others.len(),
+            name_some(&labels)
+        );
+        found.push(Diagnostic::new(Code::RowsWithoutPlace, message).in_file(&raw.nodes_path));
+    }
+}
+
+/// A note about the part of the mass that is kept along the axes of the body while its nodes turn; `worst` labels
+/// the rows of the block of displacements that differs most by direction.
+fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
+    let share = model.fixed_mass_share();
+    let deviation = model.mass_deviation();
+    (share > 0.0).then(|| {
+        let [a, b] = worst;
+        let place = if a == b { format!("at {a}") } else { format!("between {a} and {b}") };
+        let why = match deviation > rounding {
+            true => format!(
+                "blocks of displacements deviate by {deviation:.1e} from multiples of the identity, most {place}"
+            ),
+            false => format!("displacements and rotations share symmetric blocks of up to {share:.1e}"),
+        };
+        let message = format!("part of the mass matrix does not turn with the nodes: {why}");
+        Diagnostic::new(Code::MassBlockStructure, message)
+    })
+}
+
+/// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.
+fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
+    /// As much as node tables written with few digits leave.
+    const LIMIT: f64 = 1e-6;
+    let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
+    let (centre, length) = centre_and_length(&body.nodes.positions);
+    let fields = body.rows.rigid_fields(&body.nodes.positions, centre, length);
+    let residuals = rigid_residuals(damping, &fields, &body.rows.field_sizes(length));
+    let damped = residuals.iter().filter(|r| r.is_nan() || **r > LIMIT).count();
+    if damped > 0 {
+        let worst = largest(residuals.iter().copied());
+        let message = format!(
+            "D R is not zero for {damped} of {} rows: |D R| reaches {worst:.1e} of the row sum of |D|; only the damping of the modes is kept",
+            residuals.len()
+        );
+        found.push(Diagnostic::new(Code::DampingRigid, message));
+    }
+}
+
+/// Densities between aerogel and osmium, for the box around the nodes: all that is known of bodies other than
+/// solids.
+const DENSITY: (f64, f64) = (0.1, 30_000.0);
+
+fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {
+    if !raw.has_units() {
+        return;
+    }
+    let total: f64 = mass.as_csc().values().iter().sum::<f64>() * raw.units.mass.to_si();
+    let [x, y, z] = extents(&nodes.positions).map(|extent| extent * raw.units.length.to_si());
+    let volume = x * y * z;
+    if volume <= 0.0 {
+        return;
+    }
+    let density = total / volume;
+    if !(DENSITY.0..=DENSITY.1).contains(&density) {
+        let message =
+            format!("{total:.3e} kg in a box of {x:.3e} x {y:.3e} x {z:.3e} m is {density:.1e} kg/m^3");
+        found.push(Diagnostic::new(Code::InertiaImplausible, message));
+    }
+}

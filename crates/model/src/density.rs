@@ -1,0 +1,246 @@
+//! Densities of solid elements, from the mass of nodes and the volumes of the elements around them.
+//!
+//! No element is given, but K couples all nodes of an element with each other: elements are the largest sets
+//! of nodes of which each is coupled with each (cliques). Of a set that is an affine image of one of the
+//! usual elements the volume is a known multiple of the root of the determinant of the covariance of its
+//! positions, and each node has a known part of its mass. Beams, shells, bars and everything else have no
+//! such sets, or are left out by what marks them. Curved elements count with their corners, which changes
+//! their volume by some percent.
+
+use super::assembled::Assembled;
+use super::common_units::{fitting_units, state_units};
+use super::local_mass::LocalMass;
+use super::node_pairs::neighbours;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// Densities of matter in kg/m^3, from light foams to osmium.
+const DENSITIES: (f64, f64) = (10.0, 25_000.0);
+
+/// At most so many nodes are looked at, at equal distances in the node table.
+const SAMPLED: usize = 400;
+
+/// Coupled nodes of a node that is looked at: the bits of a word.
+const COUPLED: usize = 63;
+
+/// Cliques of one node; elements of a mesh are fewer.
+const CLIQUES: usize = 200;
+
+/// Root of the determinant of the covariance relative to that of a ball of the same trace, below which nodes
+/// lie in a plane: four nodes of a curved membrane do nearly.
+const FLAT: f64 = 1e-6;
+const FLAT_FOUR: f64 = 0.02;
+
+/// Largest deviation of the squared Mahalanobis distance of a corner from that of an affine element.
+const CORNER: f64 = 1.0;
+
+/// Distance of the middle of an edge from the middle between its ends, relative to their distance, in a
+/// curved element.
+const CURVED: f64 = 0.2;
+
+/// A solid element with `nodes` nodes, `corners` of them corners and the others the middles of edges: its
+/// volume is `volume` times the root of the determinant of the covariance of the corners, and the row sums of
+/// the consistent mass give each corner and each middle these parts of its mass.
+struct Element {
+    nodes: usize,
+    corners: usize,
+    volume: f64,
+    corner: f64,
+    middle: f64,
+}
+
+const ELEMENTS: [Element; 5] = [
+    Element { nodes: 4, corners: 4, volume: 8.0 / 3.0, corner: 0.25, middle: 0.0 },
+    // 3 sqrt(3): a triangle of three nodes times a line of two.
+    Element { nodes: 6, corners: 6, volume: 5.196_152_422_706_632, corner: 1.0 / 6.0, middle: 0.0 },
+    Element { nodes: 8, corners: 8, volume: 8.0, corner: 0.125, middle: 0.0 },
+    Element { nodes: 10, corners: 4, volume: 8.0 / 3.0, corner: -0.05, middle: 0.2 },
+    Element { nodes: 20, corners: 8, volume: 8.0, corner: -0.125, middle: 1.0 / 6.0 },
+];
+
+/// Densities of the elements of a body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Densities {
+    /// Lower quartile, median and upper quartile of the nodes, in the units of the model.
+    pub quartiles: [f64; 3],
+    /// How many nodes tell.
+    pub nodes: usize,
+}
+
+impl Densities {
+    /// Of a body in space; `None` where too few nodes belong to solid elements alone.
+    pub(super) fn new(body: &Assembled, local: &LocalMass, diagonal_mass: bool) -> Option<Self> {
+        let n = body.nodes.len();
+        if body.rows.dimension != 3 {
+            return None;
+        }
+        let count = n.min(SAMPLED);
+        let sampled = (0..count).into_par_iter().map(|s| s * n / count);
+        let density = |i: usize| Some(local.mass[i] / around(body, i, diagonal_mass)?);
+        let mut densities: Vec<f64> =
+            sampled.map(density).collect::<Vec<_>>().into_iter().flatten().collect();
+        let judged = densities.len();
+        if judged < 4 || judged * 20 < count {
+            return None;
+        }
+        densities.sort_by(f64::total_cmp);
+        let quartiles = [1, 2, 3].map(|q| densities[(q * (judged - 1) + 2) / 4]);
+        Some(Self { quartiles, nodes: judged })
+    }
+}
+
+/// The node's part of the volumes of the solid elements around it; `None` where there is something else, or
+/// too much to be taken apart.
+fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
+    let Assembled { nodes, rows, stiffness, .. } = body;
+    let coupled = |i: usize| neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
+    let n = nodes.len();
+    let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(own, _)| own).is_ok();
+    let mut near = coupled(node);
+    near.retain(|&j| (j as usize) < n);
+    if turns(node as u32) || near.iter().any(|&j| turns(j)) || near.is_empty() {
+        return None;
+    }
+    if near.len() > COUPLED || near.iter().all(|&j| is_bar(body, node, j as usize)) {
+        return None;
+    }
+    let mask = |i: &u32| {
+        let others = coupled(*i as usize);
+        let shared = near.iter().enumerate().filter(|(_, other)| others.binary_search(other).is_ok());
+        shared.fold(0u64, |mask, (bit, _)| mask | 1 << bit)
+    };
+    let adjacent: Vec<u64> = near.iter().map(mask).collect();
+    let mut cliques = Vec::new();
+    if !maximal_cliques(&adjacent, 0, (1 << near.len()) - 1, 0, &mut cliques) {
+        return None;
+    }
+    let part = |clique: u64| {
+        let members = (0..near.len()).filter(|bit| clique >> bit & 1 == 1).map(|bit| near[bit] as usize);
+        let positions: Vec<Vector3<f64>> =
+            std::iter::once(node).chain(members).map(|i| Vector3::from(nodes.positions[i])).collect();
+        part_of_first(&positions, diagonal_mass)
+    };
+    cliques.into_iter().map(part).sum()
+}
+
+/// Whether K couples two nodes along the line between them only.
+fn is_bar(body: &Assembled, i: usize, j: usize) -> bool {
+    let x = &body.nodes.positions;
+    let along = (Vector3::from(x[j]) - Vector3::from(x[i])).normalize();
+    let block = Matrix3::from_fn(|k, l| {
+        let (columns, values) = body.stiffness.row(3 * i + k);
+        columns.binary_search(&((3 * j + l) as u32)).map_or(0.0, |at| values[at])
+    });
+    let axial = along * along.transpose() * along.dot(&(block * along));
+    (block - axial).norm() <= 1e-6 * block.norm()
+}
+
+/// Bron and Kerbosch's search with a pivot: every largest extension of `chosen` by `candidates`, none with
+/// `excluded`. False when there are too many.
+fn maximal_cliques(
+    adjacent: &[u64],
+    chosen: u64,
+    mut candidates: u64,
+    mut excluded: u64,
+    found: &mut Vec<u64>,
+) -> bool {
+    if candidates | excluded == 0 {
+        found.push(chosen);
+        return found.len() <= CLIQUES;
+    }
+    let bits = |set: u64| (0..adjacent.len()).filter(move |bit| set >> bit & 1 == 1);
+    let pivot = bits(candidates | excluded)
+        .max_by_key(|&bit| (candidates & adjacent[bit]).count_ones())
+        .expect("one of the sets has a member");
+    for bit in bits(candidates & !adjacent[pivot]) {
+        let near = adjacent[bit];
+        if !maximal_cliques(adjacent, chosen | 1 << bit, candidates & near, excluded & near, found) {
+            return false;
+        }
+        candidates &= !(1 << bit);
+        excluded |= 1 << bit;
+    }
+    true
+}
+
+/// The part of an element's volume that belongs to its first node; `None` when these are not the nodes of an
+/// element that is known. A diagonal mass is spread over the nodes of quadratic elements in more than one
+/// way.
+fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64> {
+    let element = ELEMENTS.iter().find(|element| element.nodes == positions.len())?;
+    let linear = element.corners == element.nodes;
+    if diagonal_mass && !linear {
+        return None;
+    }
+    let at_corner = |i: &usize| linear || !is_middle(positions, *i);
+    let corners: Vec<Vector3<f64>> = (0..positions.len()).filter(at_corner).map(|i| positions[i]).collect();
+    if corners.len() != element.corners {
+        return None;
+    }
+    let count = corners.len() as f64;
+    let middle = corners.iter().sum::<Vector3<f64>>() / count;
+    let arms: Vec<Vector3<f64>> = corners.iter().map(|x| x - middle).collect();
+    let covariance = arms.iter().map(|r| r * r.transpose()).sum::<Matrix3<f64>>() / count;
+    let root = covariance.determinant().max(0.0).sqrt();
+    let ball = (covariance.trace() / 3.0).powf(1.5);
+    if root <= ball * if linear && corners.len() == 4 { FLAT_FOUR } else { FLAT } {
+        return None;
+    }
+    let inverse = covariance.try_inverse()?;
+    if arms.iter().any(|r| (r.dot(&(inverse * r)) - 3.0).abs() > CORNER) {
+        return None;
+    }
+    let part = if at_corner(&0) { element.corner } else { element.middle };
+    Some(element.volume * root * part)
+}
+
+/// Whether a node lies in the middle between two others.
+fn is_middle(positions: &[Vector3<f64>], node: usize) -> bool {
+    let x = positions[node];
+    let others = |i: usize| (i + 1..positions.len()).map(move |j| (i, j));
+    (0..positions.len()).flat_map(others).filter(|&(i, j)| i != node && j != node).any(|(i, j)| {
+        let (a, b) = (positions[i], positions[j]);
+        ((a + b) / 2.0 - x).norm() < CURVED * (a - b).norm()
+    })
+}
+
+/// An error for densities that no matter has, a warning where they may be meant: returns the density in SI where it is
+/// known. Numbers whose units nothing states are taken for m, kg, s; of matrices in memory, which may have no dimension,
+/// that is a warning.
+pub(super) fn check_density(
+    body: &Assembled,
+    densities: Option<Densities>,
+    local: &LocalMass,
+    found: &mut Vec<Diagnostic>,
+) -> Option<f64> {
+    let units = &body.raw.units;
+    let Densities { quartiles, nodes } = densities?;
+    let to_si = units.mass.to_si() / units.length.to_si().powi(3);
+    let [lower, median, upper] = quartiles.map(|density| density * to_si);
+    if upper >= DENSITIES.0 && lower <= DENSITIES.1 {
+        return Some(median);
+    }
+    let said = if units.stated { "" } else { ", which nothing states" };
+    let message = format!(
+        "the elements have a density of {median:.3e} kg/m^3 (median of {nodes} nodes; half of them between {lower:.3e} and {upper:.3e}), with length in {}, mass in {}{said}",
+        units.length.name(),
+        units.mass.name()
+    );
+    if body.raw.allow_implausible || !body.raw.has_units() {
+        found.push(Diagnostic::new(Code::InertiaImplausible, message));
+        return None;
+    }
+    let mut diagnostic = Diagnostic::new(Code::DensityImplausible, message);
+    let speed = local.sound_speed(3).map_or(0.0, |speed| speed.median);
+    let fitting = fitting_units(quartiles[1], speed).join(", or in ");
+    if !units.stated {
+        diagnostic = diagnostic.with_help(state_units(&fitting));
+    } else if !fitting.is_empty() {
+        diagnostic = diagnostic.with_help(format!(
+            "the numbers are those of matter in {fitting}: check the units of the manifest and of the coordinates; --allow-implausible (or allow_implausible in [model]) if the density is meant"
+        ));
+    }
+    found.push(diagnostic);
+    None
+}

@@ -1,0 +1,315 @@
+//! The mass matrix of a model with nodal rotations as a mass of points and directors (theory section 6).
+//!
+//! A node with rotations is a point x and directors d_a = R e_a, a = 1..d, which turn with it. With the blocks
+//! of M between node i and node j,
+//!
+//! ```text
+//! M_tr,ij = -h_ij~ + N_ij            h_ij: first moment, N_ij: symmetric
+//! M_rr,ij = tr(P_ij) I - P_ij'       P_ij' = tr(M_rr,ij)/2 I - M_rr,ij: second moment
+//! M_tt,ij = mu_ij I + D_ij           mu_ij = tr(M_tt,ij)/d
+//! ```
+//!
+//! the kinetic energy of points and directors is that of a solid: their mass E_s = [mu, h; h', P], a number for
+//! every pair of points and directors, is the same along every axis and does not change with the rotations.
+//! The rest N and D, which it leaves of M, is multiplied by the velocities of the rows along the axes of the body: the
+//! rest. Of a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of the column M_tr, P = M_rr/2 I and
+//! N = 0.
+
+use super::director_blocks::{Blocks, ROUNDING};
+use super::node_moments::NodeMoments;
+use super::rows::Rows;
+use faer::{Mat, MatMut, MatRef};
+use flexbody_linalg::{SymmetricMatrix, contiguous, contiguous_mut, multiply, multiply_vector, zeros};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// M as a mass of points and directors, and what this leaves of it.
+///
+/// Columns of *extended rows* are what it multiplies: displacements of the points (d for each), then of the
+/// directors (d for each of the d directors of a node with rotational mass), then, where there is a rest, the
+/// rotations of these nodes (three for each, in the plane one). [`DirectorMass::extend`] takes the columns of a
+/// model there, [`DirectorMass::restrict`] forces back.
+#[derive(Debug, Clone)]
+pub struct DirectorMass {
+    dimension: usize,
+    model_rows: usize,
+    points: usize,
+    /// Nodes with directors, ascending.
+    nodes: Vec<u32>,
+    /// Place of its node in `nodes`, axis and row of the model of every rotation of these nodes.
+    rotations: Vec<Rotation>,
+    /// E_s: points, then d directors of each of the nodes.
+    scalar: SymmetricMatrix,
+    /// N and D, on extended rows.
+    rest: Option<SymmetricMatrix>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Rotation {
+    place: usize,
+    axis: usize,
+    row: usize,
+}
+
+impl DirectorMass {
+    /// The mass `m` (rows of the model, symmetric) on points and directors; `None` when no rotation carries
+    /// mass.
+    pub(super) fn new(m: &SymmetricMatrix, rows: &Rows) -> Option<Self> {
+        let blocks = Blocks::new(m, rows)?;
+        let rotations =
+            rows.rotations().iter().zip(rows.displacements()..).filter_map(|(&(node, axis), row)| {
+                let place = blocks.place(node as usize)? as usize;
+                Some(Rotation { place, axis: axis.into(), row })
+            });
+        let rotations = rotations.collect();
+        let (scalar, rest) = blocks.split();
+        Some(Self {
+            dimension: rows.dimension,
+            model_rows: rows.len(),
+            points: blocks.points(),
+            rotations,
+            nodes: blocks.into_nodes(),
+            scalar,
+            rest,
+        })
+    }
+
+    /// Largest entry of the rest of the mass `m`, as [`DirectorMass::new`] finds it, relative to sqrt(M_ii M_jj): how much
+    /// of M does not turn with the nodes. Zero for lumped masses and rigid regions of solids; of consistent beams and
+    /// shells it stays, and its effect falls with the square of the element size to that of the rotary inertia of their
+    /// sections. `None` when no rotation carries mass.
+    pub(super) fn rest_share(m: &SymmetricMatrix, rows: &Rows) -> Option<f64> {
+        let share = Blocks::new(m, rows)?.share();
+        Some(if share > ROUNDING { share } else { 0.0 })
+    }
+
+    /// Nodes with directors, ascending.
+    pub fn nodes(&self) -> &[u32] {
+        &self.nodes
+    }
+
+    /// E_s: a number for every pair of points and directors, points first, then the directors of each of the nodes.
+    pub fn scalar(&self) -> &SymmetricMatrix {
+        &self.scalar
+    }
+
+    /// N and D on extended rows; `None` where E_s is all of M.
+    pub fn rest(&self) -> Option<&SymmetricMatrix> {
+        self.rest.as_ref()
+    }
+
+    /// Number of extended rows.
+    pub fn rows(&self) -> usize {
+        self.turning_rows() + if self.rest.is_some() { self.turns() * self.nodes.len() } else { 0 }
+    }
+
+    /// Extended rows that turn with the body, which come first: vectors of points and directors.
+    pub fn turning_rows(&self) -> usize {
+        self.dimension * self.scalar.n()
+    }
+
+    /// Rotations of a node that there can be.
+    fn turns(&self) -> usize {
+        if self.dimension == 2 { 1 } else { 3 }
+    }
+
+    /// First extended row of director `a` of the node at `place`.
+    fn director(&self, place: usize, a: usize) -> usize {
+        let d = self.dimension;
+        d * (self.points + d * place + a)
+    }
+
+    /// First extended row of the rotations of the node at `place`, where there is a rest.
+    fn rotation(&self, place: usize) -> usize {
+        self.turning_rows() + self.turns() * place
+    }
+
+    /// Velocities of the extended rows for those of the rows of the model, both to first order and along the
+    /// axes of the model: theta x e_a of a director.
+    ///
+    /// # Panics
+    /// When there is not one row for each of the model.
+    pub fn extend(&self, shapes: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(shapes.nrows(), self.model_rows, "one row per row of the model");
+        let mut extended = zeros(self.rows(), shapes.ncols());
+        each_column(shapes, &mut extended, |from, to| self.extend_vector(from, to));
+        extended
+    }
+
+    /// [`DirectorMass::extend`] of one column, into another.
+    pub fn extend_vector(&self, shape: &[f64], extended: &mut [f64]) {
+        let points = self.dimension * self.points;
+        extended[..points].copy_from_slice(&shape[..points]);
+        extended[points..].fill(0.0);
+        for &Rotation { place, axis, row } in &self.rotations {
+            self.turn(place, axis, shape[row], extended);
+        }
+    }
+
+    /// Displacements, velocities and accelerations of the extended rows to second order of the rotations: a director
+    /// is theta x e_a + theta x (theta x e_a) / 2 away from where it was.
+    ///
+    /// * `motion`: rows of the model with their rates and accelerations, along the axes of the model.
+    ///
+    /// # Panics
+    /// When there is not one row for each of the model, or not as many rates and accelerations.
+    pub fn extend_turned(&self, motion: [MatRef<'_, f64>; 3]) -> [Mat<f64>; 3] {
+        let mut extended = motion.map(|x| self.extend(x));
+        for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
+            for column in 0..motion[0].ncols() {
+                let [turn, rate, acceleration] = motion.map(|x| {
+                    let mut theta = Vector3::zeros();
+                    of_node.iter().for_each(|rotation| theta[rotation.axis] = x[(rotation.row, column)]);
+                    theta.cross_matrix()
+                });
+                let second = [
+                    turn * turn,
+                    turn * rate + rate * turn,
+                    turn * acceleration + acceleration * turn + 2.0 * rate * rate,
+                ];
+                for (extended, second) in extended.iter_mut().zip(second) {
+                    for a in 0..self.dimension {
+                        let row = self.director(of_node[0].place, a);
+                        (0..self.dimension).for_each(|k| extended[(row + k, column)] += 0.5 * second[(k, a)]);
+                    }
+                }
+            }
+        }
+        extended
+    }
+
+    /// Adds the rotation of a node about an axis of the model to its directors.
+    fn turn(&self, place: usize, axis: usize, angle: f64, extended: &mut [f64]) {
+        // e_axis x e_a = e_b and e_axis x e_b = -e_a for the cyclic order (axis, a, b).
+        let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+        extended[self.director(place, a) + b] += angle;
+        extended[self.director(place, b) + a] -= angle;
+        if self.rest.is_some() {
+            extended[self.rotation(place) + if self.dimension == 2 { 0 } else { axis }] += angle;
+        }
+    }
+
+    /// Unit translations and unit rotations of the extended rows, given those of the model (N x 6, in the plane
+    /// N x 3, along its axes, rotations not divided by a length): directors and rotations of nodes turn whatever
+    /// rows of rotations their nodes have.
+    ///
+    /// # Panics
+    /// When there is not one row for each of the model.
+    pub fn extend_rigid(&self, fields: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(fields.nrows(), self.model_rows, "one row per row of the model");
+        let (d, points) = (self.dimension, self.dimension * self.points);
+        let mut extended = zeros(self.rows(), fields.ncols());
+        extended.as_mut().subrows_mut(0, points).copy_from(fields.subrows(0, points));
+        for column in d..fields.ncols() {
+            let axis = if d == 2 { 2 } else { column - 3 };
+            let extended = extended.col_as_slice_mut(column);
+            (0..self.nodes.len()).for_each(|place| self.turn(place, axis, 1.0, extended));
+        }
+        extended
+    }
+
+    /// Forces on the rows of the model that do the power of forces on the extended rows: moments
+    /// sum_a e_a x f_a of those of the directors on the rotations of their node.
+    ///
+    /// # Panics
+    /// When there is not one row for each extended one.
+    pub fn restrict(&self, forces: MatRef<'_, f64>) -> Mat<f64> {
+        assert_eq!(forces.nrows(), self.rows(), "one row per extended row");
+        let mut restricted = zeros(self.model_rows, forces.ncols());
+        each_column(forces, &mut restricted, |from, to| self.restrict_vector(from, to));
+        restricted
+    }
+
+    /// [`DirectorMass::restrict`] of one column, into another.
+    pub fn restrict_vector(&self, forces: &[f64], restricted: &mut [f64]) {
+        let points = self.dimension * self.points;
+        restricted[..points].copy_from_slice(&forces[..points]);
+        restricted[points..].fill(0.0);
+        for &Rotation { place, axis, row } in &self.rotations {
+            let (a, b) = ((axis + 1) % 3, (axis + 2) % 3);
+            restricted[row] = forces[self.director(place, a) + b] - forces[self.director(place, b) + a];
+            if self.rest.is_some() {
+                restricted[row] += forces[self.rotation(place) + if self.dimension == 2 { 0 } else { axis }];
+            }
+        }
+    }
+
+    /// y = E x of extended rows.
+    ///
+    /// # Panics
+    /// When the sizes disagree.
+    pub fn multiply(&self, x: MatRef<'_, f64>, mut y: MatMut<'_, f64>) {
+        let turning = self.turning_rows();
+        if let Some(rest) = &self.rest {
+            multiply(rest, 1, x, y.as_mut());
+            let mut product = zeros(turning, x.ncols());
+            multiply(&self.scalar, self.dimension, x.subrows(0, turning), product.as_mut());
+            let mut head = y.subrows_mut(0, turning);
+            head += product;
+        } else {
+            multiply(&self.scalar, self.dimension, x, y);
+        }
+    }
+
+    /// [`DirectorMass::multiply`] of one column; `scratch` has as many entries.
+    pub fn multiply_vector(&self, x: &[f64], y: &mut [f64], scratch: &mut [f64]) {
+        let turning = self.turning_rows();
+        multiply_vector(&self.scalar, self.dimension, &x[..turning], &mut y[..turning]);
+        if let Some(rest) = &self.rest {
+            multiply_vector(rest, 1, x, scratch);
+            y[turning..].fill(0.0);
+            y.iter_mut().zip(scratch).for_each(|(y, rest)| *y += *rest);
+        }
+    }
+
+    /// Adds H theta to the moments on the rotations of every node, in the rows of the model: theta of `u`, H of the
+    /// node at a place among [`DirectorMass::nodes`].
+    ///
+    /// # Panics
+    /// When there is not one row for each of the model.
+    pub fn add_second_order(&self, h: impl Fn(usize) -> Matrix3<f64>, u: &[f64], forces: &mut [f64]) {
+        assert!(u.len() == self.model_rows && forces.len() == u.len(), "one row per row of the model");
+        for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
+            let mut theta = Vector3::zeros();
+            of_node.iter().for_each(|rotation| theta[rotation.axis] = u[rotation.row]);
+            let moment = h(of_node[0].place) * theta;
+            of_node.iter().for_each(|rotation| forces[rotation.row] += moment[rotation.axis]);
+        }
+    }
+
+    /// The moments of the mass that turns with every node, about the point and along the axes that the rigid
+    /// motions `fields` of the extended rows have, columns of `axes` in the axes of the model.
+    ///
+    /// * `fields`: [`DirectorMass::extend_rigid`], turned to these axes.
+    pub fn moments(&self, fields: MatRef<'_, f64>, axes: &Matrix3<f64>) -> Vec<NodeMoments> {
+        let mut product = zeros(self.rows(), fields.ncols());
+        self.multiply(fields, product.as_mut());
+        let d = self.dimension;
+        let vector = |row: usize, column: usize| {
+            Vector3::from_fn(|k, _| if k < d { product[(row + k, column)] } else { 0.0 })
+        };
+        let axis = |k: usize| axes.column(k).into_owned();
+        let of_node = |place: usize| {
+            let (mut first, mut second) = (Vector3::zeros(), Matrix3::zeros());
+            for a in 0..d {
+                let row = self.director(place, a);
+                first[a] = (0..d).map(|k| vector(row, k).dot(&axis(k))).sum::<f64>() / d as f64;
+                // The sum over the axes k of e_k x (e_k x z) is -2 z, in the plane -z.
+                let turned = |k: usize, column: usize| axis(k).cross(&vector(row, column));
+                let z = match d {
+                    2 => -turned(2, 2),
+                    _ => (0..3).map(|k| turned(k, 3 + k)).sum::<Vector3<f64>>() * -0.5,
+                };
+                second.set_row(a, &z.transpose());
+            }
+            NodeMoments { first: axes.transpose() * first, second: axes.transpose() * second * axes }
+        };
+        (0..self.nodes.len()).map(of_node).collect()
+    }
+}
+
+/// Makes every column of `to` of that of `from`, by all threads.
+fn each_column(from: MatRef<'_, f64>, to: &mut Mat<f64>, make: impl Fn(&[f64], &mut [f64]) + Sync) {
+    let columns: Vec<_> = from.col_iter().zip(to.col_iter_mut()).collect();
+    columns.into_par_iter().for_each(|(from, to)| make(contiguous(from), contiguous_mut(to)));
+}

@@ -1,0 +1,329 @@
+//! The checked model: every used node has d displacements (d: the dimension), row d i + k is direction k of
+//! node i; other rows follow as [`Rows`] has them.
+
+use super::assembled::Assembled;
+use super::mass_structure::MassForm;
+use super::{
+    BodyNumber, Damping, DirectorMass, DofLabel, GeometricStiffness, GivenRows, NodeSet, Nodes, Rows,
+    SurfaceMesh,
+};
+use faer::Mat;
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::provenance::{SourceFile, Sources};
+use flexbody_base::units::UnitSystem;
+use flexbody_linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};
+use std::borrow::Cow;
+use std::sync::{Arc, OnceLock};
+
+/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the
+/// order of `nodes`, then what else [`rows`](FeModel::rows) says.
+#[derive(Debug, Clone)]
+pub struct FeModel {
+    name: String,
+    units: UnitSystem,
+    nodes: Nodes,
+    mesh: Option<SurfaceMesh>,
+    rows: Rows,
+    stiffness: SymmetricMatrix,
+    /// Ms, or what comes closest to it.
+    mean_mass: SymmetricMatrix,
+    /// M, where it is not Ms kron I_d.
+    whole_mass: Option<SymmetricMatrix>,
+    commutes: bool,
+    /// True if Ms kron I_d is M to the last bit.
+    exact_scalar_mass: bool,
+    damping: Option<Damping<SymmetricMatrix>>,
+    geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
+    interfaces: Vec<NodeSet>,
+    sources: Sources,
+    digits: u8,
+    rigid_residual: f64,
+    mass_deviation: f64,
+    /// Part of the mass that does not turn with the nodes; zero where that is rounding.
+    fixed_mass_share: f64,
+    diagonal_mass: bool,
+    /// Internal row of each matrix row, `u32::MAX` of those that are left out; none when they are the same.
+    row_to_internal: Option<Vec<u32>>,
+    given_rows: Arc<GivenRows>,
+    number: Option<BodyNumber>,
+    elimination: Option<Arc<Analysis>>,
+    /// M on points and directors, once somebody needs it.
+    director_mass: OnceLock<Option<Arc<DirectorMass>>>,
+}
+
+impl FeModel {
+    pub(super) fn new(
+        body: Assembled,
+        form: MassForm,
+        rigid_residual: f64,
+        diagonal_mass: bool,
+        number: Option<BodyNumber>,
+    ) -> Self {
+        let Assembled { raw, nodes, mesh, rows, stiffness, mass, damping, geometric_stiffness, .. } = body;
+        let scalar = form.commutes && rows.len() == rows.displacements();
+        Self {
+            digits: raw.stiffness.digits,
+            name: raw.name,
+            units: raw.units,
+            nodes,
+            mesh,
+            rows,
+            stiffness,
+            mean_mass: form.scalar,
+            whole_mass: (!scalar).then_some(mass),
+            commutes: form.commutes,
+            exact_scalar_mass: form.commutes && form.exact,
+            damping,
+            geometric_stiffness,
+            interfaces: raw.interfaces,
+            sources: raw.sources,
+            rigid_residual,
+            mass_deviation: form.deviation,
+            fixed_mass_share: 0.0,
+            diagonal_mass,
+            row_to_internal: body.row_to_internal,
+            given_rows: Arc::new(raw.given_rows),
+            number,
+            elimination: None,
+            director_mass: OnceLock::new(),
+        }
+    }
+
+    /// Model name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// 3, or 2 for a body in the plane: displacements per node.
+    pub fn dimension(&self) -> usize {
+        self.rows.dimension
+    }
+
+    /// Units of all numbers.
+    pub fn units(&self) -> &UnitSystem {
+        &self.units
+    }
+
+    /// Nodes that carry degrees of freedom, in the order of the node table.
+    pub fn nodes(&self) -> &Nodes {
+        &self.nodes
+    }
+
+    /// The surface, by indices of the nodes, where elements are known.
+    pub fn mesh(&self) -> Option<&SurfaceMesh> {
+        self.mesh.as_ref()
+    }
+
+    /// K, row d i + k for direction k of node i, then the other rows.
+    pub fn stiffness(&self) -> &SymmetricMatrix {
+        &self.stiffness
+    }
+
+    /// The same model with its whole mass lumped: `masses` (one for each node) at the displacements of the
+    /// nodes, none at other rows. Damping in proportion to the mass follows it.
+    ///
+    /// # Panics
+    /// When there is not one mass for each node.
+    pub fn with_nodal_masses(&self, masses: &[f64]) -> Self {
+        assert_eq!(masses.len(), self.nodes.len(), "one mass for each node");
+        let d = self.dimension();
+        let diagonal = |masses: &mut dyn Iterator<Item = f64>, rows: usize| {
+            let entries: Vec<_> = masses.enumerate().map(|(i, mass)| (i as u32, i as u32, mass)).collect();
+            let matrix = CscMatrix::from_triplets(rows, rows, &entries);
+            SymmetricMatrix::new(matrix).expect("a diagonal matrix is symmetric")
+        };
+        let by_row = &mut masses.iter().flat_map(|mass| std::iter::repeat_n(*mass, d));
+        Self {
+            mean_mass: diagonal(&mut masses.iter().copied(), self.mean_mass.n()),
+            whole_mass: (!self.rows.are_plain()).then(|| diagonal(by_row, self.rows.len())),
+            commutes: true,
+            exact_scalar_mass: true,
+            mass_deviation: 0.0,
+            fixed_mass_share: 0.0,
+            diagonal_mass: true,
+            elimination: None,
+            director_mass: OnceLock::new(),
+            ..self.clone()
+        }
+    }
+
+    /// What the rows of the matrices are.
+    pub fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    /// Ms: M = Ms kron I_d for the displacements, of nodes and then of vectors without a place, and no other
+    /// row carries mass. `None` when M has no such form.
+    pub fn scalar_mass(&self) -> Option<&SymmetricMatrix> {
+        self.commutes.then_some(&self.mean_mass)
+    }
+
+    /// True if [`scalar_mass`](Self::scalar_mass) is the mass matrix as stored, and no mean of directions that differ
+    /// by rounding.
+    pub fn has_exact_scalar_mass(&self) -> bool {
+        self.exact_scalar_mass
+    }
+
+    /// M on points and directors; `None` when no rotation of a node carries mass. Made at the first call.
+    pub fn director_mass(&self) -> Option<&Arc<DirectorMass>> {
+        let made = || {
+            let mass = self.whole_mass.as_ref()?;
+            DirectorMass::new(mass, &self.rows).map(Arc::new)
+        };
+        self.director_mass.get_or_init(made).as_ref()
+    }
+
+    /// The mean over the directions of the mass between displacements of nodes (n x n): what lumping starts
+    /// from.
+    pub fn nodal_mass(&self) -> Cow<'_, SymmetricMatrix> {
+        let n = self.nodes.len();
+        match self.rows.vectors() {
+            0 => Cow::Borrowed(&self.mean_mass),
+            _ => Cow::Owned(self.mean_mass.principal(&(0..n).collect::<Vec<_>>())),
+        }
+    }
+
+    /// Damping, where it was given; a matrix D has the rows of K.
+    pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
+        self.damping.as_ref()
+    }
+
+    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows
+    /// of K.
+    pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
+        &self.geometric_stiffness
+    }
+
+    /// Keeps the order of elimination of its pencil.
+    pub(super) fn set_elimination(&mut self, elimination: Option<Analysis>) {
+        self.elimination = elimination.map(Arc::new);
+    }
+
+    /// The order of elimination of [`pencil`](Self::pencil), where it was looked for during the checks.
+    pub fn elimination(&self) -> Option<&Arc<Analysis>> {
+        self.elimination.as_ref()
+    }
+
+    /// K and M.
+    pub fn pencil(&self) -> Pencil<'_> {
+        match &self.whole_mass {
+            None => Pencil::new(&self.stiffness, &self.mean_mass, self.dimension()),
+            Some(mass) => Pencil::new(&self.stiffness, mass, 1),
+        }
+    }
+
+    /// The rigid fields (one row per row of K) about `centre`: translations, then rotations divided by
+    /// `length`. [`Rows::rigid_fields`].
+    pub fn rigid_fields(&self, centre: [f64; 3], length: f64) -> Mat<f64> {
+        self.rows.rigid_fields(&self.nodes.positions, centre, length)
+    }
+
+    /// Length of the longest displacement of a node, of the displacements `u` of all rows.
+    pub fn longest_displacement(&self, u: &[f64]) -> f64 {
+        let d = self.dimension();
+        let squares = u[..d * self.nodes.len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());
+        squares.fold(0.0, larger).sqrt()
+    }
+
+    /// Named node sets.
+    pub fn interfaces(&self) -> &[NodeSet] {
+        &self.interfaces
+    }
+
+    /// Takes the fingerprints of the files of the model that were not taken while reading.
+    ///
+    /// # Errors
+    /// FB101, FB132 for a file that is no longer the one that was read.
+    pub(super) fn find_sources(&self) -> Result<(), Diagnostic> {
+        self.sources.find()
+    }
+
+    /// Files it was read from.
+    pub fn sources(&self) -> &[SourceFile] {
+        &self.sources
+    }
+
+    /// Significant decimal digits of the stiffness values.
+    pub fn digits(&self) -> u8 {
+        self.digits
+    }
+
+    /// max over the rows of |K R| / sum |K|: how well K annihilates rigid motion.
+    pub fn rigid_residual(&self) -> f64 {
+        self.rigid_residual
+    }
+
+    /// Largest deviation of a mass block from a multiple of the identity, relative to sqrt(alpha_ii
+    /// alpha_jj).
+    pub fn mass_deviation(&self) -> f64 {
+        self.mass_deviation
+    }
+
+    /// Largest entry of the part of M that is kept along the axes of the body while its nodes turn, relative to
+    /// sqrt(M_ii M_jj): blocks of displacements that are no multiples of I and, of [`DirectorMass`], symmetric
+    /// blocks between displacements and rotations. Zero where it is rounding.
+    pub fn fixed_mass_share(&self) -> f64 {
+        self.fixed_mass_share
+    }
+
+    /// Keeps the part of M that does not turn, unless it is at most `rounding`.
+    pub(super) fn find_fixed_mass(&mut self, rounding: f64) {
+        let share = match (self.scalar_mass(), &self.whole_mass) {
+            (None, Some(mass)) => DirectorMass::rest_share(mass, &self.rows).unwrap_or(self.mass_deviation),
+            (None, None) => self.mass_deviation,
+            (Some(_), _) => 0.0,
+        };
+        self.fixed_mass_share = if share > rounding { share } else { 0.0 };
+    }
+
+    /// Whether M is diagonal: lumped by the FE program.
+    pub fn has_diagonal_mass(&self) -> bool {
+        self.diagonal_mass
+    }
+
+    /// Number of rows of the matrices as they were read, with those that no matrix holds.
+    pub fn matrix_rows(&self) -> usize {
+        self.row_to_internal.as_ref().map_or(self.stiffness.n(), Vec::len)
+    }
+
+    /// True if a row of the matrices as they were read has neither stiffness nor mass and is left out.
+    pub fn is_left_out(&self, row: usize) -> bool {
+        self.row_to_internal.as_ref().is_some_and(|to| to[row] == u32::MAX)
+    }
+
+    /// Columns that are given by the rows of the matrices as they were read, in the internal order.
+    ///
+    /// # Panics
+    /// When there are not as many rows.
+    pub fn in_internal_order(&self, columns: Mat<f64>) -> Mat<f64> {
+        assert_eq!(columns.nrows(), self.matrix_rows(), "rows of the matrices");
+        let Some(to) = &self.row_to_internal else { return columns };
+        let mut ordered = Mat::zeros(self.stiffness.n(), columns.ncols());
+        for j in 0..columns.ncols() {
+            for (row, &internal) in to.iter().enumerate().filter(|(_, internal)| **internal != u32::MAX) {
+                ordered[(internal as usize, j)] = columns[(row, j)];
+            }
+        }
+        ordered
+    }
+
+    /// Maps for shapes and loads from the rows of the files to the rows of K and M as they were read.
+    pub fn given_rows(&self) -> &GivenRows {
+        &self.given_rows
+    }
+
+    /// Numbers of rows that shapes and loads may have: that of K, and others that files have.
+    pub fn row_counts(&self) -> Vec<usize> {
+        std::iter::once(self.matrix_rows()).chain(self.given_rows.counts()).collect()
+    }
+
+    /// Which body of several in the same matrices it is; `None` for a model that was not split.
+    pub fn number(&self) -> Option<BodyNumber> {
+        self.number
+    }
+
+    /// Label of an internal row.
+    pub fn label(&self, row: usize) -> DofLabel {
+        self.rows.label(&self.nodes, row)
+    }
+}

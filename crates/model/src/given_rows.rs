@@ -1,0 +1,195 @@
+//! Rows of files beside K and M where the rows of the model are others: turned from the axes of nodes into those
+//! of the model, without rows that follow others, without empty rows.
+
+use super::DofLabel;
+use faer::Mat;
+use flexbody_linalg::CscMatrix;
+use std::collections::{BTreeMap, HashMap};
+
+/// Unit vectors along the rows of a node, in the axes of the model.
+pub type NodeAxes = [[f64; 3]; 3];
+
+/// Entries of rows that the model does not have may be this part of the largest entry of their matrix.
+const ROUNDING: f64 = 1e-12;
+
+/// Maps everything that is given by rows, or along the axes of nodes, to the rows of the model.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct GivenRows {
+    maps: Vec<RowMap>,
+    axes: HashMap<i64, NodeAxes>,
+}
+
+/// Maps the rows of a file to those of the model: x_file = T x.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RowMap {
+    /// T' (all rows, empty ones included, by rows of the file).
+    follows: CscMatrix,
+    /// P of the same shape, P T = I: the motion of the model in that of the file.
+    picks: CscMatrix,
+    /// Rows that the model keeps, ascending.
+    kept: Vec<u32>,
+}
+
+impl RowMap {
+    /// Maps rows of a file: column i of `follows` is the combination of rows that row i of the file moves with,
+    /// column i of `picks` says which rows take the motion of row i of the file, and `kept` are the rows that
+    /// the model has, ascending.
+    ///
+    /// # Panics
+    /// If the shapes of `follows` and `picks` differ.
+    pub fn new(follows: CscMatrix, picks: CscMatrix, kept: Vec<u32>) -> Self {
+        let shape = |own: &CscMatrix| (own.n_rows(), own.n_cols());
+        assert_eq!(shape(&follows), shape(&picks), "shapes of a map of rows");
+        Self { follows, picks, kept }
+    }
+
+    /// Number of rows of the file.
+    pub fn n_given(&self) -> usize {
+        self.follows.n_cols()
+    }
+
+    /// Maps a matrix A to T' A T.
+    ///
+    /// # Errors
+    /// [`LostRow`] if A has entries in rows that the model does not have.
+    fn matrix(&self, matrix: &CscMatrix) -> Result<CscMatrix, LostRow> {
+        let mut entries = Vec::with_capacity(matrix.nnz());
+        let mut largest = 0.0f64;
+        for column in 0..matrix.n_cols() {
+            let (rows, values) = matrix.column(column);
+            for (&row, &value) in rows.iter().zip(values) {
+                largest = largest.max(value.abs());
+                for (p, a) in self.followed(row as usize) {
+                    entries.extend(self.followed(column).map(|(q, b)| (p, q, a * value * b)));
+                }
+            }
+        }
+        let n = self.follows.n_rows();
+        let all = CscMatrix::from_triplets(n, n, &entries);
+        let lost = (0..n).find(|&column| {
+            let (rows, values) = all.column(column);
+            let own = self.place(column as u32);
+            let is_lost = |row: u32, value: f64| {
+                (own.is_none() || self.place(row).is_none()) && value.abs() > ROUNDING * largest
+            };
+            rows.iter().zip(values).any(|(row, value)| is_lost(*row, *value))
+        });
+        if lost.is_some() {
+            return Err(LostRow);
+        }
+        let kept = |(row, column): (u32, u32), value| Some((self.place(row)?, self.place(column)?, value));
+        let entries: Vec<(u32, u32, f64)> = (0..n as u32)
+            .flat_map(|column| {
+                let (rows, values) = all.column(column as usize);
+                rows.iter().zip(values).filter_map(move |(row, value)| kept((*row, column), *value))
+            })
+            .collect();
+        Ok(CscMatrix::from_triplets(self.kept.len(), self.kept.len(), &entries))
+    }
+
+    fn followed(&self, given: usize) -> impl Iterator<Item = (u32, f64)> + '_ {
+        let (rows, values) = self.follows.column(given);
+        rows.iter().copied().zip(values.iter().copied())
+    }
+
+    /// Row of the model of a row, where the model keeps it.
+    fn place(&self, row: u32) -> Option<u32> {
+        self.kept.binary_search(&row).ok().map(|place| place as u32)
+    }
+
+    /// Multiplies `by` with columns: the rows that the model keeps, and the largest absolute value of the others.
+    fn columns(&self, by: &CscMatrix, columns: &Mat<f64>) -> (Mat<f64>, f64) {
+        let mut all: Mat<f64> = Mat::zeros(by.n_rows(), columns.ncols());
+        for given in 0..by.n_cols() {
+            let (rows, values) = by.column(given);
+            for (row, value) in rows.iter().zip(values) {
+                for j in 0..columns.ncols() {
+                    all[(*row as usize, j)] += value * columns[(given, j)];
+                }
+            }
+        }
+        let kept = Mat::from_fn(self.kept.len(), all.ncols(), |i, j| all[(self.kept[i] as usize, j)]);
+        let others = (0..by.n_rows() as u32).filter(|row| self.place(*row).is_none());
+        let size = |row: u32| (0..all.ncols()).map(|j| all[(row as usize, j)].abs()).fold(0.0, f64::max);
+        (kept, others.map(size).fold(0.0, f64::max))
+    }
+}
+
+/// A matrix or a load has entries in rows that the model does not have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LostRow;
+
+impl GivenRows {
+    /// Maps for files of different numbers of rows, and the unit vectors along the rows of nodes whose results
+    /// stand along axes of their own. Of two maps for the same number of rows the first counts.
+    pub fn new(maps: Vec<RowMap>, axes: HashMap<i64, NodeAxes>) -> Self {
+        Self { maps, axes }
+    }
+
+    /// Numbers of rows, besides that of the model, that files may have.
+    pub fn counts(&self) -> impl Iterator<Item = usize> + '_ {
+        self.maps.iter().map(RowMap::n_given)
+    }
+
+    fn map(&self, n_given: usize) -> Option<&RowMap> {
+        self.maps.iter().find(|map| map.n_given() == n_given)
+    }
+
+    /// Maps a symmetric matrix A to T' A T. A matrix of another number of rows stays as it is.
+    ///
+    /// # Errors
+    /// [`LostRow`] if entries belong to rows that the model does not have.
+    pub fn matrix(&self, matrix: CscMatrix) -> Result<CscMatrix, LostRow> {
+        match self.map(matrix.n_cols()) {
+            Some(map) if matrix.n_rows() == matrix.n_cols() => map.matrix(&matrix),
+            _ => Ok(matrix),
+        }
+    }
+
+    /// Maps displacements, one column each. Columns of another number of rows stay as they are.
+    pub fn motions(&self, columns: Mat<f64>) -> Mat<f64> {
+        match self.map(columns.nrows()) {
+            Some(map) => map.columns(&map.picks, &columns).0,
+            None => columns,
+        }
+    }
+
+    /// Maps forces f to T' f, one column each. Columns of another number of rows stay as they are.
+    ///
+    /// # Errors
+    /// [`LostRow`] if forces act on rows that the model does not have.
+    pub fn forces(&self, columns: Mat<f64>) -> Result<Mat<f64>, LostRow> {
+        let Some(map) = self.map(columns.nrows()) else { return Ok(columns) };
+        let (forces, lost) = map.columns(&map.follows, &columns);
+        if lost > ROUNDING * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
+    }
+
+    /// Turns displacements that are given along the axes of the nodes into the axes of the model: rows by `labels`,
+    /// one column for each.
+    ///
+    /// # Errors
+    /// A node that has some of its displacements, or of its rotations, but not all three.
+    pub fn turn(&self, labels: &[DofLabel], columns: &mut Mat<f64>) -> Result<(), i64> {
+        let mut vectors: BTreeMap<(i64, bool), [Option<usize>; 3]> = BTreeMap::new();
+        for (row, label) in labels.iter().enumerate().filter(|(_, own)| self.axes.contains_key(&own.node)) {
+            let vector = vectors.entry((label.node, label.direction > 3)).or_default();
+            vector[usize::from(label.direction - 1) % 3] = Some(row);
+        }
+        for ((node, _), rows) in vectors {
+            let [Some(x), Some(y), Some(z)] = rows else { return Err(node) };
+            let (axes, rows) = (self.axes[&node], [x, y, z]);
+            for j in 0..columns.ncols() {
+                let own = rows.map(|row| columns[(row, j)]);
+                for (k, row) in rows.into_iter().enumerate() {
+                    columns[(row, j)] = (0..3).map(|axis| axes[axis][k] * own[axis]).sum();
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps the axes of nodes alone, for a part of the model: no file has the rows of a part.
+    pub(super) fn of_part(&self) -> Self {
+        Self { maps: Vec::new(), axes: self.axes.clone() }
+    }
+}

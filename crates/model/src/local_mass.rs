@@ -1,0 +1,205 @@
+//! The mass of every node beside the stiffness around it: speeds of sound, and masses that belong to another
+//! node.
+//!
+//! e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i is the stiffness along the lines to the nodes
+//! around a node, times the squares of their lengths. Summed over an isotropic solid with Lame's constants l
+//! and m it is (6 l + 9 m) V, whatever the elements are, and E A L of a bar: bending does not count, so that
+//! beams and shells count with what they are stretched by. Divided by d times the mass it is the square of a
+//! speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
+
+use super::assembled::Assembled;
+use super::common_units::{state_units, units_of_speed};
+use super::node_pairs::neighbours;
+use super::wording::name_some;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::SymmetricMatrix;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+/// Speeds of sound of matter in m/s, with room: the softest foams have about 30, beryllium and diamond 15,000
+/// to 20,000.
+const SPEEDS: (f64, f64) = (20.0, 25_000.0);
+
+/// No matter heavier than this (kg/m^3) is slower than this (m/s): lead has 3500, aluminium 8000, filled
+/// rubbers are lighter.
+const HEAVY: f64 = 2500.0;
+const SLOWEST_OF_HEAVY: f64 = 1000.0;
+
+/// Part of the diagonal entry of a node below which its row sum is too small to divide by.
+const MASSLESS: f64 = 0.01;
+
+/// The mass of a node may differ by so much of what its stiffness lets expect, relative to the largest such
+/// mass of its group, and must differ by so much to be told: nodes of the same elements keep 0.12 on all
+/// models in docs/plausibility.md.
+const FITS: f64 = 0.15;
+const MISFITS: f64 = 0.3;
+
+/// What belongs to each node.
+pub(super) struct LocalMass {
+    /// e_i.
+    pub dilation: Vec<f64>,
+    /// Row sum of the mass over the nodes, the mean of the directions.
+    pub mass: Vec<f64>,
+    /// Diagonal entry of the same.
+    pub diagonal: Vec<f64>,
+}
+
+/// Speeds of sound of a body in the units of the model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SoundSpeed {
+    /// From the sums over the body.
+    pub whole: f64,
+    /// The median over the nodes, which point masses and stiff connections leave alone.
+    pub median: f64,
+}
+
+impl LocalMass {
+    /// From K and the mean over the directions of the mass between nodes.
+    pub(crate) fn new(body: &Assembled, scalar_mass: &SymmetricMatrix) -> Self {
+        let Assembled { nodes, rows, stiffness, .. } = body;
+        let (n, d) = (nodes.len(), rows.dimension);
+        let x = &nodes.positions;
+        let sums = |i: usize| {
+            let mut dilation = 0.0;
+            for k in 0..d {
+                let (columns, values) = stiffness.row(d * i + k);
+                let mut sum = 0.0;
+                for (&column, &value) in columns.iter().zip(values) {
+                    let (j, l) = (column as usize / d, column as usize % d);
+                    if j >= n {
+                        break;
+                    }
+                    sum += value * (x[j][l] - x[i][l]) * (x[j][k] - x[i][k]);
+                }
+                dilation -= 0.5 * sum;
+            }
+            let (columns, values) = scalar_mass.row(i);
+            let own = columns.iter().zip(values).take_while(|(j, _)| (**j as usize) < n);
+            let (mut mass, mut diagonal) = (0.0, 0.0);
+            for (&j, &value) in own {
+                mass += value;
+                if j as usize == i {
+                    diagonal = value;
+                }
+            }
+            (dilation, (mass, diagonal))
+        };
+        let (dilation, (mass, diagonal)) = (0..n).into_par_iter().with_min_len(1024).map(sums).unzip();
+        Self { dilation, mass, diagonal }
+    }
+
+    /// The speeds of sound of a body in so many dimensions; `None` where nothing is stretched.
+    pub(crate) fn sound_speed(&self, dimension: usize) -> Option<SoundSpeed> {
+        let d = dimension as f64;
+        let mut ratios: Vec<f64> = (0..self.mass.len())
+            .filter(|&i| self.mass[i].abs() > MASSLESS * self.diagonal[i].abs())
+            .map(|i| self.dilation[i] / self.mass[i])
+            .filter(|ratio| ratio.is_finite())
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let median = *ratios.get(ratios.len() / 2)?;
+        let whole = self.dilation.iter().sum::<f64>() / self.mass.iter().sum::<f64>();
+        let speeds = SoundSpeed { whole: (whole / d).sqrt(), median: (median / d).sqrt() };
+        (speeds.whole > 0.0 && speeds.median > 0.0).then_some(speeds)
+    }
+
+    /// Pairs of nodes whose masses would fit the stiffness if they were exchanged, and do not as they are.
+    /// Only nodes of the same elements are compared, those that K couples with the same others: whatever
+    /// these are made of, it is the same for them.
+    pub(crate) fn exchanged(&self, body: &Assembled) -> Vec<[usize; 2]> {
+        let mut pairs = Vec::new();
+        for group in self.groups(body) {
+            let (sum_mass, sum_dilation) = group
+                .iter()
+                .fold((0.0, 0.0), |(mass, dilation), &i| (mass + self.mass[i], dilation + self.dilation[i]));
+            let density = sum_mass / sum_dilation;
+            if !(density > 0.0 && density.is_finite()) {
+                continue;
+            }
+            let expected = |i: usize| density * self.dilation[i];
+            let size =
+                group.iter().fold(0.0f64, |size, &i| size.max(self.mass[i].abs()).max(expected(i).abs()));
+            let off = |mass: f64, i: usize| (mass - expected(i)).abs() / size;
+            let wrong: Vec<usize> = group.into_iter().filter(|&i| off(self.mass[i], i) > MISFITS).collect();
+            for (at, &i) in wrong.iter().enumerate() {
+                let fits = |j: &&usize| off(self.mass[**j], i) < FITS && off(self.mass[i], **j) < FITS;
+                pairs.extend(wrong[at + 1..].iter().find(fits).map(|&j| [i, j]));
+            }
+        }
+        pairs
+    }
+
+    /// Nodes that K couples with the same others (and each other), two or more.
+    fn groups(&self, body: &Assembled) -> Vec<Vec<usize>> {
+        let Assembled { nodes, rows, stiffness, .. } = body;
+        let around = |i: usize| {
+            let mut closed = neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
+            closed.insert(closed.partition_point(|&j| (j as usize) < i), i as u32);
+            closed
+        };
+        let key = |i: usize| {
+            let mut hasher = DefaultHasher::new();
+            around(i).hash(&mut hasher);
+            hasher.finish()
+        };
+        let keys: Vec<u64> = (0..nodes.len()).into_par_iter().with_min_len(1024).map(key).collect();
+        let mut groups: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
+        keys.iter().enumerate().for_each(|(i, &key)| groups.entry(key).or_default().push(i));
+        let same =
+            |group: &Vec<usize>| group.len() > 1 && group.iter().all(|&i| around(i) == around(group[0]));
+        let mut groups: Vec<Vec<usize>> = groups.into_values().filter(same).collect();
+        groups.sort();
+        groups
+    }
+}
+
+/// A warning for masses that belong to another node; how many pairs there are.
+pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut Vec<Diagnostic>) -> usize {
+    let pairs = local.exchanged(body);
+    if pairs.is_empty() {
+        return 0;
+    }
+    let number = |i: usize| body.rows.number(&body.nodes, i);
+    let named: Vec<String> = pairs.iter().map(|&[i, j]| format!("{} and {}", number(i), number(j))).collect();
+    let message = format!(
+        "masses of nodes of the same elements fit their stiffness only when exchanged: {}",
+        name_some(&named)
+    );
+    found.push(Diagnostic::new(Code::MassesExchanged, message).in_file(&body.raw.mass.path));
+    pairs.len()
+}
+
+/// A warning when the speed of sound is that of no matter; `density` (SI) where it is known. An error where nothing states
+/// the units and the speed is that of matter in common ones: beams and shells have no density that K and M tell.
+pub(super) fn check_speed(
+    body: &Assembled,
+    local: &LocalMass,
+    density: Option<f64>,
+    found: &mut Vec<Diagnostic>,
+) {
+    let units = &body.raw.units;
+    let Some(speeds) = local.sound_speed(body.rows.dimension).filter(|_| body.raw.has_units()) else {
+        return;
+    };
+    let to_si = units.length.to_si() / units.time.to_si();
+    let (whole, median) = (speeds.whole * to_si, speeds.median * to_si);
+    let heavy = density.filter(|density| *density > HEAVY);
+    let slowest = if heavy.is_some() { SLOWEST_OF_HEAVY } else { SPEEDS.0 };
+    if whole.min(median) > SPEEDS.1 || whole.max(median) < slowest {
+        let matter = heavy.map_or(String::new(), |density| format!(" in matter of {density:.0} kg/m^3"));
+        let message = format!(
+            "stiffness, mass and coordinates give a speed of sound of {median:.3e} m/s{matter} (median of the nodes; {whole:.3e} m/s of the whole body)"
+        );
+        let fitting = units_of_speed(speeds.median).join(", or in ");
+        let unstated = !units.stated && !body.raw.allow_implausible && !fitting.is_empty();
+        found.push(match unstated && !found.iter().any(|own| own.code() == Code::DensityImplausible) {
+            true => Diagnostic::new(
+                Code::DensityImplausible,
+                format!("{message}, with numbers in m, kg, s, which nothing states"),
+            )
+            .with_help(state_units(&fitting)),
+            false => Diagnostic::new(Code::SpeedImplausible, message),
+        });
+    }
+}

@@ -1,0 +1,46 @@
+//! Whether the numbers of a model can be multiplied with each other in double precision.
+
+use super::rigid::extents;
+use super::{Nodes, RawModel};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::SymmetricMatrix;
+use rayon::prelude::*;
+
+/// Largest size, and reciprocal of the smallest, that a quantity may have: squares of all of them then stay
+/// twenty-eight decades within the range of double precision, which is the room that modes and rounding
+/// errors have.
+const LARGEST: f64 = 1e140;
+
+/// A refusal when K, M, the size of the body, or what units make of them, is so large or small that products
+/// overflow, or vanish without a trace.
+pub(super) fn check_magnitudes(
+    stiffness: &SymmetricMatrix,
+    mass: &SymmetricMatrix,
+    nodes: &Nodes,
+    raw: &RawModel,
+) -> Option<Diagnostic> {
+    let largest =
+        |m: &SymmetricMatrix| m.as_csc().values().par_iter().map(|v| v.abs()).reduce(|| 0.0, f64::max);
+    let (k, m) = (largest(stiffness), largest(mass));
+    let far = nodes.positions.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let size = extents(&nodes.positions).into_iter().fold(0.0, f64::max);
+    if [k, m, size].contains(&0.0) {
+        return None; // said by name elsewhere
+    }
+    let (stiffness_file, mass_file, nodes_file) = (&raw.stiffness.path, &raw.mass.path, &raw.nodes_path);
+    let quantities = [
+        ("stiffness", k, stiffness_file),
+        ("mass", m, mass_file),
+        ("length", size, nodes_file),
+        ("distance from the origin", far.max(size), nodes_file),
+        ("stiffness / mass", k / m, mass_file),
+        ("mass length^2", m * size * size, mass_file),
+    ];
+    let fits = |value: f64| (LARGEST.recip()..=LARGEST).contains(&value);
+    let (name, value, file) = quantities.into_iter().find(|&(_, value, _)| !fits(value))?;
+    let message = format!(
+        "{name} is of the order of {value:.0e}, not within {:.0e} and {LARGEST:.0e}",
+        LARGEST.recip()
+    );
+    Some(Diagnostic::new(Code::MagnitudeExtreme, message).in_file(file))
+}

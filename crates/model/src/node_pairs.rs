@@ -1,0 +1,235 @@
+//! Which pairs of nodes each matrix couples: an element that gives two nodes common mass ties them by its
+//! stiffness too.
+
+use super::assembled::Assembled;
+use super::rows::Rows;
+use super::wording::name_some;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::SymmetricMatrix;
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// Mass between two rows relative to the root of their diagonal entries below which it is what rounding left
+/// of zero.
+const NOTHING: f64 = 1e-10;
+
+/// Vertices per parallel task.
+const VERTICES: usize = 2048;
+
+/// The pairs of vertices ([`Rows::vertex`]) that the mass couples.
+#[derive(Default)]
+pub(super) struct MassPairs {
+    /// How many there are.
+    pub count: usize,
+    /// Those that the stiffness does not couple, ascending, the lower vertex first.
+    pub foreign: Vec<[u32; 2]>,
+}
+
+impl MassPairs {
+    /// All of them, of matrices in the internal order.
+    pub(crate) fn new(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: &Rows) -> Self {
+        let diagonal = mass.diagonal();
+        let own = |first: usize| {
+            let mut part = Self::default();
+            for vertex in first..(first + VERTICES).min(rows.vertices()) {
+                let mut coupled = by_mass(mass, &diagonal, rows, vertex);
+                coupled.retain(|&other| other as usize > vertex);
+                part.count += coupled.len();
+                // Bubbles of one element share mass, but their strains may be orthogonal.
+                if !coupled.is_empty() && rows.is_node(vertex) {
+                    let tied = neighbours(stiffness, rows, vertex, |_, _, value| value != 0.0);
+                    coupled.retain(|other| tied.binary_search(other).is_err());
+                    part.foreign.extend(coupled.into_iter().map(|other| [vertex as u32, other]));
+                }
+            }
+            part
+        };
+        let starts = (0..rows.vertices()).into_par_iter().step_by(VERTICES);
+        let mut all = Self::default();
+        for part in starts.map(own).collect::<Vec<_>>() {
+            all.count += part.count;
+            all.foreign.extend(part.foreign);
+        }
+        all
+    }
+}
+
+/// The other vertices to which `matrix` has an entry that `counts` (row, column, value) from the rows of
+/// `vertex`, ascending.
+pub(super) fn neighbours(
+    matrix: &SymmetricMatrix,
+    rows: &Rows,
+    vertex: usize,
+    counts: impl Fn(usize, usize, f64) -> bool,
+) -> Vec<u32> {
+    let mut others = Vec::new();
+    for row in rows.of_vertex(vertex) {
+        let (columns, values) = matrix.row(row);
+        for (&column, &value) in columns.iter().zip(values) {
+            let other = rows.vertex(column as usize) as u32;
+            if others.last() != Some(&other) && counts(row, column as usize, value) {
+                others.push(other);
+            }
+        }
+    }
+    others.sort();
+    others.dedup();
+    others.retain(|&other| other as usize != vertex);
+    others
+}
+
+fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize) -> Vec<u32> {
+    let counts = |i: usize, j: usize, value: f64| {
+        value != 0.0 && value * value > NOTHING * NOTHING * (diagonal[i] * diagonal[j]).abs()
+    };
+    neighbours(mass, rows, vertex, counts)
+}
+
+/// An error when the mass couples nodes that the stiffness does not, which no order of the same elements
+/// does. A warning only where the pairs are those of mass elements, or where the user wants it so. Returns
+/// how many pairs the mass couples, and how many of them the stiffness does not.
+pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) -> [usize; 2] {
+    let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
+    let MassPairs { count, foreign } = MassPairs::new(stiffness, mass, rows);
+    if foreign.is_empty() {
+        return [count, 0];
+    }
+    let number = |vertex: u32| rows.number(nodes, vertex as usize);
+    let named: Vec<String> =
+        foreign.iter().take(6).map(|&[a, b]| format!("{} with {}", number(a), number(b))).collect();
+    let some = match foreign.len().checked_sub(named.len()) {
+        None | Some(0) => name_some(&named),
+        Some(_) => named.join(", ") + ", ...",
+    };
+    let message = format!(
+        "mass couples {count} pairs of nodes, {} of which stiffness does not couple: {some}",
+        foreign.len()
+    );
+    let report = |code| Diagnostic::new(code, message.as_str()).in_file(&raw.mass.path);
+    if raw.allow_implausible {
+        found.push(report(Code::MassPairs));
+    } else if let Some(order) = other_order(body) {
+        found.push(report(Code::MassOrder).with_help(order));
+    } else if are_mass_elements(mass, rows, count, &foreign) {
+        let help = "each of these nodes shares mass with each other, as of a mass element or a mass spread over nodes: nothing to do if the model has one";
+        found.push(report(Code::MassPairs).with_help(help));
+    } else {
+        found.push(report(Code::MassOrder));
+    }
+    [count, foreign.len()]
+}
+
+/// Whether the pairs fall into groups within which the mass couples every node with every other, as when a
+/// mass is spread over them. One node coupled with several others is no such group, nor are several single
+/// pairs: that is what two exchanged nodes leave.
+fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign: &[[u32; 2]]) -> bool {
+    if foreign.len() * 4 > count {
+        // Every other mass would belong to such elements. A single pair in a tiny model may be one.
+        return foreign.len() == 1;
+    }
+    let mut pairs_of: HashMap<u32, Vec<u32>> = HashMap::new();
+    for &[a, b] in foreign {
+        pairs_of.entry(a).or_default().push(b);
+        pairs_of.entry(b).or_default().push(a);
+    }
+    let diagonal = mass.diagonal();
+    let mut members: Vec<u32> = pairs_of.keys().copied().collect();
+    members.sort_unstable();
+    let mut seen: HashMap<u32, usize> = HashMap::new();
+    for (group, &first) in members.iter().enumerate() {
+        if seen.contains_key(&first) {
+            continue;
+        }
+        let mut own = vec![first];
+        seen.insert(first, group);
+        let mut at = 0;
+        while at < own.len() {
+            for &other in &pairs_of[&own[at]] {
+                if seen.insert(other, group).is_none() {
+                    own.push(other);
+                }
+            }
+            at += 1;
+        }
+        let pairs = own.iter().map(|vertex| pairs_of[vertex].len()).sum::<usize>() / 2;
+        let single = pairs == 1 && foreign.len() > 1;
+        let star = pairs > 1 && own.iter().any(|vertex| pairs_of[vertex].len() == pairs);
+        let complete = |&vertex: &u32| {
+            let coupled = by_mass(mass, &diagonal, rows, vertex as usize);
+            coupled.iter().filter(|other| seen.get(other) == Some(&group)).count() == own.len() - 1
+        };
+        if single || star || !own.iter().all(complete) {
+            return false;
+        }
+    }
+    true
+}
+
+/// An order that the rows of M may stand in: whether the model can have it, the row that each row of the file
+/// would stand for, and what to do about it.
+type Order<'o> = (bool, &'o dyn Fn(usize) -> usize, &'static str);
+
+/// What to do when the mass fits the stiffness in another order of its rows.
+fn other_order(body: &Assembled) -> Option<&'static str> {
+    let Assembled { nodes, rows, row_to_internal, .. } = body;
+    let n = rows.len();
+    if row_to_internal.as_ref().is_some_and(|to| to.len() != n) {
+        return None;
+    }
+    let internal = |row: usize| row_to_internal.as_ref().map_or(row, |to| to[row] as usize);
+    let mut by_label: Vec<usize> = (0..n).collect();
+    by_label.sort_by_key(|&row| {
+        let label = rows.label(nodes, row);
+        (label.node, label.direction)
+    });
+    let mut row_of = vec![0; n];
+    (0..n).for_each(|row| row_of[internal(row)] = row);
+    let per_node = n / rows.nodes.max(1);
+    let blocked = |row: usize| per_node * (row % rows.nodes) + row / rows.nodes;
+    let transposed = |row: usize| rows.nodes * (row % per_node) + row / per_node;
+    // The internal row that each row of the mass file would stand for.
+    let orders: [Order<'_>; 5] = [
+        (
+            true,
+            &|row| by_label[row],
+            "the rows of the mass matrix follow ascending node numbers, those of the stiffness matrix another order: write both in one",
+        ),
+        (
+            true,
+            &|row| row,
+            "the rows of the mass matrix follow the node table, those of the stiffness matrix another order: write both in one",
+        ),
+        (
+            true,
+            &|row| internal(n - 1 - row),
+            "the rows of the mass matrix stand in the reverse order of those of the stiffness matrix: write both in one",
+        ),
+        (
+            per_node * rows.nodes == n,
+            &|row| internal(blocked(row)),
+            "the rows of the mass matrix are those of the first direction for all nodes, then the second, and so on; those of the stiffness matrix go node by node: write both in one order",
+        ),
+        (
+            per_node * rows.nodes == n,
+            &|row| internal(transposed(row)),
+            "the rows of the mass matrix go node by node, those of the stiffness matrix direction by direction: write both in one order",
+        ),
+    ];
+    orders.iter().find(|(possible, to, _)| *possible && fits(body, &row_of, to)).map(|(.., help)| *help)
+}
+
+/// Whether the mass couples only what the stiffness couples when each row of its file stands for the internal
+/// row `to`; `row_of` is the row of the file that each internal row stood for.
+fn fits(body: &Assembled, row_of: &[usize], to: &dyn Fn(usize) -> usize) -> bool {
+    let Assembled { rows, stiffness, mass, .. } = body;
+    let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();
+    let mut tied: HashMap<usize, Vec<u32>> = HashMap::new();
+    (0..rows.len()).all(|row| {
+        let own = place[row];
+        let near = tied.entry(own).or_insert_with(|| neighbours(stiffness, rows, own, |_, _, v| v != 0.0));
+        mass.row(row).0.iter().all(|&column| {
+            let other = place[column as usize];
+            other == own || near.binary_search(&(other as u32)).is_ok()
+        })
+    })
+}

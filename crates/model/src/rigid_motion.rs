@@ -1,0 +1,203 @@
+//! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly
+//! where it does not.
+
+use super::assembled::Assembled;
+use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
+use super::wording::name_some;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_linalg::{Pencil, gram, largest};
+
+/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second
+/// limit: node tables written with few digits leave up to 1e-6, supports 0.01 to 1. Above the first, what is
+/// known of the positions is told: the invariants have no more digits than that.
+pub(super) fn check_rigid_motion(
+    body: &Assembled,
+    (rounded, limit): (f64, f64),
+    found: &mut Vec<Diagnostic>,
+) -> f64 {
+    let Assembled { raw, nodes, rows, stiffness, .. } = body;
+    let (centre, length) = centre_and_length(&nodes.positions);
+    let fields = rows.rigid_fields(&nodes.positions, centre, length);
+    let residuals = rigid_residuals(stiffness, &fields, &rows.field_sizes(length));
+    let worst = largest(residuals.iter().copied());
+    if worst.is_nan() || worst > limit {
+        let mut strained: Vec<usize> =
+            (0..residuals.len()).filter(|&i| residuals[i].is_nan() || residuals[i] > limit).collect();
+        strained.sort_by(|&a, &b| residuals[b].total_cmp(&residuals[a]).then(a.cmp(&b)));
+        let named: Vec<String> =
+            strained.iter().map(|&i| format!("{} ({:.1e})", rows.label(nodes, i), residuals[i])).collect();
+        let message = format!(
+            "K R is not zero for {} of {} rows: |K R| reaches {worst:.1e} of the row sum of |K| (allowed {limit:.0e}); worst: {}",
+            strained.len(),
+            residuals.len(),
+            name_some(&named)
+        );
+        let help = match mislabelled(body, limit) {
+            Some(help) => help,
+            None if is_stressed(body, &fields, &strained, limit) => {
+                "at these nodes K turns forces with rotations and lets translations free: it holds the stress of a preload (pretension of a member, contact, pressure); write K of the unloaded body, and give the stress stiffness as [[geometric_stiffness]]"
+            }
+            None if strained.len() * 2 < residuals.len() => {
+                "these degrees of freedom are supported or tied to ground: export the free body"
+            }
+            None => {
+                "nearly all rows fail: coordinates in other units or another node order than the matrices, or rotations labelled as displacements"
+            }
+        };
+        let diagnostic = Diagnostic::new(Code::RigidMotionStrained, message);
+        found.push(diagnostic.in_file(&raw.stiffness.path).with_help(help));
+    } else if worst > rounded {
+        let message = format!(
+            "|K R| reaches {worst:.1e} of the row sum of |K|: node positions and stiffness agree to about as much of the size of the body"
+        );
+        found.push(Diagnostic::new(Code::NodesRounded, message).in_file(&raw.nodes_path));
+    }
+    worst
+}
+
+/// True if K leaves translations free, and rotations (angle theta about each axis) make forces theta x F at the
+/// strained rows: K of a body under a load F that is in equilibrium with stress in it. `fields` are the rigid
+/// motions, with rotations divided by a length.
+fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f64) -> bool {
+    /// Part of the forces that may not be theta x F.
+    const OTHER: f64 = 1e-3;
+    let d = body.rows.dimension;
+    let force = |row: usize, field: usize| {
+        let (columns, values) = body.stiffness.row(row);
+        columns.iter().zip(values).map(|(&j, k)| k * fields[(j as usize, field)]).sum::<f64>()
+    };
+    let size = |row: usize| body.stiffness.row(row).1.iter().map(|k| k.abs()).sum::<f64>();
+    let mut vertices: Vec<usize> = strained.iter().map(|row| row / 3).collect();
+    vertices.sort_unstable();
+    vertices.dedup();
+    d == 3
+        && strained.iter().all(|row| *row < 3 * body.nodes.len())
+        && strained.iter().all(|&row| (0..3).all(|k| force(row, k).abs() <= limit * size(row)))
+        && vertices.iter().all(|vertex| {
+            let block = [0, 1, 2].map(|k| [3, 4, 5].map(|field| force(3 * vertex + k, field)));
+            let pairs = || (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+            let largest = pairs().map(|(k, l)| block[k][l].abs()).fold(0.0, f64::max);
+            pairs().all(|(k, l)| (block[k][l] + block[l][k]).abs() <= OTHER * largest)
+        })
+}
+
+/// What to do when K leaves the rigid motions free that its rows have by another reading of the labels.
+fn mislabelled(body: &Assembled, limit: f64) -> Option<&'static str> {
+    let readings = Readings::new(body, limit);
+    readings.of_three_rows().or_else(|| readings.swapped())
+}
+
+/// Other readings of the labels of a body in space.
+struct Readings<'a> {
+    body: &'a Assembled,
+    /// Residual that rounding leaves of rigid motion.
+    limit: f64,
+    length: f64,
+    /// Rigid fields of the nodes in space.
+    fields: Mat<f64>,
+}
+
+impl<'a> Readings<'a> {
+    fn new(body: &'a Assembled, limit: f64) -> Self {
+        let (centre, length) = centre_and_length(&body.nodes.positions);
+        Self { body, limit, length, fields: rigid_fields(&body.nodes.positions, 3, centre, length) }
+    }
+
+    /// Whether K leaves these motions free; `rotation` says which rows are taken for rotations.
+    fn are_free(&self, fields: &Mat<f64>, rotation: impl Fn(usize) -> bool) -> bool {
+        let size = |row: usize| if rotation(row) { 1.0 / self.length } else { 1.0 };
+        let sizes: Vec<f64> = (0..fields.nrows()).map(size).collect();
+        rigid_residuals(&self.body.stiffness, fields, &sizes).iter().all(|&r| r <= self.limit)
+    }
+
+    /// What a rigid field does to a direction of a node: translations, then rotations.
+    fn motion(&self, node: usize, direction: usize, field: usize) -> f64 {
+        match (direction < 3, field >= 3) {
+            (true, _) => self.fields[(3 * node + direction, field)],
+            (false, true) => f64::from(u8::from(direction == field)) / self.length,
+            (false, false) => 0.0,
+        }
+    }
+
+    /// The three rows of each node are others than its displacements, or stand in another order.
+    fn of_three_rows(&self) -> Option<&'static str> {
+        if self.body.rows.dimension != 3 || !self.body.rows.are_plain() {
+            return None;
+        }
+        // Motions that such rows cannot show vanish.
+        let readings = [
+            (
+                [0, 1, 5],
+                "rows are ux, uy, rz of a plane frame: set `dimension = 2` and label the rotations with direction 6",
+            ),
+            (
+                [0, 2, 4],
+                "rows are ux, uz, ry of a plane frame: label them 1, 3, 5 in space, or turn its plane to x, y and set `dimension = 2`",
+            ),
+            (
+                [2, 3, 4],
+                "rows are uz, rx, ry of a plate in bending: label them 3, 4, 5 and give the displacements in its plane as well",
+            ),
+        ];
+        let n = self.body.nodes.len();
+        for (directions, help) in readings {
+            let fields = Mat::from_fn(3 * n, 6, |row, c| self.motion(row / 3, directions[row % 3], c));
+            if self.are_free(&fields, |row| directions[row % 3] >= 3) {
+                return Some(help);
+            }
+        }
+        let blocked = Mat::from_fn(3 * n, 6, |row, c| self.fields[(3 * (row % n) + row / n, c)]);
+        self.are_free(&blocked, |_| false)
+            .then_some("rows are those of x for all nodes, then y, then z: give a dofs table that says so")
+    }
+
+    /// Every node has three displacements and three rotations, which are labelled as each other.
+    fn swapped(&self) -> Option<&'static str> {
+        let (rows, n) = (&self.body.rows, self.body.nodes.len());
+        if rows.dimension != 3 || rows.rotations().len() != 3 * n {
+            return None;
+        }
+        let swapped = Mat::from_fn(rows.len(), 6, |row, c| match row.checked_sub(3 * n) {
+            _ if rows.vertex(row) >= n => 0.0,
+            None => self.motion(row / 3, 3 + row % 3, c),
+            Some(turn) => self.motion(turn / 3, turn % 3, c),
+        });
+        self.are_free(&swapped, |row| row < 3 * n).then_some(
+            "rotations are labelled as displacements and displacements as rotations: 1, 2, 3 are ux, uy, uz and 4, 5, 6 are rx, ry, rz",
+        )
+    }
+}
+
+/// A mass that does not commute with rotations must still give rigid motion the inertia of a rigid body: R'MR
+/// = \[m I, -c~; c~, I0\].
+pub(super) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Diagnostic>) {
+    let Assembled { raw, nodes, rows, mass, stiffness, .. } = body;
+    let (centre, length) = centre_and_length(&nodes.positions);
+    let rigid = rows.rigid_fields(&nodes.positions, centre, length);
+    let d = rows.dimension;
+    let g = gram(rigid.as_ref(), Pencil::new(stiffness, mass, 1).apply_mass(rigid.as_ref()).as_ref());
+    let m = (0..d).map(|k| g[(k, k)]).sum::<f64>() / d as f64;
+    let mut refuse = |message: String| {
+        found.push(Diagnostic::new(Code::MassDirectional, message).in_file(&raw.mass.path));
+    };
+    let directional = (0..d).flat_map(|k| (0..d).map(move |l| (k, l)));
+    let spread =
+        directional.fold(0.0f64, |s, (k, l)| s.max((g[(k, l)] - if k == l { m } else { 0.0 }).abs()));
+    if spread > tolerance * m {
+        let along: Vec<String> =
+            (0..d).map(|k| format!("{} along {}", g[(k, k)], ["x", "y", "z"][k])).collect();
+        return refuse(format!("total mass is {}, coupled by up to {:.1e}", along.join(", "), spread));
+    }
+    if d == 3 {
+        // T_k' M (e_l x r) = -T_l' M (e_k x r), zero for k = l.
+        let skew = (0..3).flat_map(|k| (0..3).map(move |l| (k, l)));
+        let spread = skew.fold(0.0f64, |s, (k, l)| s.max((g[(k, 3 + l)] + g[(l, 3 + k)]).abs()));
+        if spread > tolerance * m {
+            refuse(format!(
+                "centres of mass along x, y and z differ by {:.1e}: the mass matrix is not that of a body",
+                0.5 * spread / m * length
+            ));
+        }
+    }
+}

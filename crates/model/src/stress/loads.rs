@@ -1,0 +1,298 @@
+//! The loads that geometric stiffness is given for, as forces at nodes, and how far others are from them.
+
+use super::fit::{Relief, force, least_lengths, solve};
+use crate::rigid::centre_and_length;
+use crate::{Coupling, FeModel, InertialRows, LoadKind, NodeSet, UnitLoad};
+use faer::Mat;
+use flexbody_linalg::{gram, larger};
+use nalgebra::{Matrix6, Vector3, Vector6};
+
+/// Part of the acceleration that balances a load by which inertia relief may differ from it.
+const NEARLY_BALANCED: f64 = 1e-3;
+
+/// Nodes with the least differences that have to carry a load: the others may be supported.
+const FREE_NODES: f64 = 0.5;
+
+/// A node is supported where its difference, relative to its force, is more than so many times the usual one.
+const SUPPORTED: f64 = 10.0;
+
+/// Part of the load that these nodes carry at the least.
+const FREE_LOAD: f64 = 0.25;
+
+/// Forces below this part of the inertia of the body are rounding.
+const SMALL_LOAD: f64 = 1e-6;
+
+/// Unit loads of a model.
+pub(super) struct UnitLoads<'m> {
+    model: &'m FeModel,
+    rows: InertialRows<'m>,
+    /// M times the rigid motions about the centre of [`InertialRows`], on its rows.
+    momenta: Mat<f64>,
+    /// Forces -M of the rigid motions at every node.
+    relief: Vec<Relief>,
+    /// Mass of the rigid motions; zero for those out of the plane.
+    mass: Matrix6<f64>,
+    /// Largest distance of a node from the middle.
+    length: f64,
+}
+
+/// One explanation of the forces that a stress turns: those of the load and of rigid accelerations.
+struct Explained {
+    acceleration: Vector6<f64>,
+    /// Error of the accelerations themselves.
+    error: f64,
+}
+
+impl<'m> UnitLoads<'m> {
+    pub(super) fn new(model: &'m FeModel) -> Self {
+        let rows = InertialRows::new(model, model.centre_of_mass());
+        let rigid = rows.rigid();
+        let momenta = rows.weigh(rigid.as_ref());
+        let at_nodes = rows.restrict(momenta.clone());
+        let (d, to) = (model.dimension(), motions(model.dimension()));
+        let relief = (0..model.nodes().len()).map(|i| {
+            let mut forces: Relief = [Vector3::zeros(); 6];
+            for (column, &motion) in to.iter().enumerate() {
+                (0..d).for_each(|k| forces[motion][k] = -at_nodes[(d * i + k, column)]);
+            }
+            forces
+        });
+        let relief = relief.collect();
+        let products = gram(rigid.as_ref(), momenta.as_ref());
+        let mut mass = Matrix6::zeros();
+        for (a, &to_a) in to.iter().enumerate() {
+            to.iter().enumerate().for_each(|(b, &to_b)| mass[(to_a, to_b)] = products[(a, b)]);
+        }
+        let (_, length) = centre_and_length(&model.nodes().positions);
+        Self { model, rows, momenta, relief, mass, length }
+    }
+
+    /// Difference of `forces`, one at each node, from those of a unit of `load`, relative to them; supports at some
+    /// nodes and inertia relief may carry the load. `None` of a load that is known by its name only.
+    pub(super) fn error(&self, load: &UnitLoad, forces: &[Vector3<f64>]) -> Option<f64> {
+        let axis = load.component;
+        match &load.kind {
+            LoadKind::Named(_) => None,
+            LoadKind::Acceleration => Some(self.of_acceleration(forces, axis)),
+            LoadKind::AngularAcceleration => Some(self.of_angular_acceleration(forces, axis)),
+            LoadKind::Spin => Some(self.of_spin(forces, axis)),
+            LoadKind::Force(at) | LoadKind::Moment(at) => {
+                let set = self.model.interfaces().iter().find(|set| set.name == *at)?;
+                let mut wanted = Vector6::zeros();
+                wanted[if matches!(load.kind, LoadKind::Force(_)) { axis } else { 3 + axis }] = 1.0;
+                Some(self.of_interface(forces, set, &wanted))
+            }
+        }
+    }
+
+    /// Inertia forces of a unit acceleration.
+    fn of_acceleration(&self, forces: &[Vector3<f64>], axis: usize) -> f64 {
+        let none = vec![Vector3::zeros(); forces.len()];
+        self.of_inertia(forces, &none, &Vector6::ith(axis, 1.0))
+    }
+
+    /// Inertia forces of a unit angular acceleration about the origin of a frame.
+    fn of_angular_acceleration(&self, forces: &[Vector3<f64>], axis: usize) -> f64 {
+        let none = vec![Vector3::zeros(); forces.len()];
+        let about_centre = Vector6::ith(3 + axis, 1.0);
+        let shift = Vector3::ith(axis, 1.0).cross(&self.rows.centre());
+        let about_origin = about_centre + translation(&shift);
+        let error = |motion: &Vector6<f64>| self.of_inertia(forces, &none, motion);
+        error(&about_centre).min(error(&about_origin))
+    }
+
+    /// Centrifugal forces about the origin of a frame.
+    fn of_spin(&self, forces: &[Vector3<f64>], component: usize) -> f64 {
+        let load = self.centrifugal(component);
+        let (k, l) = LoadKind::SPIN[component];
+        let twice =
+            |k: usize, l: usize| Vector3::ith(k, 1.0).cross(&Vector3::ith(l, 1.0).cross(&self.rows.centre()));
+        let shift = if k == l { twice(k, l) } else { twice(k, l) + twice(l, k) };
+        let error = |motion: &Vector6<f64>| self.of_inertia(forces, &load, motion);
+        error(&Vector6::zeros()).min(error(&translation(&shift)))
+    }
+
+    /// Least error of what may carry the `load` with the inertia forces of a rigid acceleration: supports, the inertia
+    /// relief of a free body, or both.
+    fn of_inertia(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], motion: &Vector6<f64>) -> f64 {
+        let load: Vec<_> =
+            load.iter().zip(&self.relief).map(|(f, relief)| f + force(relief, motion)).collect();
+        let whole = self.balance(&load);
+        let partly = least_lengths(&differences(forces, &load), &self.relief);
+        // Supports do no work on the motion that they leave: it is M-orthogonal to what they take of the load.
+        let taken = whole - partly;
+        let product = |a: &Vector6<f64>, b: &Vector6<f64>| a.dot(&(self.mass * b));
+        let size = product(&taken, &taken).min(product(&partly, &partly));
+        // Moments at rotations of nodes are not among the forces: relief that nearly balances the load is all of it.
+        let is_balanced = self.rows.have_directors()
+            && product(&taken, &taken) <= NEARLY_BALANCED.powi(2) * product(&partly, &partly);
+        let error = if is_balanced || size == 0.0 { 0.0 } else { product(&taken, &partly).abs() / size };
+        let all = [
+            Explained { acceleration: Vector6::zeros(), error: 0.0 },
+            Explained { acceleration: whole, error: 0.0 },
+            Explained { acceleration: partly, error },
+        ];
+        self.least(forces, &load, &all)
+    }
+
+    /// Rigid acceleration whose inertia forces balance forces at the nodes.
+    fn balance(&self, load: &[Vector3<f64>]) -> Vector6<f64> {
+        let mut normal = Matrix6::zeros();
+        let mut right = Vector6::zeros();
+        let motions = self.model.nodes().positions.iter().map(|x| self.motions_of(x));
+        for ((motions, relief), f) in motions.zip(&self.relief).zip(load) {
+            for a in 0..6 {
+                right[a] += motions[a].dot(f);
+                (0..6).for_each(|b| normal[(a, b)] -= motions[a].dot(&relief[b]));
+            }
+        }
+        solve(0.5 * (normal + normal.transpose()), &right)
+    }
+
+    /// Displacements of a place under the six unit rigid motions.
+    fn motions_of(&self, place: &[f64; 3]) -> Relief {
+        let arm = Vector3::from(*place) - self.rows.centre();
+        std::array::from_fn(|motion| match motion {
+            0..3 => Vector3::ith(motion, 1.0),
+            _ => Vector3::ith(motion - 3, 1.0).cross(&arm),
+        })
+    }
+
+    /// Forces at the nodes of an interface with a unit resultant.
+    fn of_interface(&self, forces: &[Vector3<f64>], set: &NodeSet, wanted: &Vector6<f64>) -> f64 {
+        let ids = &self.model.nodes().ids;
+        let is_member: Vec<bool> = ids.iter().map(|id| set.nodes.contains(id)).collect();
+        let outside: Vec<_> = forces
+            .iter()
+            .zip(&is_member)
+            .map(|(f, &member)| if member { Vector3::zeros() } else { *f })
+            .collect();
+        let resultant = self.resultant_of(wanted, self.reference(set, &is_member));
+        let balance = solve(self.mass, &resultant);
+        let candidates = [Vector6::zeros(), balance, least_lengths(&outside, &self.relief)];
+        let total: f64 = forces.iter().map(Vector3::norm).sum::<f64>().max(f64::MIN_POSITIVE);
+        let error = |by: &Vector6<f64>| {
+            let rest = |i: usize| forces[i] - force(&self.relief[i], by);
+            let mut lengths: Vec<f64> =
+                (0..ids.len()).filter(|&i| !is_member[i]).map(|i| rest(i).norm()).collect();
+            lengths.sort_by(f64::total_cmp);
+            let kept = (FREE_NODES * ids.len() as f64).ceil() as usize;
+            let elsewhere = lengths.iter().take(kept).sum::<f64>() / total;
+            let own: Vec<_> = (0..ids.len()).filter(|&i| is_member[i]).map(|i| (i, rest(i))).collect();
+            larger(elsewhere, self.resultant_error(&own, set, wanted, &is_member))
+        };
+        candidates.iter().map(error).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Difference of the resultant of the forces at the nodes of an interface from `wanted` about its reference
+    /// point, in units of the larger of the wanted force and moment. Moments are not known where nodes turn.
+    fn resultant_error(
+        &self,
+        own: &[(usize, Vector3<f64>)],
+        set: &NodeSet,
+        wanted: &Vector6<f64>,
+        is_member: &[bool],
+    ) -> f64 {
+        let positions = &self.model.nodes().positions;
+        let about = self.reference(set, is_member);
+        let mut difference = -wanted.fixed_rows::<3>(0).into_owned();
+        let mut moment = -wanted.fixed_rows::<3>(3).into_owned();
+        for (i, f) in own {
+            difference += f;
+            moment += (Vector3::from(positions[*i]) - about).cross(f);
+        }
+        let turning = self.model.rows().rotations().iter().any(|&(node, _)| is_member[node as usize]);
+        let known = !turning && set.coupling() != Coupling::Free;
+        let is_moment = wanted.fixed_rows::<3>(3).norm() > 0.0;
+        let force_error = difference.norm() * if is_moment { self.length } else { 1.0 };
+        let moment_error = moment.norm() / if is_moment { 1.0 } else { self.length };
+        if known { larger(force_error, moment_error) } else { force_error }
+    }
+
+    /// The reference point of an interface, or the mean of its nodes.
+    fn reference(&self, set: &NodeSet, is_member: &[bool]) -> Vector3<f64> {
+        if let Some(point) = set.reference.point() {
+            return Vector3::from(point);
+        }
+        let own: Vec<_> = self.model.nodes().positions.iter().zip(is_member).filter(|(_, m)| **m).collect();
+        own.iter().map(|(x, _)| Vector3::from(**x)).sum::<Vector3<f64>>() / own.len().max(1) as f64
+    }
+
+    /// Work of a force and moment at a point on the unit rigid motions.
+    fn resultant_of(&self, wanted: &Vector6<f64>, point: Vector3<f64>) -> Vector6<f64> {
+        let f = wanted.fixed_rows::<3>(0).into_owned();
+        let moment = wanted.fixed_rows::<3>(3) + (point - self.rows.centre()).cross(&f);
+        let mut resultant = Vector6::zeros();
+        resultant.fixed_rows_mut::<3>(0).copy_from(&f);
+        resultant.fixed_rows_mut::<3>(3).copy_from(&moment);
+        resultant
+    }
+
+    /// Least error of the explanations of `forces`.
+    fn least(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], all: &[Explained]) -> f64 {
+        let error = |one: &Explained| larger(one.error, self.unexplained(forces, load, &one.acceleration));
+        all.iter().map(error).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Difference of `forces` from `load` with the relief by an acceleration, at the nodes where it is least, relative to
+    /// the forces there.
+    fn unexplained(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], by: &Vector6<f64>) -> f64 {
+        let net: Vec<_> = load.iter().zip(&self.relief).map(|(f, relief)| f + force(relief, by)).collect();
+        let mut nodes: Vec<(f64, usize)> =
+            forces.iter().zip(&net).map(|(f, net)| (f - net).norm()).zip(0..).collect();
+        nodes.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let all: f64 = net.iter().map(Vector3::norm).sum();
+        let floor = SMALL_LOAD * self.inertia();
+        let size_of = |i: usize| larger(net[i].norm(), forces[i].norm());
+        let largest = (0..net.len()).map(size_of).fold(0.0, larger);
+        let loaded = nodes.iter().filter(|one| size_of(one.1) > SMALL_LOAD * largest);
+        let mut ratios: Vec<f64> = loaded.map(|&(rest, i)| rest / size_of(i)).collect();
+        ratios.sort_by(f64::total_cmp);
+        let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(0.0);
+        let (mut difference, mut size, mut carried) = (0.0, 0.0, 0.0);
+        for (count, &(rest, i)) in nodes.iter().enumerate() {
+            let own = size_of(i);
+            let is_enough = count as f64 >= FREE_NODES * net.len() as f64 && carried >= FREE_LOAD * all;
+            if is_enough && rest > SUPPORTED * usual * own {
+                continue;
+            }
+            carried += net[i].norm();
+            difference += rest;
+            size += own;
+        }
+        difference / larger(size, floor)
+    }
+
+    /// Sum of the inertia forces of unit motions over the nodes, rotations by their lengths.
+    fn inertia(&self) -> f64 {
+        let of_node = |relief: &Relief| relief.iter().map(Vector3::norm).fold(0.0, larger);
+        self.relief.iter().map(of_node).sum::<f64>()
+    }
+
+    /// Centrifugal forces at the nodes for one product of spin rates, about the centre.
+    fn centrifugal(&self, component: usize) -> Vec<Vector3<f64>> {
+        let (d, (k, l)) = (self.model.dimension(), LoadKind::SPIN[component]);
+        let mut load = Mat::zeros(self.momenta.nrows(), 1);
+        for (k, l) in if k == l { vec![(k, l)] } else { vec![(k, l), (l, k)] } {
+            let momentum = self.momenta.as_ref().subcols(if d == 2 { 2 } else { 3 + l }, 1).to_owned();
+            self.rows.add_turned(|_| -Vector3::ith(k, 1.0), &momentum, &mut load);
+        }
+        let load = self.rows.restrict(load);
+        let at = |i: usize| Vector3::from_fn(|k, _| if k < d { load[(d * i + k, 0)] } else { 0.0 });
+        (0..self.model.nodes().len()).map(at).collect()
+    }
+}
+
+/// The rigid motions of a body with so many dimensions, among the six.
+fn motions(dimension: usize) -> &'static [usize] {
+    if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
+}
+
+/// The rigid motion of a translation.
+fn translation(by: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(by.x, by.y, by.z, 0.0, 0.0, 0.0)
+}
+
+fn differences(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    a.iter().zip(b).map(|(a, b)| a - b).collect()
+}

@@ -1,0 +1,202 @@
+//! Relations of a geometric stiffness with rigid motion of the body.
+
+use crate::FeModel;
+use crate::rigid::centre_and_length;
+use crate::tolerance::rounding;
+use flexbody_linalg::{SymmetricMatrix, larger};
+use nalgebra::{Matrix3, Vector3};
+use rayon::prelude::*;
+
+/// Least size of a row relative to the largest one: forces of smaller rows are measured by this.
+const SMALL_ROW: f64 = 1e-3;
+
+/// Least size of the turned forces relative to the entries times the distances of their nodes: those of a stress
+/// without load (self-stress) are rounding.
+const SMALL_FORCE: f64 = 1e-3;
+
+/// Relations of a geometric stiffness with rigid motion: the forces that it turns, and relative errors.
+pub(super) struct Relations {
+    /// Force f at every node, from K_geo (phi x x) = phi x f. Axes of the model.
+    pub forces: Vec<Vector3<f64>>,
+    /// Forces of translations.
+    pub translation: Translation,
+    /// Part of the forces under rotation that is no phi x f; zero in the plane, where every force is one.
+    pub rotation: f64,
+    /// Part of the entries between nodes that has a direction; zero where nodes have rotations or internal rows, or
+    /// where M depends on directions.
+    pub blocks: f64,
+    /// Error that the digits of the file explain.
+    pub rounding: f64,
+}
+
+/// Forces of translations, relative to the sums of the entries of the rows.
+pub(super) struct Translation {
+    /// The largest.
+    pub share: f64,
+    /// Rows with more than half of it.
+    pub rows: Vec<usize>,
+}
+
+impl Relations {
+    pub(super) fn new(model: &FeModel, matrix: &SymmetricMatrix, solid: bool, digits: u8) -> Self {
+        let largest = matrix.as_csc().values().iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        let fields = RigidFields::new(model, if largest > 0.0 { largest.recip() } else { 1.0 });
+        let nodes: Vec<NodeMotion> =
+            (0..model.nodes().len()).into_par_iter().map(|i| fields.of_node(matrix, i)).collect();
+        let turned: f64 = nodes.iter().map(|node| node.turned.norm()).sum();
+        let entries: f64 = nodes.iter().map(|node| node.entries).sum();
+        let size = larger(turned, SMALL_FORCE * entries);
+        let relative = |x: f64| if size > 0.0 { x / size } else { 0.0 };
+        let skewed = |node: &NodeMotion| 0.5 * (node.turned + node.turned.transpose()).norm();
+        let plain = model.rows().are_plain() && model.scalar_mass().is_some();
+        let plane = model.dimension() == 2;
+        Self {
+            rotation: if plane { 0.0 } else { relative(nodes.iter().map(skewed).sum()) },
+            forces: nodes.iter().map(|node| turned_force(&node.turned, plane) / fields.scale).collect(),
+            translation: Translation::of(&nodes, model.dimension()),
+            blocks: if plain { directed_share(model, matrix, solid) } else { 0.0 },
+            rounding: relative(rounding(digits, 2) * entries),
+        }
+    }
+}
+
+/// The force f of G e_k = e_k x f; in the plane only G e_z is known.
+fn turned_force(turned: &Matrix3<f64>, plane: bool) -> Vector3<f64> {
+    let g = turned;
+    if plane {
+        return Vector3::new(g[(1, 2)], -g[(0, 2)], 0.0);
+    }
+    0.5 * Vector3::new(g[(1, 2)] - g[(2, 1)], g[(2, 0)] - g[(0, 2)], g[(0, 1)] - g[(1, 0)])
+}
+
+/// Forces of K_geo at one node under rigid motions.
+struct NodeMotion {
+    /// Force along each axis under each translation, the largest.
+    moved: [f64; 3],
+    /// Sum of the entries of each of its rows at what translates.
+    rows: [f64; 3],
+    /// Column k: force under the rotation e_k about the node itself.
+    turned: Matrix3<f64>,
+    /// Sum of |entries| times what a rotation about the node displaces at most.
+    entries: f64,
+}
+
+/// Rigid motion of every row: translations, then rotations about the centre, zero where there is none.
+struct RigidFields<'m> {
+    model: &'m FeModel,
+    centre: [f64; 3],
+    rows: Vec<[f64; 6]>,
+    /// Reciprocal of the largest entry of K_geo, by which its entries are multiplied: squares of them stay in range.
+    scale: f64,
+}
+
+impl<'m> RigidFields<'m> {
+    fn new(model: &'m FeModel, scale: f64) -> Self {
+        let (centre, _) = centre_and_length(&model.nodes().positions);
+        let fields = model.rigid_fields(centre, 1.0);
+        let columns: &[usize] = if model.dimension() == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
+        let row = |i: usize| {
+            let mut row = [0.0; 6];
+            columns.iter().enumerate().for_each(|(from, &to)| row[to] = fields[(i, from)]);
+            row
+        };
+        Self { model, centre, rows: (0..fields.nrows()).map(row).collect(), scale }
+    }
+
+    fn of_node(&self, matrix: &SymmetricMatrix, node: usize) -> NodeMotion {
+        let d = self.model.dimension();
+        let x = self.model.nodes().positions[node];
+        let arm = Vector3::from_fn(|k, _| x[k] - self.centre[k]);
+        let mut motion =
+            NodeMotion { moved: [0.0; 3], rows: [0.0; 3], turned: Matrix3::zeros(), entries: 0.0 };
+        for axis in 0..d {
+            let (columns, values) = matrix.row(d * node + axis);
+            let mut moved = Vector3::zeros();
+            for (&column, value) in columns.iter().zip(values) {
+                let value = value * self.scale;
+                let [tx, ty, tz, rx, ry, rz] = self.rows[column as usize];
+                let along = Vector3::new(tx, ty, tz);
+                // (e_k x (x_j - x_i)) . t = R_jk - (e_k x arm) . t, and e_k . (arm x t) is the last.
+                let turn = Vector3::new(rx, ry, rz) - arm.cross(&along);
+                moved += value * along;
+                motion.rows[axis] += value.abs() * along.norm();
+                motion.entries += value.abs() * turn.norm();
+                (0..3).for_each(|k| motion.turned[(axis, k)] += value * turn[k]);
+            }
+            motion.moved[axis] = moved.amax();
+        }
+        motion
+    }
+}
+
+impl Translation {
+    fn of(nodes: &[NodeMotion], dimension: usize) -> Self {
+        let largest = nodes.iter().flat_map(|node| node.rows).fold(0.0, larger);
+        if largest == 0.0 {
+            return Self { share: 0.0, rows: Vec::new() };
+        }
+        let share =
+            |node: &NodeMotion, axis: usize| node.moved[axis] / larger(node.rows[axis], SMALL_ROW * largest);
+        let shares: Vec<f64> =
+            nodes.iter().flat_map(|node| (0..dimension).map(move |axis| share(node, axis))).collect();
+        let worst = shares.iter().copied().fold(0.0, larger);
+        let rows = (0..shares.len()).filter(|&row| shares[row] > 0.5 * worst).collect();
+        Self { share: worst, rows }
+    }
+}
+
+/// Part of the entries between different nodes that is outside of multiples of I, of bodies of other elements than
+/// solids outside of those and of multiples of d d' with d along the line between the nodes, as bars have them.
+fn directed_share(model: &FeModel, matrix: &SymmetricMatrix, solid: bool) -> f64 {
+    let d = model.dimension();
+    let positions = &model.nodes().positions;
+    let of_node = |i: usize| {
+        let mut sums = [0.0; 2];
+        for (j, block) in blocks_of(matrix, d, i) {
+            let line = Vector3::from_fn(|k, _| positions[j][k] - positions[i][k]);
+            let line = if solid { None } else { line.try_normalize(0.0) };
+            sums[0] += outside(&block, d, line).abs().sum();
+            sums[1] += block.abs().sum();
+        }
+        sums
+    };
+    let [directed, all] = (0..model.nodes().len())
+        .into_par_iter()
+        .map(of_node)
+        .collect::<Vec<_>>()
+        .into_iter()
+        .fold([0.0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    if all > 0.0 { directed / all } else { 0.0 }
+}
+
+/// Blocks of K_geo between node `i` and the others, zero outside of the plane.
+fn blocks_of(matrix: &SymmetricMatrix, d: usize, i: usize) -> Vec<(usize, Matrix3<f64>)> {
+    let mut entries: Vec<(usize, usize, usize, f64)> = Vec::new();
+    for axis in 0..d {
+        let (columns, values) = matrix.row(d * i + axis);
+        let entry = |(&column, &value): (&u32, &f64)| (column as usize / d, axis, column as usize % d, value);
+        entries.extend(columns.iter().zip(values).map(entry).filter(|one| one.0 != i));
+    }
+    entries.sort_unstable_by_key(|one| one.0);
+    let block = |same: &[(usize, usize, usize, f64)]| {
+        let mut block = Matrix3::zeros();
+        same.iter().for_each(|&(_, a, b, value)| block[(a, b)] = value);
+        (same[0].0, block)
+    };
+    entries.chunk_by(|a, b| a.0 == b.0).map(block).collect()
+}
+
+/// The part of a block outside of multiples of I in d dimensions and, with a unit vector `line`, of its square.
+fn outside(block: &Matrix3<f64>, d: usize, line: Option<Vector3<f64>>) -> Matrix3<f64> {
+    let part = 1.0 / d as f64;
+    let unit = Matrix3::from_diagonal(&Vector3::from_fn(|k, _| if k < d { 1.0 } else { 0.0 }));
+    let mut rest = block - unit * (part * block.trace());
+    if let Some(line) = line {
+        let directed = line * line.transpose() - unit * part;
+        let square = directed.norm_squared();
+        if square > 0.0 {
+            rest -= directed * (rest.dot(&directed) / square);
+        }
+    }
+    rest
+}

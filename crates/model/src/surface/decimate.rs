@@ -1,0 +1,298 @@
+//! Fewer triangles for the same surface.
+//!
+//! One node after the other moves onto a neighbour, the one first whose move changes the surface least, after
+//! Garland and Heckbert, "Surface simplification using quadric error metrics" (1997), with one addition: the
+//! error also counts the way that a node moves. On a flat plate planes alone would leave two triangles, which
+//! cannot show how it bends; with the way, triangles keep about the same size.
+
+use super::SurfaceMesh;
+use super::features::normal;
+use super::quadric::Quadric;
+use nalgebra::Vector3;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashMap};
+
+/// Squared way of a node beside its squared distance from the planes of its triangles. Up to triangles of
+/// eight tenths of the radius of curvature the way decides.
+const WAY: f64 = 0.01;
+
+/// Weight of the planes that hold feature edges in place.
+const FEATURE: f64 = 10.0;
+
+/// A triangle may turn up to this cosine in one move.
+const TURNED: f64 = 0.2;
+
+impl SurfaceMesh {
+    /// The mesh with `most` triangles at the most, on some of its nodes, whose positions are `positions`.
+    /// Edges follow the nodes that they end at. The same input gives the same mesh.
+    ///
+    /// # Panics
+    /// When there are fewer positions than [`least_nodes`](Self::least_nodes).
+    pub fn decimated(&self, positions: &[[f64; 3]], most: usize) -> Option<Self> {
+        if self.triangles.len() <= most {
+            return Some(self.clone());
+        }
+        let mut decimation = Decimation::new(self, positions);
+        decimation.run(most, true);
+        // Small parts and rims stand in the way of the last moves: then the form is given up.
+        decimation.run(most, false);
+        decimation.mesh(self)
+    }
+}
+
+/// A mesh that loses nodes. Nodes are numbered among themselves here.
+struct Decimation {
+    /// Index of each node in the body.
+    nodes: Vec<u32>,
+    index: HashMap<u32, u32>,
+    positions: Vec<[f64; 3]>,
+    /// Corners of each triangle; equal ones where it is gone.
+    triangles: Vec<[u32; 3]>,
+    alive: usize,
+    /// Triangles at each node, gone ones among them.
+    at_node: Vec<Vec<u32>>,
+    /// Neighbours of each node along feature edges.
+    features: Vec<Vec<u32>>,
+    error: Vec<Quadric>,
+    /// How often the error of each node has changed.
+    changes: Vec<u32>,
+    /// Where each node has gone: itself while it is there.
+    gone_to: Vec<u32>,
+}
+
+/// A move of the first node onto the second, by its error (the bits of a number that is not negative are in
+/// its order) and the changes that the error knows of.
+type Move = Reverse<(u64, [u32; 2], [u32; 2])>;
+
+impl Decimation {
+    fn new(mesh: &SurfaceMesh, positions: &[[f64; 3]]) -> Self {
+        let mut nodes: Vec<u32> = mesh.triangles.as_flattened().to_vec();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let index: HashMap<u32, u32> = nodes.iter().zip(0..).map(|(&node, i)| (node, i)).collect();
+        let n = nodes.len();
+        let mut own = Self {
+            positions: nodes.iter().map(|&node| positions[node as usize]).collect(),
+            triangles: mesh.triangles.iter().map(|corners| corners.map(|node| index[&node])).collect(),
+            alive: mesh.triangles.len(),
+            at_node: vec![Vec::new(); n],
+            features: vec![Vec::new(); n],
+            error: vec![Quadric::default(); n],
+            changes: vec![0; n],
+            gone_to: (0..n as u32).collect(),
+            nodes,
+            index,
+        };
+        for (t, corners) in (0..).zip(&own.triangles) {
+            corners.iter().for_each(|&node| own.at_node[node as usize].push(t));
+        }
+        for [a, b] in &mesh.edges {
+            if let (Some(&a), Some(&b)) = (own.index.get(a), own.index.get(b)) {
+                own.features[a as usize].push(b);
+                own.features[b as usize].push(a);
+            }
+        }
+        own.measure();
+        own
+    }
+
+    fn x(&self, node: u32) -> Vector3<f64> {
+        self.positions[node as usize].into()
+    }
+
+    /// The errors of all nodes: distances from the planes of their triangles, from planes across those at
+    /// feature edges, and from their places, by the areas around them.
+    fn measure(&mut self) {
+        for t in 0..self.triangles.len() {
+            let corners = self.triangles[t];
+            let [a, b, c] = corners.map(|node| self.x(node));
+            let area = (b - a).cross(&(c - a)).norm() / 6.0;
+            let normal = normal(corners, &self.positions);
+            for (k, &node) in corners.iter().enumerate() {
+                let x = self.x(node);
+                self.error[node as usize] += Quadric::plane(normal, x, area);
+                self.error[node as usize] += Quadric::point(x, WAY * area);
+                let next = corners[(k + 1) % 3];
+                if !self.features[node as usize].contains(&next) {
+                    continue;
+                }
+                let along = self.x(next) - x;
+                let across = along.cross(&normal).try_normalize(0.0).unwrap_or_default();
+                let holding = Quadric::plane(across, x, FEATURE * along.norm_squared());
+                self.error[node as usize] += holding;
+                self.error[next as usize] += holding;
+            }
+        }
+    }
+
+    /// Moves nodes until `most` triangles are left, or no move is left; with `form` only such that keep the
+    /// form.
+    fn run(&mut self, most: usize, form: bool) {
+        let mut moves = BinaryHeap::new();
+        if self.alive > most {
+            for node in 0..self.nodes.len() as u32 {
+                self.offer(node, &mut moves);
+            }
+        }
+        while self.alive > most {
+            let Some(Reverse((_, [from, to], changes))) = moves.pop() else { return };
+            let current = [from, to].map(|node| self.changes[node as usize]);
+            let there = [from, to].iter().all(|&node| self.gone_to[node as usize] == node);
+            if there && current == changes && (!form || self.keeps_form(from, to)) {
+                self.collapse(from, to);
+                self.offer(to, &mut moves);
+            }
+        }
+    }
+
+    /// Adds the moves between a node and its neighbours.
+    fn offer(&self, node: u32, moves: &mut BinaryHeap<Move>) {
+        for other in self.neighbours(node) {
+            for [from, to] in [[node, other], [other, node]] {
+                let mut error = self.error[from as usize];
+                error += self.error[to as usize];
+                let changes = [from, to].map(|node| self.changes[node as usize]);
+                moves.push(Reverse((error.at(self.x(to)).to_bits(), [from, to], changes)));
+            }
+        }
+    }
+
+    /// Triangles at a node.
+    fn around(&self, node: u32) -> impl Iterator<Item = [u32; 3]> {
+        let all = self.at_node[node as usize].iter().map(|&t| self.triangles[t as usize]);
+        all.filter(move |corners| corners.contains(&node) && corners[0] != corners[1])
+    }
+
+    /// Nodes that share a triangle with a node, ascending.
+    fn neighbours(&self, node: u32) -> Vec<u32> {
+        let mut found: Vec<u32> = self.around(node).flatten().filter(|&other| other != node).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// Whether a move leaves feature edges where they are, folds nothing and joins nothing that was apart.
+    fn keeps_form(&self, from: u32, to: u32) -> bool {
+        let features = &self.features[from as usize];
+        let along_feature = features.len() == 2 && features.contains(&to);
+        if !features.is_empty() && !along_feature {
+            return false;
+        }
+        let others = self.neighbours(to);
+        let common = self.neighbours(from).iter().filter(|node| others.binary_search(node).is_ok()).count();
+        let shared = self.around(from).filter(|corners| corners.contains(&to)).count();
+        let folds = |corners: [u32; 3]| {
+            let moved = corners.map(|node| if node == from { to } else { node });
+            normal(corners, &self.positions).dot(&normal(moved, &self.positions)) < TURNED
+        };
+        common == shared && !self.around(from).filter(|corners| !corners.contains(&to)).any(folds)
+    }
+
+    fn collapse(&mut self, from: u32, to: u32) {
+        let moved = std::mem::take(&mut self.at_node[from as usize]);
+        for t in moved {
+            let corners = &mut self.triangles[t as usize];
+            if !corners.contains(&from) {
+                continue;
+            }
+            if corners.contains(&to) {
+                *corners = [to; 3];
+                self.alive -= 1;
+            } else {
+                corners.iter_mut().filter(|node| **node == from).for_each(|node| *node = to);
+                self.at_node[to as usize].push(t);
+            }
+        }
+        for other in std::mem::take(&mut self.features[from as usize]) {
+            let of_other = &mut self.features[other as usize];
+            of_other.retain(|node| *node != from && *node != to);
+            if other != to {
+                of_other.push(to);
+                self.features[to as usize].retain(|node| *node != other);
+                self.features[to as usize].push(other);
+            }
+        }
+        let error = self.error[from as usize];
+        self.error[to as usize] += error;
+        self.changes[to as usize] += 1;
+        self.gone_to[from as usize] = to;
+    }
+
+    /// What is left, by the nodes of the body.
+    fn mesh(&self, before: &SurfaceMesh) -> Option<SurfaceMesh> {
+        let there = |node: u32| {
+            let Some(&own) = self.index.get(&node) else { return node };
+            let mut at = own;
+            while self.gone_to[at as usize] != at {
+                at = self.gone_to[at as usize];
+            }
+            self.nodes[at as usize]
+        };
+        let left = self.triangles.iter().filter(|[a, b, c]| a != b && b != c && c != a);
+        let triangles = left.map(|corners| corners.map(|node| self.nodes[node as usize])).collect();
+        let ordered = |[a, b]: [u32; 2]| [a.min(b), a.max(b)];
+        let mut edges: Vec<[u32; 2]> = before.edges.iter().map(|ends| ordered(ends.map(there))).collect();
+        edges.retain(|[a, b]| a != b);
+        edges.sort_unstable();
+        edges.dedup();
+        SurfaceMesh::of_parts(triangles, edges)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elements::{ElementShape, Elements};
+    use crate::{Nodes, skin};
+
+    /// A box of n x n x n bricks with sides of length 1.
+    fn cube(n: usize) -> (SurfaceMesh, Nodes) {
+        let node = |i: usize, j: usize, k: usize| ((i * (n + 1) + j) * (n + 1) + k) as i64;
+        let mut elements = Elements::default();
+        let cells = |end: usize| (0..end.pow(3)).map(move |m| (m / end / end, m / end % end, m % end));
+        for (i, j, k) in cells(n) {
+            let ring =
+                |k: usize| [node(i, j, k), node(i + 1, j, k), node(i + 1, j + 1, k), node(i, j + 1, k)];
+            elements.add("", ElementShape::Hexahedron, &[ring(k), ring(k + 1)].concat());
+        }
+        let place = |(i, j, k): (usize, usize, usize)| [i, j, k].map(|m| m as f64 / n as f64);
+        let nodes = Nodes {
+            ids: cells(n + 1).map(|(i, j, k)| node(i, j, k)).collect(),
+            positions: cells(n + 1).map(place).collect(),
+        };
+        (skin(&elements, &nodes).mesh.expect("a surface"), nodes)
+    }
+
+    fn volume(mesh: &SurfaceMesh, nodes: &Nodes) -> f64 {
+        let x = |i: u32| Vector3::from(nodes.positions[i as usize]);
+        mesh.triangles().iter().map(|&[a, b, c]| x(a).dot(&x(b).cross(&x(c))) / 6.0).sum()
+    }
+
+    /// A cube stays a cube of the same volume, with triangles of about one size.
+    #[test]
+    fn a_cube_keeps_its_form() {
+        let (mesh, nodes) = cube(10);
+        assert_eq!(mesh.triangles().len(), 1200);
+        let fewer = mesh.decimated(&nodes.positions, 300).expect("a mesh");
+        assert!((280..=300).contains(&fewer.triangles().len()), "{}", fewer.triangles().len());
+        assert!((volume(&fewer, &nodes) - 1.0).abs() < 1e-9, "{}", volume(&fewer, &nodes));
+        let area = |&[a, b, c]: &[u32; 3]| {
+            let x = |i: u32| Vector3::from(nodes.positions[i as usize]);
+            (x(b) - x(a)).cross(&(x(c) - x(a))).norm() / 2.0
+        };
+        let largest = fewer.triangles().iter().map(area).fold(0.0, f64::max);
+        assert!(largest < 8.0 * 6.0 / 300.0, "{largest}");
+        assert!(fewer.edges().len() < mesh.edges().len());
+        assert_eq!(Some(fewer), mesh.decimated(&nodes.positions, 300));
+    }
+
+    /// However few triangles are wanted, there are no more.
+    #[test]
+    fn the_number_is_kept_to() {
+        let (mesh, nodes) = cube(3);
+        for most in [100, 50, 12, 7, 1] {
+            let fewer = mesh.decimated(&nodes.positions, most).expect("a mesh");
+            assert!(fewer.triangles().len() <= most, "{most}: {}", fewer.triangles().len());
+        }
+    }
+}

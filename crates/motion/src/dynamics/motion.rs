@@ -1,0 +1,392 @@
+//! The motion of one body in space as a system that can be integrated.
+
+use super::{
+    Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Prescribed, Snapshot,
+};
+use crate::integration::{Failure, Oscillator, System};
+use nalgebra::{Matrix3, Vector3};
+
+/// Deformations below this part of the size of the body count as this much, so that a body at rest has a
+/// scale.
+const LEAST_DEFORMATION: f64 = 1e-6;
+
+/// The scale of vibration is at least this part of that of the whole internal motion.
+const LEAST_VIBRATION: f64 = 1e-3;
+
+/// Forces on a body from outside, and motion that is prescribed.
+pub trait Surroundings {
+    /// Adds the generalised forces (F, tau, Q) in body axes at the state of `evaluation`
+    /// ([`EquationsOfMotion`]).
+    fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]);
+
+    /// Rigid motion that is prescribed of a frame with these axes: velocities (V, omega) along them, and the
+    /// rates of their components. Nothing unless said.
+    fn prescribed(&self, _time: f64, _axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
+        (Prescribed::NOTHING, Prescribed::NOTHING)
+    }
+}
+
+/// No forces: a free body in empty space.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct EmptySpace;
+
+impl Surroundings for EmptySpace {
+    fn add_forces(&self, _: f64, _: &Place, _: &Evaluation<'_>, _: &mut [f64]) {}
+}
+
+/// The equations of motion of one body as a [`System`] in momenta:
+///
+/// ```text
+/// y = (G, e, q, P, L, pi, D, W, j, k),    R = G + D,    (A'P, A'(L - D x P), pi) = Mc(q) nu
+/// G' = P / m     D' = A (p - m V) / m     e' = G'omega / 4     q' = qd
+/// P' = A F     L' = A tau + D x A F     pi' = dT/dq - K_ff q - D qd + Q
+/// ```
+///
+/// in world axes, with the angular momentum L about a point G that starts at the origin R of the frame and
+/// flies with P / m. P and L of a free body are constant entries of y, so that every method keeps the momenta
+/// to rounding, whatever the mass matrix and the frame; it is (6.3) of the theory with the rotation and the
+/// flight of the frame taken out. For a free body whose frame is at its centre of mass D vanishes, and what
+/// is left is a Hamiltonian system on quaternions with a constant structure, which Gauss collocation keeps
+/// (McLachlan, Modin, Verdier, Collective symplectic integrators, Nonlinearity 27, 2014).
+///
+/// W, j and k collect work and impulses for [`Snapshot::balance`]. A plane body uses the entries of its
+/// plane.
+pub struct Motion<'a> {
+    evaluation: Evaluation<'a>,
+    surroundings: &'a dyn Surroundings,
+    /// Where the origin was at the start.
+    reference: Vector3<f64>,
+    size: Size,
+    oscillators: Vec<Oscillator>,
+    momenta: Vec<f64>,
+    forces: Vec<f64>,
+    rates: Vec<f64>,
+}
+
+/// Mass, length and rates of a body, which its motion is measured against.
+#[derive(Debug, Clone)]
+struct Size {
+    mass: f64,
+    /// Radius of gyration about the centre of mass.
+    radius: f64,
+    /// Stiffness of every mode, positive.
+    stiffness: Vec<f64>,
+    /// Circular frequency of the softest.
+    first_rate: f64,
+}
+
+impl Size {
+    fn new(equations: &EquationsOfMotion) -> Self {
+        let (mass, c) = (equations.mass, equations.first_moment);
+        let about_origin = 0.5 * equations.inertia.trace() / mass;
+        let about_centre = about_origin - c.norm_squared() / (mass * mass);
+        let own: Vec<f64> = (0..equations.nf).map(|j| equations.stiffness.get(j, j)).collect();
+        // Modes without stiffness count as the softest that has some.
+        let softest = own.iter().copied().filter(|&k| k > 0.0).fold(f64::INFINITY, f64::min);
+        let softest = if softest.is_finite() { softest } else { 1.0 };
+        Self {
+            mass,
+            radius: if about_centre > 0.0 { about_centre } else { about_origin }.sqrt(),
+            stiffness: own.iter().map(|&k| k.max(softest)).collect(),
+            first_rate: softest.sqrt(),
+        }
+    }
+}
+
+/// Entries of y besides q and pi.
+const PLAIN: usize = 3 + 4 + 3 + 3 + 3 + 1 + 3 + 3;
+
+/// Where the entries of y stand, for a body of nf modes.
+#[derive(Debug, Clone, Copy)]
+struct Layout(usize);
+
+impl Layout {
+    const FLIGHT: usize = 0;
+    const ATTITUDE: usize = 3;
+    const MODES: usize = 7;
+
+    fn linear(self) -> usize {
+        Self::MODES + self.0
+    }
+
+    fn angular(self) -> usize {
+        self.linear() + 3
+    }
+
+    fn modal(self) -> usize {
+        self.angular() + 3
+    }
+
+    fn offset(self) -> usize {
+        self.modal() + self.0
+    }
+
+    fn work(self) -> usize {
+        self.offset() + 3
+    }
+
+    fn impulse(self) -> usize {
+        self.work() + 1
+    }
+
+    fn angular_impulse(self) -> usize {
+        self.impulse() + 3
+    }
+}
+
+fn vector(state: &[f64], at: usize) -> Vector3<f64> {
+    Vector3::new(state[at], state[at + 1], state[at + 2])
+}
+
+fn put(value: &Vector3<f64>, at: usize, state: &mut [f64]) {
+    state[at..at + 3].copy_from_slice(value.as_slice());
+}
+
+fn attitude(state: &[f64]) -> EulerParameters {
+    let at = Layout::ATTITUDE;
+    EulerParameters([state[at], state[at + 1], state[at + 2], state[at + 3]])
+}
+
+impl<'a> Motion<'a> {
+    /// The motion from `start`, and y at the start.
+    ///
+    /// # Panics
+    /// When `start` has not the number of modes of the equations.
+    pub fn new(
+        equations: &'a EquationsOfMotion,
+        surroundings: &'a dyn Surroundings,
+        start: &Configuration,
+    ) -> (Self, Vec<f64>) {
+        let (nf, n, r) = (equations.n_modes(), equations.n_velocities(), equations.n_rigid());
+        let layout = Layout(nf);
+        let axes = start.attitude.axes();
+        let mut evaluation = Evaluation::new(equations);
+        let mut nu = vec![0.0; n];
+        equations.put_rigid(axes.tr_mul(&start.velocity), start.omega, &mut nu[..r]);
+        nu[r..].copy_from_slice(&start.qd);
+        evaluation.set(&start.q, &nu);
+
+        let mut state = vec![0.0; PLAIN + 2 * nf];
+        put(&start.origin, Layout::FLIGHT, &mut state);
+        state[Layout::ATTITUDE..Layout::MODES].copy_from_slice(&start.attitude.0);
+        state[Layout::MODES..layout.linear()].copy_from_slice(&start.q);
+        put(&(axes * evaluation.linear_momentum()), layout.linear(), &mut state);
+        put(&(axes * evaluation.angular_momentum()), layout.angular(), &mut state);
+        evaluation.modal_momentum(&mut state[layout.modal()..layout.offset()]);
+
+        let oscillator = |j: usize| {
+            let (stiffness, damping) = equations.oscillator(j)?;
+            Some(Oscillator {
+                coordinate: Layout::MODES + j,
+                momentum: layout.modal() + j,
+                stiffness,
+                damping,
+            })
+        };
+        let motion = Self {
+            evaluation,
+            surroundings,
+            reference: start.origin,
+            size: Size::new(equations),
+            oscillators: (0..nf).filter_map(oscillator).collect(),
+            momenta: vec![0.0; n],
+            forces: vec![0.0; n],
+            rates: vec![0.0; n],
+        };
+        (motion, state)
+    }
+
+    /// Mass of the body, and its radius of gyration sqrt(tr(I) / 2m) about the centre of mass.
+    pub fn size(&self) -> (f64, f64) {
+        (self.size.mass, self.size.radius)
+    }
+
+    /// Elastic energy of a deformation that is 1e-9 of the radius of gyration in the softest mode: far below
+    /// what is integrated, far above rounding.
+    pub fn least_energy(&self) -> f64 {
+        const PART: f64 = 1e-9;
+        0.5 * self.size.mass * (PART * self.size.radius * self.size.first_rate).powi(2)
+    }
+
+    /// The body at a state.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] where the mass matrix of the deformed body is not positive definite.
+    pub fn evaluate<'m>(&'m mut self, time: f64, state: &'m [f64]) -> Result<Snapshot<'m>, Failure> {
+        let (place, rates) = self.go_to(time, state)?;
+        let reaction = match rates {
+            Prescribed::NOTHING => (Vector3::zeros(), Vector3::zeros()),
+            _ => self.apply(time, &place, &rates)?,
+        };
+        let layout = self.layout();
+        Ok(Snapshot {
+            place,
+            attitude: attitude(state),
+            evaluation: &self.evaluation,
+            reference: self.reference,
+            mass: self.size.mass,
+            work: state[layout.work()],
+            impulse: vector(state, layout.impulse()),
+            angular_impulse: vector(state, layout.angular_impulse()),
+            reaction,
+        })
+    }
+
+    /// nu' at a state, in the order of [`EquationsOfMotion`]: V' and omega' are the rates of the components
+    /// in body axes.
+    ///
+    /// # Errors
+    /// As [`Motion::evaluate`].
+    pub fn accelerations(&mut self, time: f64, state: &[f64]) -> Result<&[f64], Failure> {
+        let (place, rates) = self.go_to(time, state)?;
+        self.apply(time, &place, &rates)?;
+        if rates == Prescribed::NOTHING {
+            self.evaluation
+                .accelerations(&self.forces, &mut self.rates)
+                .map_err(|_| not_positive_definite())?;
+        }
+        Ok(&self.rates)
+    }
+
+    fn layout(&self) -> Layout {
+        Layout(self.evaluation.equations().n_modes())
+    }
+
+    /// Attitude of the frame and modal coordinates at a state.
+    pub fn shape<'s>(&self, state: &'s [f64]) -> (EulerParameters, &'s [f64]) {
+        (attitude(state), &state[Layout::MODES..self.layout().linear()])
+    }
+
+    /// Sets the evaluation; the place and the rates of what is prescribed.
+    fn go_to(&mut self, time: f64, state: &[f64]) -> Result<(Place, Prescribed), Failure> {
+        let (layout, equations) = (self.layout(), self.evaluation.equations());
+        let (offset, linear) = (vector(state, layout.offset()), vector(state, layout.linear()));
+        let place = Place { origin: vector(state, Layout::FLIGHT) + offset, axes: attitude(state).axes() };
+        let angular = vector(state, layout.angular()) - offset.cross(&linear);
+        let (rigid, modal) = self.momenta.split_at_mut(equations.n_rigid());
+        equations.put_rigid(place.axes.tr_mul(&linear), place.axes.tr_mul(&angular), rigid);
+        modal.copy_from_slice(&state[layout.modal()..layout.offset()]);
+        let (velocities, rates) = self.surroundings.prescribed(time, &place.axes);
+        self.evaluation
+            .set_momenta(&state[Layout::MODES..layout.linear()], &self.momenta, &velocities)
+            .map_err(|_| not_positive_definite())?;
+        Ok((place, rates))
+    }
+
+    /// Generalised forces to `self.forces`, those included that the prescribed motion takes, which are
+    /// returned.
+    fn apply(
+        &mut self,
+        time: f64,
+        place: &Place,
+        rates: &Prescribed,
+    ) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
+        self.forces.fill(0.0);
+        self.surroundings.add_forces(time, place, &self.evaluation, &mut self.forces);
+        let none = (Vector3::zeros(), Vector3::zeros());
+        if *rates == Prescribed::NOTHING {
+            return Ok(none);
+        }
+        let equations = self.evaluation.equations();
+        self.evaluation
+            .prescribed_accelerations(&self.forces, rates, &mut self.rates)
+            .map_err(|_| not_positive_definite())?;
+        self.evaluation.balance(&self.rates, &mut self.momenta);
+        let (needed, applied) = (equations.split(&self.momenta), equations.split(&self.forces));
+        let reaction = (
+            rates.linear.map_or(none.0, |_| needed.0 - applied.0),
+            rates.angular.map_or(none.1, |_| needed.1 - applied.1),
+        );
+        let total = (applied.0 + reaction.0, applied.1 + reaction.1);
+        equations.put_rigid(total.0, total.1, &mut self.forces[..equations.n_rigid()]);
+        Ok(reaction)
+    }
+}
+
+fn not_positive_definite() -> Failure {
+    Failure::Rates { reason: "the mass matrix of the deformed body is not positive definite" }
+}
+
+impl System for Motion<'_> {
+    fn dimension(&self) -> usize {
+        PLAIN + 2 * self.evaluation.equations().n_modes()
+    }
+
+    fn rates(&mut self, time: f64, state: &[f64], rates: &mut [f64]) -> Result<(), Failure> {
+        let layout = self.layout();
+        let (place, prescribed) = self.go_to(time, state)?;
+        self.apply(time, &place, &prescribed)?;
+        let equations = self.evaluation.equations();
+        let (velocity, omega) = self.evaluation.rigid_velocity();
+        let (force, torque, modal) = equations.split(&self.forces);
+        let qd = self.evaluation.modal_velocity();
+        let (world_force, world_torque) = (place.axes * force, place.axes * torque);
+        let (mass, offset) = (self.size.mass, vector(state, layout.offset()));
+
+        put(&(vector(state, layout.linear()) / mass), Layout::FLIGHT, rates);
+        rates[Layout::ATTITUDE..Layout::MODES].copy_from_slice(&attitude(state).rate(&omega));
+        rates[Layout::MODES..layout.linear()].copy_from_slice(qd);
+        put(&world_force, layout.linear(), rates);
+        put(&(world_torque + offset.cross(&world_force)), layout.angular(), rates);
+        self.evaluation.modal_momentum_rate(modal, &mut rates[layout.modal()..layout.offset()]);
+        // A V - P / m, without the rounding of V where P is that of this V.
+        let relative = match prescribed.linear {
+            None => place.axes * self.evaluation.relative_momentum() / -mass,
+            Some(_) => place.axes * velocity - vector(state, layout.linear()) / mass,
+        };
+        put(&relative, layout.offset(), rates);
+        let modal_power: f64 = modal.iter().zip(qd).map(|(force, rate)| force * rate).sum();
+        rates[layout.work()] =
+            force.dot(&velocity) + torque.dot(&omega) + modal_power - equations.dissipation(qd);
+        let arm = place.origin - self.reference;
+        put(&world_force, layout.impulse(), rates);
+        put(&(world_torque + arm.cross(&world_force)), layout.angular_impulse(), rates);
+        Ok(())
+    }
+
+    /// Positions are measured against the radius of gyration r, attitude against 1, momenta and modes in the
+    /// energy norm: against the rotational energy and that of the vibration, the latter at least 1e-3 of the
+    /// former in amplitude, and both at least those of a deformation of 1e-6 r at the first frequency. Work
+    /// and impulses follow and are not controlled.
+    fn scales(&self, state: &[f64], scales: &mut [f64]) {
+        let (layout, size) = (self.layout(), &self.size);
+        let body_angular = attitude(state).axes().tr_mul(&vector(state, layout.angular()));
+        let rotation = body_angular.norm() / (size.mass.sqrt() * size.radius);
+        let momenta = &state[layout.modal()..layout.offset()];
+        let vibration = momenta
+            .iter()
+            .zip(&state[Layout::MODES..])
+            .zip(&size.stiffness)
+            .map(|((p, q), stiffness)| p * p + stiffness * q * q)
+            .sum::<f64>()
+            .sqrt();
+        let least = LEAST_DEFORMATION * size.mass.sqrt() * size.radius * size.first_rate;
+        let whole = rotation.max(vibration).max(least);
+        let vibration = vibration.max(LEAST_VIBRATION * whole);
+
+        scales[..Layout::ATTITUDE].fill(size.radius);
+        scales[Layout::ATTITUDE..Layout::MODES].fill(1.0);
+        for (scale, stiffness) in scales[Layout::MODES..].iter_mut().zip(&size.stiffness) {
+            *scale = vibration / stiffness.sqrt();
+        }
+        scales[layout.linear()..layout.angular()].fill(whole * size.mass.sqrt());
+        scales[layout.angular()..layout.modal()].fill(whole * size.mass.sqrt() * size.radius);
+        scales[layout.modal()..layout.offset()].fill(vibration);
+        scales[layout.offset()..layout.work()].fill(size.radius);
+        scales[layout.work()..].fill(f64::INFINITY);
+    }
+
+    fn oscillators(&self) -> &[Oscillator] {
+        &self.oscillators
+    }
+
+    /// Euler parameters of unit length.
+    fn settle(&self, state: &mut [f64]) {
+        let e = &mut state[Layout::ATTITUDE..Layout::MODES];
+        let square: f64 = e.iter().map(|e| e * e).sum();
+        if (square - 1.0).abs() > 4.0 * f64::EPSILON {
+            let length = square.sqrt();
+            e.iter_mut().for_each(|e| *e /= length);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! What ties the frame to the body.
+
+use super::motions::Motions;
+use super::{NodalError, NodalPoint};
+use flexbody_model::{DofLabel, FeModel};
+
+/// The conditions C u = 0 on the displacements, as many as rigid motions, that say where the frame of the
+/// deformed body is.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum ReferenceConditions {
+    /// R'M u = 0 with the rigid motions R (Tisserand): no deformation carries momentum to first order. What
+    /// free-surface modes fulfil.
+    #[default]
+    MeanAxes,
+    /// These degrees of freedom are zero: the frame is fixed to nodes. Six, of a plane body three.
+    Held(Vec<DofLabel>),
+    /// This point rests, displacement and rotation: the frame is fixed to it.
+    AtRest(NodalPoint),
+}
+
+impl ReferenceConditions {
+    /// C', given M R; none of the held rows is without mass.
+    pub(super) fn columns(
+        &self,
+        model: &FeModel,
+        moving: &[usize],
+        mass_rigid: &Motions,
+    ) -> Result<Motions, NodalError> {
+        let held = match self {
+            Self::MeanAxes => return Ok(mass_rigid.clone()),
+            Self::AtRest(point) => return of_point(model, moving, point),
+            Self::Held(held) => held,
+        };
+        if held.len() != moving.len() {
+            return Err(NodalError::ConditionCount { expected: moving.len(), found: held.len() });
+        }
+        let mut columns = vec![[0.0; 6]; model.rows().len()];
+        for (dof, &column) in held.iter().zip(moving) {
+            let row = (0..columns.len()).find(|&row| model.label(row) == *dof);
+            let row = row.ok_or(NodalError::DofUnknown(*dof))?;
+            refuse_massless(model, row)?;
+            columns[row][column] = 1.0;
+        }
+        Ok(columns)
+    }
+}
+
+/// C' of a point that rests: its weights.
+fn of_point(model: &FeModel, moving: &[usize], point: &NodalPoint) -> Result<Motions, NodalError> {
+    let loads = point.unit_loads(model);
+    let mut columns = vec![[0.0; 6]; model.rows().len()];
+    for (row, columns) in columns.iter_mut().enumerate() {
+        moving.iter().enumerate().for_each(|(at, &motion)| columns[motion] = loads[(row, at)]);
+        if columns.iter().any(|weight| *weight != 0.0) {
+            refuse_massless(model, row)?;
+        }
+    }
+    Ok(columns)
+}
+
+/// Conditions on a row without mass are none on the motion.
+fn refuse_massless(model: &FeModel, row: usize) -> Result<(), NodalError> {
+    let pencil = model.pencil();
+    match pencil.mass().row(row / pencil.block()).0.is_empty() {
+        true => Err(NodalError::HeldWithoutMass(model.label(row))),
+        false => Ok(()),
+    }
+}

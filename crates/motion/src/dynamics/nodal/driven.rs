@@ -1,0 +1,138 @@
+//! The nodal equations where motion of the frame is given instead of following from forces.
+
+use super::NodalEvaluation;
+use super::drive::{Drive, mask};
+use super::equations::NodalEquations;
+use super::inversion::Conditions;
+use super::inversion::Given;
+use super::motions::{add_motion, halves, joined, sums};
+use crate::dynamics::{AlongFrame, Prescribed};
+use crate::integration::Failure;
+use nalgebra::{Vector3, Vector6};
+
+impl NodalEquations<'_> {
+    /// What is given of (V, omega), or of the rates of its components: model axes, zero elsewhere.
+    fn given(&self, prescribed: &Prescribed) -> Vector6<f64> {
+        let or_zero = |v: Option<AlongFrame>| v.unwrap_or_default().0;
+        self.in_model(&or_zero(prescribed.linear), &or_zero(prescribed.angular))
+    }
+
+    /// Takes from w what of C'mu makes R'w vanish: of w only what is beside C' counts where motion is given.
+    pub(super) fn take_conditions(&self, w: &mut [f64]) {
+        let part = self.rigid_part.tr_mul(&sums(&self.rigid, w));
+        add_motion(&self.conditions, -1.0, &part, w);
+    }
+}
+
+impl NodalEvaluation<'_> {
+    /// Goes to a state, without loads, where `velocities` of the frame are given, V and omega in its axes.
+    ///
+    /// w of the state counts up to C'mu, P as the momentum along what is free; L does not count. With E = C
+    /// M^-1 C' and B'C' at the displacements u,
+    ///
+    /// ```text
+    /// E mu - C B (V, omega) = -C M^-1 w
+    /// (B'C' mu)_k = (p, h)_k - (B'w)_k    or    (V, omega)_k = what is given
+    /// ```
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// As [`NodalEvaluation::set`].
+    pub fn set_driven(&mut self, state: &[f64], velocities: &Prescribed) -> Result<(), Failure> {
+        if *velocities == Prescribed::NOTHING {
+            return self.set(state);
+        }
+        let body = self.equations;
+        let momenta = self.go_to(state);
+        let at_rest = body.conditions_at(&self.u);
+        let given = mask(velocities);
+        if self.turned.is_some() {
+            self.conditions = Conditions::new(&at_rest);
+            return self.set_turned(&Given { components: given, motion: body.given(velocities) }, &momenta);
+        }
+        let drive = Drive::new(&body.answer, &at_rest, given);
+
+        self.vbar.copy_from_slice(&self.w);
+        body.solve(&mut self.vbar, &mut self.first);
+        let missing = momenta - body.onto_frame(&self.u, &self.w);
+        let own = body.given(velocities);
+        let frame = Vector6::from_fn(|k, _| if given[k] { own[k] } else { missing[k] });
+        let conditions = -sums(&body.conditions, &self.vbar);
+        let (mu, nu) = drive.solve(&conditions, &frame)?;
+        add_motion(&body.conditions, 1.0, &mu, &mut self.w);
+        add_motion(&body.answered, 1.0, &mu, &mut self.vbar);
+        (self.p, self.h) = halves(&body.onto_frame(&self.u, &self.w));
+        self.move_frame(&nu);
+        self.drive = Some(drive);
+        Ok(())
+    }
+
+    /// V' and omega' in the axes of the frame, and u'' (N), under the loads where `rates` of (V, omega) are
+    /// given: those of the components in the axes of the frame. [`NodalEvaluation::driving_force`] is then
+    /// what they take.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When the state was not set with what is given, or `udd` has not N entries.
+    pub fn driven_accelerations(
+        &mut self,
+        rates: &Prescribed,
+        udd: &mut [f64],
+    ) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
+        assert_eq!(udd.len(), self.u.len(), "one entry per row");
+        let drive = self.drive.take().filter(|drive| drive.given == mask(rates));
+        let mut drive = drive.expect("a state that was set with what is given");
+        let body = self.equations;
+        if self.turned.is_some() {
+            self.drive = Some(drive);
+            let given = Given { components: mask(rates), motion: body.given(rates) };
+            return self.turned_accelerations(&given, udd);
+        }
+        let wanted = self.find_forces();
+        udd.copy_from_slice(&self.w_rate);
+        body.solve(udd, &mut self.first);
+        body.add_turned(-1.0, &self.omega, &self.ud, udd);
+
+        let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
+        let own = body.given(rates);
+        let frame = Vector6::from_fn(|k, _| if drive.given[k] { own[k] } else { missing[k] });
+        let conditions = -sums(&body.conditions, udd);
+        let (lambda, nu) = drive.solve(&conditions, &frame)?;
+        self.multipliers = lambda;
+        add_motion(&body.conditions, 1.0, &lambda, &mut self.w_rate);
+        add_motion(&body.answered, 1.0, &lambda, udd);
+        body.add_frame(-1.0, &nu, &self.u, udd);
+        body.massless.project(body.stiffness(), udd, &mut self.room);
+        let taken = body.onto_frame(&self.u, &self.w_rate) - wanted;
+        drive.reaction = Vector6::from_fn(|k, _| if drive.given[k] { taken[k] } else { 0.0 });
+        self.drive = Some(drive);
+        let (linear, angular) = halves(&nu);
+        let to_frame = body.frame.axes.transpose();
+        Ok((to_frame * linear, to_frame * angular))
+    }
+
+    /// Force and torque about the origin of the frame, its axes, that the given motion took in the last
+    /// [`NodalEvaluation::driven_accelerations`] beside the loads; zero along what is free.
+    pub fn driving_force(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let reaction = self.drive.as_ref().map_or_else(Vector6::zeros, |drive| drive.reaction);
+        let (force, torque) = halves(&reaction);
+        let to_frame = self.equations.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+
+    /// (p', h') along the axes of the frame, less what forces that drive it make of them.
+    pub(super) fn momentum_rates(&self) -> Vector6<f64> {
+        let torque = self.torque - self.omega.cross(&self.h) - self.velocity.cross(&self.p);
+        joined(&(self.force - self.omega.cross(&self.p)), &torque)
+    }
+
+    /// B'w' of a body that nothing drives: (p', h') less what u' makes of B'w.
+    pub(super) fn wanted(&self) -> Vector6<f64> {
+        let turned = self.equations.moment(&self.ud, &self.w);
+        self.momentum_rates() - joined(&Vector3::zeros(), &turned)
+    }
+}

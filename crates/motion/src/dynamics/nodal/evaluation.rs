@@ -1,0 +1,335 @@
+//! The nodal equations at one state.
+
+use super::damping::{Amplitudes, ModalDamping};
+use super::drive::{Drive, LOST};
+use super::equations::NodalEquations;
+use super::inversion::Given;
+use super::inversion::{Conditions, TurnedMass};
+use super::massless::Room;
+use super::motions::{add_motion, halves, joined, sums};
+use super::state::{ANGULAR, LINEAR, OFFSET, attitude};
+use crate::dynamics::kernels::add_scaled;
+use crate::dynamics::{EulerParameters, Orientation};
+use crate::integration::Failure;
+use flexbody_linalg::multiply_vector;
+use flexbody_model::Damping;
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after
+/// [`NodalEvaluation::new`].
+///
+/// [`NodalEvaluation::set`] takes the state and removes all loads; loads are added then; rates and
+/// accelerations are those under them.
+#[derive(Debug, Clone)]
+pub struct NodalEvaluation<'e> {
+    pub(super) equations: &'e NodalEquations<'e>,
+    pub(super) origin: Vector3<f64>,
+    /// As in the state, of unit length but for the error of the integration.
+    pub(super) attitude: EulerParameters,
+    /// D, and P / m.
+    offset: Vector3<f64>,
+    flight: Vector3<f64>,
+    /// Model axes to world axes.
+    pub(super) axes: Matrix3<f64>,
+    /// V, omega, p, h in model axes.
+    pub(super) velocity: Vector3<f64>,
+    pub(super) omega: Vector3<f64>,
+    pub(super) p: Vector3<f64>,
+    pub(super) h: Vector3<f64>,
+    pub(super) u: Vec<f64>,
+    pub(super) ud: Vec<f64>,
+    pub(super) vbar: Vec<f64>,
+    pub(super) w: Vec<f64>,
+    pub(super) conditions: Conditions,
+    /// The mass of turned nodes, where rotations carry mass.
+    pub(super) turned: Option<TurnedMass<'e>>,
+    /// Loads: force, torque about the origin, forces of rows; model axes.
+    pub(super) force: Vector3<f64>,
+    pub(super) torque: Vector3<f64>,
+    pub(super) row_forces: Vec<f64>,
+    pub(super) w_rate: Vec<f64>,
+    pub(super) multipliers: Vector6<f64>,
+    /// Where motion of the frame is given.
+    pub(super) drive: Option<Drive>,
+    pub(super) first: Vec<f64>,
+    pub(super) second: Vec<f64>,
+    pub(super) room: Room,
+    amplitudes: Amplitudes,
+}
+
+impl<'e> NodalEvaluation<'e> {
+    /// Memory for evaluations of `equations`, set to rest without deformation.
+    pub fn new(equations: &'e NodalEquations<'e>) -> Self {
+        let zeros = || vec![0.0; equations.n_rows()];
+        let zero = Vector3::zeros();
+        Self {
+            equations,
+            origin: zero,
+            attitude: EulerParameters([1.0, 0.0, 0.0, 0.0]),
+            offset: zero,
+            flight: zero,
+            axes: equations.frame.axes.transpose(),
+            velocity: zero,
+            omega: zero,
+            p: zero,
+            h: zero,
+            u: zeros(),
+            ud: zeros(),
+            vbar: zeros(),
+            w: zeros(),
+            conditions: Conditions::new(&equations.conditions_rigid),
+            turned: TurnedMass::new(equations),
+            force: zero,
+            torque: zero,
+            row_forces: zeros(),
+            w_rate: zeros(),
+            multipliers: Vector6::zeros(),
+            drive: None,
+            first: zeros(),
+            second: zeros(),
+            room: equations.massless.room(),
+            amplitudes: equations.modal_damping.as_ref().map_or_else(Amplitudes::default, ModalDamping::room),
+        }
+    }
+
+    /// The equations.
+    pub fn equations(&self) -> &'e NodalEquations<'e> {
+        self.equations
+    }
+
+    /// Goes to a state, without loads.
+    ///
+    /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a
+    /// whole. Then M(u) vbar = w, C B (V, omega) = C vbar and u' = vbar - B (V, omega), where M(u) = M unless
+    /// rotations carry mass.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] when the body is deformed so far that C B is singular, or nodes are turned so far that
+    /// their mass is not positive definite.
+    ///
+    /// # Panics
+    /// When `state` has not [`NodalEquations::dimension`] entries.
+    pub fn set(&mut self, state: &[f64]) -> Result<(), Failure> {
+        let body = self.equations;
+        let momenta = self.go_to(state);
+        self.conditions = Conditions::new(&body.conditions_at(&self.u));
+        let missing = momenta - body.onto_frame(&self.u, &self.w);
+        let mu = self.conditions.plain.solve(&missing).ok_or(LOST)?;
+        add_motion(&body.conditions, 1.0, &mu, &mut self.w);
+
+        self.vbar.copy_from_slice(&self.w);
+        match &mut self.turned {
+            None => body.solve(&mut self.vbar, &mut self.first),
+            Some(turned) => {
+                turned.turn(&self.u, &self.conditions);
+                turned.solve(&mut self.vbar)?;
+            }
+        }
+        let nu = sums(&body.conditions, &self.vbar);
+        let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
+        self.move_frame(&nu);
+        if let Some(turned) = &mut self.turned {
+            turned.kinetics.go(&nu, &self.ud, &mut self.first);
+        }
+        Ok(())
+    }
+
+    /// Takes what the state says, without loads; (p, h) as its momenta say.
+    pub(super) fn go_to(&mut self, state: &[f64]) -> Vector6<f64> {
+        let body = self.equations;
+        let (frame, u, w) = body.parts(state);
+        let vector = |at: usize| Vector3::from_column_slice(&frame[at..at + 3]);
+        self.offset = vector(OFFSET);
+        self.origin = vector(0) + self.offset;
+        self.flight = vector(LINEAR) / body.rigid_mass[(0, 0)];
+        self.attitude = attitude(frame);
+        // As the reduced equations have it between the ends of steps, where e is not of unit length.
+        self.axes = self.attitude.axes() * body.frame.axes.transpose();
+        self.u.copy_from_slice(u);
+        self.w.copy_from_slice(w);
+        (self.force, self.torque) = (Vector3::zeros(), Vector3::zeros());
+        self.row_forces.fill(0.0);
+        self.drive = None;
+        let (linear, angular) = (vector(LINEAR), vector(ANGULAR) - self.offset.cross(&vector(LINEAR)));
+        (self.p, self.h) = (self.axes.tr_mul(&linear), self.axes.tr_mul(&angular));
+        joined(&self.p, &self.h)
+    }
+
+    /// The frame moves with nu = (V, omega); u' is what that leaves of vbar.
+    pub(super) fn move_frame(&mut self, nu: &Vector6<f64>) {
+        let body = self.equations;
+        (self.velocity, self.omega) = halves(nu);
+        self.ud.copy_from_slice(&self.vbar);
+        body.add_frame(-1.0, nu, &self.u, &mut self.ud);
+        if !body.massless.is_empty() {
+            body.massless.project(body.stiffness(), &mut self.ud, &mut self.room);
+            self.vbar.copy_from_slice(&self.ud);
+            body.add_frame(1.0, nu, &self.u, &mut self.vbar);
+        }
+    }
+
+    /// y' (see [`NodalEquations::dimension`]) under the loads.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `rates` has not the length of a state.
+    pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
+        assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
+        self.find_rates()?;
+        let (flight, offset) = match self.drive {
+            None => {
+                let relative = self.velocity - self.p / self.equations.rigid_mass[(0, 0)];
+                (self.flight, self.axes * relative)
+            }
+            // Where the frame is driven it is not told from the momentum: G goes with it.
+            Some(_) => (self.axes * self.velocity, Vector3::zeros()),
+        };
+        let linear = self.axes * self.force;
+        let angular = self.axes * self.torque + self.offset.cross(&linear);
+        let turning = self.attitude.rate(&self.equations.frame.axes.tr_mul(&self.omega));
+        let frame = flight.iter().chain(&offset).chain(&turning).chain(&linear).chain(&angular);
+        let nodes = self.ud.iter().chain(&self.w_rate);
+        rates.iter_mut().zip(frame.chain(nodes)).for_each(|(rate, value)| *rate = *value);
+        Ok(())
+    }
+
+    /// w' and lambda.
+    ///
+    /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is
+    /// known from the momenta.
+    ///
+    /// Where motion of the frame is given, w counts up to C'mu: lambda then leaves R'w' = 0.
+    fn find_rates(&mut self) -> Result<(), Failure> {
+        let body = self.equations;
+        let wanted = self.find_forces();
+        if self.drive.is_some() {
+            body.take_conditions(&mut self.w_rate);
+            return Ok(());
+        }
+        let missing = wanted - body.onto_frame(&self.u, &self.w_rate);
+        self.multipliers = self.conditions.plain.solve(&missing).ok_or(LOST)?;
+        add_motion(&body.conditions, 1.0, &self.multipliers, &mut self.w_rate);
+        Ok(())
+    }
+
+    /// w' without C'lambda; what B'w' is of a body that nothing drives.
+    pub(super) fn find_forces(&mut self) -> Vector6<f64> {
+        self.first.copy_from_slice(&self.row_forces);
+        match &self.turned {
+            None => self.equations.add_turned(-1.0, &self.omega, &self.w, &mut self.first),
+            Some(turned) => turned.kinetics.add_slope(&self.ud, &mut self.first),
+        }
+        self.take_internal_forces();
+        self.wanted()
+    }
+
+    /// `w_rate` = T'(f - D u') - K u for the forces f in `first`.
+    fn take_internal_forces(&mut self) {
+        let body = self.equations;
+        self.second.copy_from_slice(&self.u);
+        match body.damping {
+            None => {}
+            Some(Damping::Rayleigh { alpha, beta }) => {
+                body.weigh(&self.ud, &mut self.w_rate);
+                add_scaled(-alpha, &self.w_rate, &mut self.first);
+                add_scaled(*beta, &self.ud, &mut self.second);
+            }
+            Some(Damping::Matrix(damping)) => {
+                multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
+                add_scaled(-1.0, &self.w_rate, &mut self.first);
+            }
+            // That of the modes is below.
+            Some(Damping::Ratio(_) | Damping::Bands(_)) => {}
+        }
+        if let Some(damping) = &body.modal_damping {
+            damping.add(-1.0, &self.ud, &mut self.first, &mut self.amplitudes);
+        }
+        // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the
+        // others.
+        body.massless.add_static(&self.first, &mut self.second, &mut self.room);
+        multiply_vector(body.stiffness(), 1, &self.second, &mut self.w_rate);
+        self.w_rate.iter_mut().zip(&self.first).for_each(|(rate, force)| *rate = force - *rate);
+    }
+
+    /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components
+    /// in these axes.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `udd` has not N entries.
+    pub fn accelerations(&mut self, udd: &mut [f64]) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
+        assert_eq!(udd.len(), self.u.len(), "one entry per row");
+        if self.turned.is_some() {
+            return self.turned_accelerations(&Given::nothing(), udd);
+        }
+        self.find_rates()?;
+        let body = self.equations;
+        udd.copy_from_slice(&self.w_rate);
+        body.solve(udd, &mut self.first);
+        body.add_turned(-1.0, &self.omega, &self.ud, udd);
+        let nu = sums(&body.conditions, udd);
+        let nu = self.conditions.transposed.solve(&nu).ok_or(LOST)?;
+        let (linear, angular) = halves(&nu);
+        body.add_frame(-1.0, &nu, &self.u, udd);
+        body.massless.project(body.stiffness(), udd, &mut self.room);
+        let to_frame = body.frame.axes.transpose();
+        Ok((to_frame * linear, to_frame * angular))
+    }
+
+    /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame:
+    /// what it takes to hold C u = 0. Where rotations carry mass, lambda is that of the last accelerations: in
+    /// rates it counts up to what leaves (p, h) = B'w. Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the
+    /// moment that linear elastic forces have about the deformed body.
+    pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
+        let (force, torque) = halves(&(self.equations.conditions_at(&self.u) * self.multipliers));
+        let to_frame = self.equations.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+
+    /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F
+    /// and tau in the axes of the frame, and f (N) in model axes, with lambda = 0; none on what has no mass.
+    ///
+    /// # Panics
+    /// When a length is not N.
+    pub fn balance(
+        &mut self,
+        linear: &Vector3<f64>,
+        angular: &Vector3<f64>,
+        udd: &[f64],
+        forces: &mut [f64],
+    ) -> (Vector3<f64>, Vector3<f64>) {
+        let body = self.equations;
+        assert!(udd.len() == self.u.len() && forces.len() == self.u.len(), "one entry per row");
+        let nu = body.in_model(linear, angular);
+        if self.turned.is_some() {
+            return self.turned_balance(&nu, udd, forces);
+        }
+        let change = &mut self.first;
+        change.copy_from_slice(udd);
+        body.add_frame(1.0, &nu, &self.u, change);
+        body.add_turned(1.0, &self.omega, &self.ud, change);
+        body.weigh(change, forces);
+        let (force, torque) = halves(&body.onto_frame(&self.u, forces));
+        let force = force + self.omega.cross(&self.p);
+        let torque = torque
+            + body.moment(&self.ud, &self.w)
+            + self.omega.cross(&self.h)
+            + self.velocity.cross(&self.p);
+        body.add_turned(1.0, &self.omega, &self.w, forces);
+        self.take_inertia_forces(forces);
+        let to_frame = body.frame.axes.transpose();
+        (to_frame * force, to_frame * torque)
+    }
+
+    /// Adds what K and damping take to the `forces` that inertia takes.
+    pub(super) fn take_inertia_forces(&mut self, forces: &mut [f64]) {
+        self.first.copy_from_slice(forces);
+        self.first.iter_mut().for_each(|force| *force = -*force);
+        self.take_internal_forces();
+        forces.iter_mut().zip(&self.w_rate).for_each(|(force, rate)| *force = -rate);
+    }
+}

@@ -1,0 +1,278 @@
+//! Velocities from the momenta of turned nodes.
+
+use super::drive::LOST;
+use super::equations::NodalEquations;
+use super::kinetics::Kinetics;
+use super::massless::Room;
+use super::motions::{add_motion, sums};
+use crate::dynamics::kernels::{add_scaled, dot};
+use crate::integration::Failure;
+use flexbody_linalg::multiply_vector;
+use nalgebra::{LU, Matrix6, U6, Vector6};
+
+/// Iterations end when the energy of the residual is the square of this part of the energy of the solution, which
+/// is rounding.
+const SOLVED: f64 = 1e-15;
+
+/// Iterations at the most: their number grows with the turns of the nodes, to 30 at turns of 0.3. Beyond it the
+/// evaluation fails.
+const MOST_ITERATIONS: usize = 200;
+
+/// Nodes that are turned beyond what their mass is positive for.
+const TURNED: Failure =
+    Failure::Rates { reason: "the nodes are turned so far that their mass is not positive definite" };
+
+/// B'C' at the displacements and its transpose, factored.
+#[derive(Debug, Clone)]
+pub(super) struct Conditions {
+    pub plain: LU<f64, U6, U6>,
+    pub transposed: LU<f64, U6, U6>,
+}
+
+impl Conditions {
+    pub(super) fn new(matrix: &Matrix6<f64>) -> Self {
+        Self { plain: matrix.lu(), transposed: matrix.transpose().lu() }
+    }
+}
+
+/// The mass of turned nodes as a symmetric operator on N rows.
+///
+/// A vector v of all rows is a motion nu = (C B)^-1 C v of the frame and rates u' = T (v - B nu) with C u' = 0. Of
+/// the momenta w and (p, h) of these,
+///
+/// ```text
+/// M(u) v = T'w + C'(B'C')^-1 ((p, h) - B'T'w)
+/// ```
+///
+/// is the gradient of T(v). w of a state counts up to C'mu: w + C'(B'C')^-1 ((p, h) - B'w) = M(u) v is what v
+/// follows from, by conjugate gradients with the factor of M = M(0) as preconditioner. T takes what carries no
+/// mass where K takes it; it is the identity where that turns no node with directors.
+#[derive(Debug, Clone)]
+pub(super) struct TurnedMass<'e> {
+    pub kinetics: Kinetics<'e>,
+    body: &'e NodalEquations<'e>,
+    /// True if T is not the identity.
+    restricts: bool,
+    conditions: Conditions,
+    u: Vec<f64>,
+    rates: Vec<f64>,
+    residual: Vec<f64>,
+    preconditioned: Vec<f64>,
+    direction: Vec<f64>,
+    product: Vec<f64>,
+    scratch: Vec<f64>,
+    room: Room,
+}
+
+/// Components of (V, omega), or of their rates, that are given.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Given {
+    pub components: [bool; 6],
+    /// Model axes; zero in the components that are free.
+    pub motion: Vector6<f64>,
+}
+
+impl Given {
+    /// No component.
+    pub(super) fn nothing() -> Self {
+        Self { components: [false; 6], motion: Vector6::zeros() }
+    }
+
+    /// `free` in the components that are free, `own` in the given ones.
+    pub(super) fn or_own(&self, free: &Vector6<f64>, own: &Vector6<f64>) -> Vector6<f64> {
+        Vector6::from_fn(|k, _| if self.components[k] { own[k] } else { free[k] })
+    }
+
+    /// x <- v with the given motion, and M(u) v = x + C'(B'C')^-1 (rest of the momenta) in what is free.
+    pub(super) fn solve(
+        &self,
+        turned: &mut TurnedMass<'_>,
+        momenta: &Vector6<f64>,
+        own: &Vector6<f64>,
+        x: &mut [f64],
+    ) -> Result<Vector6<f64>, Failure> {
+        turned.complete(&self.or_own(momenta, own), x)?;
+        match self.components.contains(&true) {
+            true => turned.solve_given(x, self.components, &self.motion)?,
+            false => turned.solve(x)?,
+        }
+        turned.frame_of(x)
+    }
+}
+
+/// Components of the motion of the frame that are given, and the rest of what constrains it.
+#[derive(Debug, Clone)]
+struct Constraint {
+    components: [bool; 6],
+    /// (B'C')^-1 and the inverse of N'M^-1 N for the columns N of C'(B'C')^-1 that belong to given components.
+    multipliers: Matrix6<f64>,
+    answer: Matrix6<f64>,
+}
+
+impl<'e> TurnedMass<'e> {
+    /// Memory for the equations of `body`, at rest without deformation; `None` where no rotation carries mass.
+    pub(super) fn new(body: &'e NodalEquations<'e>) -> Option<Self> {
+        let directors = body.directors.as_ref()?;
+        let zeros = || vec![0.0; body.n_rows()];
+        Some(Self {
+            kinetics: Kinetics::new(body, directors),
+            body,
+            restricts: body.massless.turns(directors),
+            conditions: Conditions::new(&body.conditions_rigid),
+            u: zeros(),
+            rates: zeros(),
+            residual: zeros(),
+            preconditioned: zeros(),
+            direction: zeros(),
+            product: zeros(),
+            scratch: zeros(),
+            room: body.massless.room(),
+        })
+    }
+
+    /// Goes to the displacements `u` with their `conditions`.
+    pub(super) fn turn(&mut self, u: &[f64], conditions: &Conditions) {
+        self.u.copy_from_slice(u);
+        self.conditions.clone_from(conditions);
+        self.kinetics.turn(u);
+    }
+
+    /// w <- w + C'(B'C')^-1 (momenta - B'w).
+    pub(super) fn complete(&self, momenta: &Vector6<f64>, w: &mut [f64]) -> Result<(), Failure> {
+        let missing = momenta - self.body.onto_frame(&self.u, w);
+        let mu = self.conditions.plain.solve(&missing).ok_or(LOST)?;
+        add_motion(&self.body.conditions, 1.0, &mu, w);
+        Ok(())
+    }
+
+    /// nu = (C B)^-1 C v.
+    pub(super) fn frame_of(&self, v: &[f64]) -> Result<Vector6<f64>, Failure> {
+        let nu = sums(&self.body.conditions, v);
+        self.conditions.transposed.solve(&nu).ok_or(LOST)
+    }
+
+    /// x <- T'x.
+    pub(super) fn restrict(&mut self, x: &mut [f64]) {
+        if !self.restricts {
+            return;
+        }
+        self.scratch.fill(0.0);
+        self.body.massless.add_static(x, &mut self.scratch, &mut self.room);
+        multiply_vector(self.body.stiffness(), 1, &self.scratch, &mut self.rates);
+        x.iter_mut().zip(&self.rates).for_each(|(x, taken)| *x -= taken);
+    }
+
+    /// w = T'dT/du' and (p, h) of v.
+    pub(super) fn momenta(&mut self, v: &[f64], w: &mut [f64]) -> Result<Vector6<f64>, Failure> {
+        let nu = self.frame_of(v)?;
+        self.rates.copy_from_slice(v);
+        self.body.add_frame(-1.0, &nu, &self.u, &mut self.rates);
+        if self.restricts {
+            self.body.massless.project(self.body.stiffness(), &mut self.rates, &mut self.room);
+        }
+        let momenta = self.kinetics.momenta(&nu, &self.rates, w);
+        self.restrict(w);
+        Ok(momenta)
+    }
+
+    /// product = M(u) v.
+    fn multiply(&mut self, v: &[f64], product: &mut [f64]) -> Result<(), Failure> {
+        let momenta = self.momenta(v, product)?;
+        self.complete(&momenta, product)
+    }
+
+    /// x <- M(u)^-1 x for a body that nothing drives.
+    pub(super) fn solve(&mut self, x: &mut [f64]) -> Result<(), Failure> {
+        self.residual.copy_from_slice(x);
+        x.fill(0.0);
+        self.iterate(x, 0.0, None)
+    }
+
+    /// x <- v with the `components` of its motion of the frame as in `motion`, and M(u) v = x up to forces that
+    /// act on these.
+    ///
+    /// * `motion`: zero in the other components.
+    pub(super) fn solve_given(
+        &mut self,
+        x: &mut [f64],
+        components: [bool; 6],
+        motion: &Vector6<f64>,
+    ) -> Result<(), Failure> {
+        let given = self.given(components)?;
+        self.residual.copy_from_slice(x);
+        x.fill(0.0);
+        self.body.add_frame(1.0, motion, &self.u, x);
+        let mut product = std::mem::take(&mut self.product);
+        let multiplied = self.multiply(x, &mut product);
+        self.residual.iter_mut().zip(&product).for_each(|(r, product)| *r -= product);
+        let energy = dot(x, &product);
+        self.product = product;
+        multiplied?;
+        self.iterate(x, energy, Some(&given))
+    }
+
+    fn given(&self, components: [bool; 6]) -> Result<Constraint, Failure> {
+        let multipliers = self.conditions.plain.solve(&Matrix6::identity()).ok_or(LOST)?;
+        let mut answer = multipliers.transpose() * self.body.answer * multipliers;
+        for (k, _) in components.iter().enumerate().filter(|(_, given)| !**given) {
+            answer.row_mut(k).fill(0.0);
+            answer.column_mut(k).fill(0.0);
+            answer[(k, k)] = 1.0;
+        }
+        Ok(Constraint { components, multipliers, answer: answer.try_inverse().ok_or(LOST)? })
+    }
+
+    /// Conjugate gradients from x, whose residual is set, to rounding of the larger of `energy` and that of the
+    /// correction.
+    fn iterate(&mut self, x: &mut [f64], energy: f64, given: Option<&Constraint>) -> Result<(), Failure> {
+        self.precondition(given)?;
+        let mut square = dot(&self.residual, &self.preconditioned);
+        let enough = SOLVED * SOLVED * square.max(energy);
+        self.direction.copy_from_slice(&self.preconditioned);
+        for _ in 0..MOST_ITERATIONS {
+            if square <= enough {
+                return Ok(());
+            }
+            let curvature = self.curvature()?;
+            if curvature.is_nan() || curvature <= 0.0 {
+                return Err(TURNED);
+            }
+            let step = square / curvature;
+            add_scaled(step, &self.direction, x);
+            add_scaled(-step, &self.product, &mut self.residual);
+            self.precondition(given)?;
+            let next = dot(&self.residual, &self.preconditioned);
+            let part = next / square;
+            self.direction.iter_mut().zip(&self.preconditioned).for_each(|(p, z)| *p = z + part * *p);
+            square = next;
+        }
+        Err(TURNED)
+    }
+
+    /// The product of the mass with the direction, and the square of the direction in it.
+    fn curvature(&mut self) -> Result<f64, Failure> {
+        let (direction, mut product) =
+            (std::mem::take(&mut self.direction), std::mem::take(&mut self.product));
+        let multiplied = self.multiply(&direction, &mut product);
+        (self.direction, self.product) = (direction, product);
+        multiplied?;
+        Ok(dot(&self.direction, &self.product))
+    }
+
+    /// The residual times M^-1, without motion in the given components: forces on these are taken from both, and
+    /// rounding on what carries no mass from the residual.
+    fn precondition(&mut self, given: Option<&Constraint>) -> Result<(), Failure> {
+        let mut residual = std::mem::take(&mut self.residual);
+        self.restrict(&mut residual);
+        self.residual = residual;
+        self.preconditioned.copy_from_slice(&self.residual);
+        self.body.solve(&mut self.preconditioned, &mut self.scratch);
+        let Some(given) = given else { return Ok(()) };
+        let nu = self.frame_of(&self.preconditioned)?;
+        let moved = Vector6::from_fn(|k, _| if given.components[k] { nu[k] } else { 0.0 });
+        let mu = given.multipliers * (given.answer * moved);
+        add_motion(&self.body.conditions, -1.0, &mu, &mut self.residual);
+        add_motion(&self.body.answered, -1.0, &mu, &mut self.preconditioned);
+        Ok(())
+    }
+}

@@ -1,0 +1,176 @@
+//! What carries no mass follows from the rest: exact condensation (theory 6.13).
+
+use super::NodalError;
+use super::directors::Directors;
+use flexbody_linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
+use flexbody_model::FeModel;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+/// Part of its diagonal entry up to which a pivot of M is zero. Consistent masses stay above 1e-4, null
+/// vectors leave 1e-15.
+pub(super) const NULL_PIVOT: f64 = 1e-9;
+
+/// Largest z'Mz of a null vector relative to that of the diagonal of M.
+const NULL_MASS: f64 = 1e-10;
+
+/// Most numbers that null vectors may take (16 MB).
+const DENSE: usize = 2_000_000;
+
+/// The null space of M: Z = \[unit vectors of empty rows, others\], the others with K z = 0 in the empty
+/// rows.
+#[derive(Debug, Clone)]
+pub(super) struct Massless {
+    /// Empty rows of M.
+    rows: Vec<usize>,
+    /// K of these rows.
+    own: Option<SparseLdl>,
+    /// The other null vectors, one after the other, and K times them.
+    vectors: Vec<f64>,
+    weighted: Vec<f64>,
+    /// Z'K Z of the others.
+    factor: Option<Cholesky<f64, Dyn>>,
+}
+
+/// Memory for the products of [`Massless`].
+#[derive(Debug, Clone)]
+pub(super) struct Room {
+    own: Vec<f64>,
+    scratch: Vec<f64>,
+    coefficients: DVector<f64>,
+}
+
+/// Whether M has nothing in a row.
+fn is_empty(model: &FeModel, row: usize) -> bool {
+    let pencil = model.pencil();
+    pencil.mass().row(row / pencil.block()).0.is_empty()
+}
+
+/// Refuses a null vector z that has a mass: `product` is M z, `diagonal` that of M.
+fn refuse_mass(product: &[f64], z: &[f64], diagonal: &[f64]) -> Result<(), NodalError> {
+    let mass: f64 = product.iter().zip(z).map(|(m, z)| m * z).sum();
+    let scale: f64 = diagonal.iter().zip(z).map(|(d, z)| d * z * z).sum();
+    if mass.is_nan() || mass.abs() > NULL_MASS * scale {
+        return Err(NodalError::MassIndefinite);
+    }
+    Ok(())
+}
+
+/// The factor of Z'K Z for null vectors Z and their products K Z, of `n` rows each.
+fn null_stiffness(vectors: &[f64], weighted: &[f64], n: usize) -> Result<Cholesky<f64, Dyn>, NodalError> {
+    let k = vectors.len() / n;
+    let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+    let energy = DMatrix::from_fn(k, k, |i, j| product(&vectors[i * n..][..n], &weighted[j * n..][..n]));
+    let energy = 0.5 * (&energy + energy.transpose());
+    energy.cholesky().ok_or(NodalError::MasslessUnheld)
+}
+
+impl Massless {
+    /// Finds the null space of the mass that `factor` is of.
+    pub(super) fn new(model: &FeModel, factor: &SparseLdl) -> Result<Self, NodalError> {
+        let (pencil, stiffness) = (model.pencil(), model.stiffness());
+        let (n, block) = (pencil.n(), pencil.block());
+        let mut massless = Self::of_empty_rows(model)?;
+        let starts: Vec<usize> = factor
+            .null_rows()
+            .iter()
+            .flat_map(|&vertex| (0..block).map(move |k| vertex * block + k))
+            .filter(|&row| !is_empty(model, row))
+            .collect();
+        let k = starts.len();
+        if n * k > DENSE {
+            return Err(NodalError::NullSpaceTooLarge { null_vectors: k, rows: n });
+        }
+        let (mut vectors, mut weighted) = (vec![0.0; n * k], vec![0.0; n * k]);
+        let (mut scratch, mut room) = (vec![0.0; n], massless.room());
+        let diagonal = pencil.mass_diagonal();
+        for ((&start, z), kz) in starts.iter().zip(vectors.chunks_mut(n)).zip(weighted.chunks_mut(n)) {
+            z[start] = 1.0;
+            factor.solve_in_place(block, z, &mut scratch);
+            // Of a size that suits the products below, in any units.
+            let size = z.iter().fold(0.0f64, |m, z| m.max(z.abs()));
+            z.iter_mut().for_each(|z| *z /= size);
+            multiply_vector(pencil.mass(), block, z, &mut scratch);
+            refuse_mass(&scratch, z, &diagonal)?;
+            massless.project(stiffness, z, &mut room);
+            multiply_vector(stiffness, 1, z, kz);
+        }
+        if k > 0 {
+            massless.factor = Some(null_stiffness(&vectors, &weighted, n)?);
+        }
+        (massless.vectors, massless.weighted) = (vectors, weighted);
+        Ok(massless)
+    }
+
+    /// The rows that M leaves empty, which K must hold, without null vectors yet.
+    fn of_empty_rows(model: &FeModel) -> Result<Self, NodalError> {
+        let rows: Vec<usize> = (0..model.pencil().n()).filter(|&row| is_empty(model, row)).collect();
+        let own = (!rows.is_empty()).then(|| SparseLdl::new(&model.stiffness().principal(&rows), 0.0));
+        let own = match own {
+            Some(None) => return Err(NodalError::MasslessUnheld),
+            Some(Some(own)) if !own.null_rows().is_empty() => return Err(NodalError::MasslessUnheld),
+            own => own.flatten(),
+        };
+        Ok(Self { rows, own, vectors: Vec::new(), weighted: Vec::new(), factor: None })
+    }
+
+    /// Whether M has an inverse.
+    pub(super) fn is_empty(&self) -> bool {
+        self.rows.is_empty() && self.vectors.is_empty()
+    }
+
+    /// True if there are null vectors beside the empty rows, or an empty row turns a node with directors: their
+    /// motion may have mass where nodes are turned.
+    pub(super) fn turns(&self, directors: &Directors<'_>) -> bool {
+        self.n_vectors() > 0 || self.rows.iter().any(|&row| directors.has_rotation(row))
+    }
+
+    /// Number of null vectors beside the empty rows.
+    pub(super) fn n_vectors(&self) -> usize {
+        self.factor.as_ref().map_or(0, |factor| factor.l_dirty().nrows())
+    }
+
+    pub(super) fn room(&self) -> Room {
+        let zeros = || vec![0.0; self.rows.len()];
+        Room { own: zeros(), scratch: zeros(), coefficients: DVector::zeros(self.n_vectors()) }
+    }
+
+    /// x <- T x, T = I - Z (Z'K Z)^-1 Z'K: what has no mass goes where K takes it.
+    pub(super) fn project(&self, stiffness: &SymmetricMatrix, x: &mut [f64], room: &mut Room) {
+        if let Some(own) = &self.own {
+            self.rows.iter().for_each(|&row| x[row] = 0.0);
+            for (force, &row) in room.own.iter_mut().zip(&self.rows) {
+                let (columns, values) = stiffness.row(row);
+                *force = -columns.iter().zip(values).map(|(&j, k)| k * x[j as usize]).sum::<f64>();
+            }
+            own.solve_in_place(1, &mut room.own, &mut room.scratch);
+            self.rows.iter().zip(&room.own).for_each(|(&row, value)| x[row] = *value);
+        }
+        let Some(factor) = &self.factor else { return };
+        for (c, kz) in room.coefficients.iter_mut().zip(self.weighted.chunks(x.len())) {
+            *c = -kz.iter().zip(&*x).map(|(kz, x)| kz * x).sum::<f64>();
+        }
+        factor.solve_mut(&mut room.coefficients);
+        self.add_vectors(x, room);
+    }
+
+    /// x <- x + Z (Z'K Z)^-1 Z'b: adds the displacements that the forces b give to what has no mass.
+    pub(super) fn add_static(&self, b: &[f64], x: &mut [f64], room: &mut Room) {
+        if let Some(own) = &self.own {
+            room.own.iter_mut().zip(&self.rows).for_each(|(force, &row)| *force = b[row]);
+            own.solve_in_place(1, &mut room.own, &mut room.scratch);
+            self.rows.iter().zip(&room.own).for_each(|(&row, value)| x[row] += value);
+        }
+        let Some(factor) = &self.factor else { return };
+        for (c, z) in room.coefficients.iter_mut().zip(self.vectors.chunks(x.len())) {
+            *c = z.iter().zip(b).map(|(z, b)| z * b).sum();
+        }
+        factor.solve_mut(&mut room.coefficients);
+        self.add_vectors(x, room);
+    }
+
+    fn add_vectors(&self, x: &mut [f64], room: &Room) {
+        for (c, z) in room.coefficients.iter().zip(self.vectors.chunks(x.len())) {
+            x.iter_mut().zip(z).for_each(|(x, z)| *x += c * z);
+        }
+    }
+}

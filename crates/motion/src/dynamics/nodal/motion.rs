@@ -1,0 +1,198 @@
+//! The nodal equations under loads as a system that is integrated.
+
+use super::NodalEvaluation;
+use super::equations::NodalEquations;
+use super::state::{ANGULAR, ATTITUDE, DISPLACEMENTS, LINEAR, attitude};
+use super::stiff::Stiff;
+use crate::dynamics::{Orientation, Prescribed};
+use crate::integration::{Failure, StageMode, System};
+use nalgebra::{Matrix3, Vector3, Vector6};
+
+/// Deformation that is nothing, relative to the size of the body: the scale of a body at rest.
+const NOTHING: f64 = 1e-9;
+
+/// y' = f(t, y) of all nodes, with y as [`NodalEquations::dimension`] says.
+///
+/// The error of a step is measured in energy: with E the kinetic energy about the centre of mass (estimated
+/// with the diagonal of M) and the elastic energy, and n entries of y,
+///
+/// ```text
+/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    G, D: length / sqrt(n)    e: 1 / sqrt(n)
+/// ```
+///
+/// so that the mean square of error over scale is the energy of the error relative to E, with the diagonals
+/// of K and M in place of the matrices: strict for soft modes, whose u has less energy than that. A body at
+/// rest has in place of E what deforms it by 1e-9 of its size; one that is driven the energy of its spin
+/// besides.
+///
+/// Implicit steps solve what is stiff, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of M + z D +
+/// z^2 K.
+pub struct NodalMotion<'e, L> {
+    pub(super) evaluation: NodalEvaluation<'e>,
+    loads: L,
+    drive: Option<Box<Drive<'e>>>,
+    stiff: Stiff<'e>,
+    stiffness: Vec<f64>,
+    mass: Vec<f64>,
+}
+
+/// Velocities of the frame that are given at a time, and their rates, where the frame has these axes in the
+/// world.
+type Drive<'e> = dyn Fn(f64, &Matrix3<f64>) -> (Prescribed, Prescribed) + 'e;
+
+impl<'e> NodalMotion<'e, fn(f64, &mut NodalEvaluation<'e>)> {
+    /// A body without loads.
+    pub fn free(equations: &'e NodalEquations<'e>) -> Self {
+        Self::new(equations, |_, _| {})
+    }
+}
+
+impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
+    /// A body under `loads`, which are added at a time and to an evaluation that is set to the state.
+    pub fn new(equations: &'e NodalEquations<'e>, loads: L) -> Self {
+        let positive = |diagonal: Vec<f64>| {
+            let mean = diagonal.iter().sum::<f64>() / diagonal.len() as f64;
+            diagonal.into_iter().map(|d| if d > 0.0 { d } else { mean }).collect()
+        };
+        Self {
+            evaluation: NodalEvaluation::new(equations),
+            loads,
+            drive: None,
+            stiff: Stiff::new(equations),
+            stiffness: positive(equations.stiffness().diagonal()),
+            mass: positive(equations.model.pencil().mass_diagonal()),
+        }
+    }
+
+    /// The same where motion of the frame is given: `drive` tells its velocities at a time, V and omega in
+    /// the axes of the frame, and their rates, from these axes in the world. What is given at one time is
+    /// given at all.
+    pub fn driven(self, drive: impl Fn(f64, &Matrix3<f64>) -> (Prescribed, Prescribed) + 'e) -> Self {
+        Self { drive: Some(Box::new(drive)), ..self }
+    }
+
+    /// What is given of the motion of the frame at a state, and of its rates.
+    fn given(&self, time: f64, state: &[f64]) -> (Prescribed, Prescribed) {
+        let Some(drive) = &self.drive else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
+        let axes = attitude(state).normalised().axes() * self.evaluation.equations.frame.axes;
+        drive(time, &axes)
+    }
+
+    /// The body at a state, under its loads.
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    pub fn evaluate(&mut self, time: f64, state: &[f64]) -> Result<&mut NodalEvaluation<'e>, Failure> {
+        let (velocities, _) = self.given(time, state);
+        self.evaluation.set_driven(state, &velocities)?;
+        (self.loads)(time, &mut self.evaluation);
+        Ok(&mut self.evaluation)
+    }
+
+    /// V' and omega' in the axes of the frame, and u'' (N), at a state; the evaluation then has what drives
+    /// the frame ([`NodalEvaluation::driving_force`]).
+    ///
+    /// # Errors
+    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    ///
+    /// # Panics
+    /// When `udd` has not N entries.
+    pub fn accelerations(
+        &mut self,
+        time: f64,
+        state: &[f64],
+        udd: &mut [f64],
+    ) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
+        let (_, rates) = self.given(time, state);
+        self.evaluate(time, state)?;
+        match rates {
+            Prescribed::NOTHING => self.evaluation.accelerations(udd),
+            _ => self.evaluation.driven_accelerations(&rates, udd),
+        }
+    }
+
+    /// [`NodalEvaluation::loaded_displacements`] at the state that was seen last.
+    pub fn loaded_displacements(&mut self) -> &[f64] {
+        self.evaluation.loaded_displacements()
+    }
+
+    /// The evaluation at the state that was seen last.
+    pub fn evaluation(&self) -> &NodalEvaluation<'e> {
+        &self.evaluation
+    }
+
+    /// E.
+    fn energy(&self, state: &[f64]) -> f64 {
+        let body = self.evaluation.equations;
+        let (frame, u, w) = body.parts(state);
+        let axes = attitude(frame).normalised().axes();
+        let mut linear = Vector3::from_column_slice(&frame[LINEAR..LINEAR + 3]) / body.rigid_mass[(0, 0)];
+        let mut spin = 0.0;
+        if self.drive.is_some() {
+            // w has nothing of the frame then.
+            linear.fill(0.0);
+            let omega = self.evaluation.omega;
+            spin = omega.dot(&(body.rigid_mass.fixed_view::<3, 3>(3, 3) * omega));
+        }
+        let drift = body.in_model(&axes.tr_mul(&linear), &Vector3::zeros());
+        let about_centre = |((w, mass_rigid), mass): ((&f64, &[f64; 6]), &f64)| {
+            (w - Vector6::from(*mass_rigid).dot(&drift)).powi(2) / mass
+        };
+        let kinetic: f64 = w.iter().zip(&body.mass_rigid).zip(&self.mass).map(about_centre).sum();
+        let least: f64 = self.stiffness.iter().sum::<f64>() * (NOTHING * body.length).powi(2);
+        (0.5 * (kinetic + spin) + body.elastic_energy(u)).max(0.5 * least)
+    }
+}
+
+impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> {
+    fn dimension(&self) -> usize {
+        self.evaluation.equations.dimension()
+    }
+
+    fn rates(&mut self, time: f64, state: &[f64], rates: &mut [f64]) -> Result<(), Failure> {
+        self.evaluate(time, state)?.rates(rates)
+    }
+
+    fn scales(&self, state: &[f64], scales: &mut [f64]) {
+        let body = self.evaluation.equations;
+        let share = 2.0 * self.energy(state) / scales.len() as f64;
+        let one = (scales.len() as f64).sqrt().recip();
+        let (frame, nodes) = scales.split_at_mut(DISPLACEMENTS);
+        let inertia = body.rigid_mass.diagonal().fixed_rows::<3>(3).amax();
+        frame[..ATTITUDE].fill(body.length * one);
+        frame[ATTITUDE..LINEAR].fill(one);
+        frame[LINEAR..ANGULAR].fill((share * body.rigid_mass[(0, 0)]).sqrt());
+        frame[ANGULAR..].fill((share * inertia).sqrt());
+        let (u, w) = nodes.split_at_mut(body.n_rows());
+        u.iter_mut().zip(&self.stiffness).for_each(|(scale, k)| *scale = (share / k).sqrt());
+        w.iter_mut().zip(&self.mass).for_each(|(scale, m)| *scale = (share * m).sqrt());
+    }
+
+    /// The energy of the corrections of u and w, relative to E of the step; those of the frame in their
+    /// scales.
+    fn correct_stages(
+        &mut self,
+        h: f64,
+        modes: &[StageMode],
+        scales: &[f64],
+        lacks: &mut [Vec<f64>],
+    ) -> Result<Option<f64>, Failure> {
+        let energy = self.stiff.correct(h, modes, lacks)?;
+        let of_step = 0.5 * scales.len() as f64 * self.stiffness[0] * scales[DISPLACEMENTS].powi(2);
+        let frame = lacks.iter().flat_map(|lack| lack[..DISPLACEMENTS].iter().zip(scales));
+        let frame: f64 = frame.map(|(lack, scale)| (lack / scale).powi(2)).sum();
+        Ok(Some((energy / of_step + frame / (lacks.len() * scales.len()) as f64).sqrt()))
+    }
+
+    /// Euler parameters of unit length; C u = 0; of a body that is driven R'w = 0.
+    fn settle(&self, state: &mut [f64]) {
+        let unit = attitude(state).normalised();
+        state[ATTITUDE..LINEAR].copy_from_slice(&unit.0);
+        let body = self.evaluation.equations;
+        let (u, w) = state[DISPLACEMENTS..].split_at_mut(body.n_rows());
+        body.take_rigid(u);
+        if self.drive.is_some() {
+            body.take_conditions(w);
+        }
+    }
+}

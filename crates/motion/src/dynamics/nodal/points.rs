@@ -1,0 +1,106 @@
+//! Points of a body among its nodes: where loads act and motion is read.
+
+use faer::{Mat, MatRef};
+use flexbody_base::error::Result;
+use flexbody_body::basis::interface_loads;
+use flexbody_model::FeModel;
+use nalgebra::Vector3;
+
+/// Rows of the model with their weights in the three components of a vector.
+pub(super) type Weights = Vec<(usize, [f64; 3])>;
+
+/// A node, or the reference point of an interface: C_t and C_r, which take the displacement and the rotation
+/// vector of the point from the displacements u of all rows, in model axes. The forces b and torques t that
+/// do work on these are the nodal forces C_t'b + C_r't: [`BodyPoint`](crate::dynamics::BodyPoint)
+/// without modes, for Psi_t = C_t Psi and Psi_r = C_r Psi.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NodalPoint {
+    /// Place in the undeformed model.
+    place: Vector3<f64>,
+    pub(super) translation: Weights,
+    /// Empty where the point has no orientation.
+    pub(super) rotation: Weights,
+}
+
+impl NodalPoint {
+    /// Node `node` of `model`, by its index. It has an orientation where the node has rotations.
+    ///
+    /// # Panics
+    /// When the index is not below the number of nodes.
+    pub fn node(model: &FeModel, node: usize) -> Self {
+        let d = model.dimension();
+        let unit = |axis: usize| std::array::from_fn(|k| f64::from(k == axis));
+        let rotations = (model.rows().displacements()..).zip(model.rows().rotations());
+        let own = rotations.filter(|(_, (of, _))| *of as usize == node);
+        Self {
+            place: model.nodes().positions[node].into(),
+            translation: (0..d).map(|k| (d * node + k, unit(k))).collect(),
+            rotation: own.map(|(row, &(_, axis))| (row, unit(axis.into()))).collect(),
+        }
+    }
+
+    /// The reference point of the interface `name`: the rigid motion that fits that of its nodes best, as of
+    /// every coupling (theory (5.3)). `None` for an interface that does not exist or has no reference point.
+    ///
+    /// # Errors
+    /// FB150 when the model has no interfaces at all.
+    pub fn interface(model: &FeModel, name: &str) -> Result<Option<Self>> {
+        let set = model.interfaces().iter().find(|set| set.name == name);
+        let Some(place) = set.and_then(|set| set.reference.point()) else { return Ok(None) };
+        let Some(loads) = interface_loads(model, name)? else { return Ok(None) };
+        let d = model.dimension();
+        let (forces, torques) = loads.as_ref().split_at_col(d);
+        let about = if d == 2 { 2 } else { 0 };
+        Ok(Some(Self {
+            place: place.into(),
+            translation: weights(forces, 0),
+            rotation: weights(torques, about),
+        }))
+    }
+
+    /// Place in the undeformed model, model axes.
+    pub fn place(&self) -> Vector3<f64> {
+        self.place
+    }
+
+    /// Whether the point has an orientation.
+    pub fn turns(&self) -> bool {
+        !self.rotation.is_empty()
+    }
+
+    /// C_t u, model axes.
+    pub fn displacement(&self, u: &[f64]) -> Vector3<f64> {
+        sum(&self.translation, u)
+    }
+
+    /// theta = C_r u, model axes; zero where the point has no orientation.
+    pub fn rotation(&self, u: &[f64]) -> Vector3<f64> {
+        sum(&self.rotation, u)
+    }
+
+    /// \[C_t', C_r'\] (N x 6, in the plane N x 3): nodal forces of unit forces and torques, model axes.
+    pub fn unit_loads(&self, model: &FeModel) -> Mat<f64> {
+        let d = model.dimension();
+        let axes: &[usize] = if d == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
+        let mut loads = Mat::zeros(model.rows().len(), axes.len());
+        for (column, &axis) in axes.iter().enumerate() {
+            let own = if axis < 3 { &self.translation } else { &self.rotation };
+            own.iter().for_each(|(row, weights)| loads[(*row, column)] = weights[axis % 3]);
+        }
+        loads
+    }
+}
+
+/// The rows of `loads` that are not zero, its columns being components from `first` on.
+fn weights(loads: MatRef<'_, f64>, first: usize) -> Weights {
+    let row = |i: usize| {
+        let mut own = [0.0; 3];
+        (0..loads.ncols()).for_each(|k| own[first + k] = loads[(i, k)]);
+        (i, own)
+    };
+    (0..loads.nrows()).map(row).filter(|(_, own)| own.iter().any(|weight| *weight != 0.0)).collect()
+}
+
+fn sum(weights: &Weights, u: &[f64]) -> Vector3<f64> {
+    weights.iter().map(|(row, weights)| Vector3::from(*weights) * u[*row]).sum()
+}

@@ -1,0 +1,362 @@
+//! How far a motion is from that of a reference: the errors that tolerances of a scene are about.
+
+use super::lively::{LivelyNodes, along_principal_directions, longest};
+use super::peak::Peak;
+use super::{Extremes, Tolerance, Trace};
+use crate::dynamics::EulerParameters;
+use faer::MatRef;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::{larger, not_negative};
+use nalgebra::{DMatrix, DVector, Vector3};
+
+/// Torques, relative to the energy of the motion, that are none: rounding.
+const NO_TORQUE: f64 = 1e-10;
+
+/// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
+pub const LEAST_REACTION: f64 = 1e-3;
+
+/// Part of the largest force times the radius of gyration below which torques are not looked at, and of the largest
+/// torque over this radius for forces: the torque of a bar that is shaken along its axis is what rounding makes of it.
+const LEAST_BESIDE: f64 = 1e-2;
+
+/// Errors of the second half of a run over those of the first, beyond the growth of the motion, from which on
+/// they are said to grow.
+const GROWING: f64 = 1.8;
+
+/// Errors below this part of their tolerance do not matter yet, though they grow.
+const MATTERS: f64 = 0.1;
+
+/// Force and torque.
+type Reaction = (Vector3<f64>, Vector3<f64>);
+
+/// Largest errors over the continuous motion. `None`: the reference has nothing of it.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct OutputErrors {
+    /// Angle between the frames, radians.
+    pub attitude: f64,
+    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of
+    /// any of them or to the least that counts ([`Resolution`](super::Resolution)). Without watched points:
+    /// of the nodes that move most in some mode along some axis.
+    pub deflection: Option<f64>,
+    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that
+    /// counts instead of the largest where that is less.
+    pub stress: Option<f64>,
+    /// Difference of force F, or torque T, that the prescribed motion takes, relative to the largest force, or
+    /// torque, or to a thousandth of w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2, or to a
+    /// hundredth of the largest T / r, or F r.
+    pub reaction: Option<f64>,
+}
+
+impl OutputErrors {
+    /// The largest ratio of error to tolerance.
+    pub fn worst(&self, tolerance: &Tolerance) -> f64 {
+        let ratio = |error: Option<f64>, allowed: f64| error.map_or(0.0, |error| error / allowed);
+        let ratios = [
+            self.attitude / tolerance.attitude,
+            ratio(self.deflection, tolerance.deflection),
+            ratio(self.stress, tolerance.stress),
+            ratio(self.reaction, tolerance.reaction),
+        ];
+        ratios.into_iter().fold(0.0, larger)
+    }
+
+    /// The output whose error is largest beside its tolerance: its name, the error, and the tolerance.
+    pub fn decisive(&self, tolerance: &Tolerance) -> (&'static str, f64, f64) {
+        let all = [
+            ("attitude", Some(self.attitude), tolerance.attitude),
+            ("deflection", self.deflection, tolerance.deflection),
+            ("stress", self.stress, tolerance.stress),
+            ("reaction", self.reaction, tolerance.reaction),
+        ];
+        let there = all.into_iter().filter_map(|(name, error, allowed)| Some((name, error?, allowed)));
+        // NaN is the largest of all.
+        let ratio = |(_, error, allowed): &(&str, f64, f64)| error / allowed;
+        there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
+    }
+
+    /// The larger of each error of two motions.
+    pub fn larger_of(self, other: Self) -> Self {
+        let larger_of = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(larger);
+        Self {
+            attitude: larger(self.attitude, other.attitude),
+            deflection: larger_of(self.deflection, other.deflection),
+            stress: larger_of(self.stress, other.stress),
+            reaction: larger_of(self.reaction, other.reaction),
+        }
+    }
+
+    /// Whether every error is within its tolerance.
+    pub fn within(&self, tolerance: &Tolerance) -> bool {
+        self.worst(tolerance) <= 1.0
+    }
+}
+
+/// The errors along the motion, as [`OutputErrors`] has the largest of them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorHistory {
+    /// Where the motion was looked at.
+    pub time: Vec<f64>,
+    /// Errors of the attitude.
+    pub attitude: Vec<f64>,
+    /// Errors of the deflections.
+    pub deflection: Option<Vec<f64>>,
+    /// Errors of the elastic energy.
+    pub stress: Option<Vec<f64>>,
+    /// Errors of force and torque.
+    pub reaction: Option<Vec<f64>>,
+}
+
+impl ErrorHistory {
+    /// The largest errors, also between the places where the motion was looked at.
+    pub fn largest(&self) -> OutputErrors {
+        let peak = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
+        OutputErrors {
+            attitude: peak(&self.attitude),
+            deflection: self.deflection.as_deref().map(peak),
+            stress: self.stress.as_deref().map(peak),
+            reaction: self.reaction.as_deref().map(peak),
+        }
+    }
+
+    /// How much more the errors grow from the first half of the run to the second than `motion`, that of the
+    /// reference, does: about 1 for errors that stay in step with the motion, 2 and more where phases run
+    /// apart. `None` where they do not grow so much that it is worth a word (`GROWING`), or where those of
+    /// the second half do not matter yet (`MATTERS`).
+    pub fn growth(&self, motion: &Trace, tolerance: &Tolerance) -> Option<f64> {
+        let growth = |(first, second): (f64, f64), allowed: f64| {
+            (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
+        };
+        let energies: Vec<f64> = motion.elastic.iter().map(|energy| not_negative(*energy).sqrt()).collect();
+        let motion = growth(self.halves(&energies), 0.0)?;
+        // The attitude has no amplitude: it grows when it grows.
+        let attitude = growth(self.halves(&self.attitude), tolerance.attitude);
+        let deformation = [(&self.deflection, tolerance.deflection), (&self.stress, tolerance.stress)];
+        let beyond_motion = deformation.into_iter().filter_map(|(errors, allowed)| {
+            Some(growth(self.halves(errors.as_ref()?), allowed)? / motion.max(1.0))
+        });
+        let most = beyond_motion.chain(attitude).reduce(f64::max);
+        most.filter(|growth| *growth > GROWING)
+    }
+
+    /// The largest of `values` along the motion in the first half of the run, and in the second.
+    pub fn halves(&self, values: &[f64]) -> (f64, f64) {
+        let end = self.time.last().copied().unwrap_or(0.0);
+        let (first, second) = values.split_at(self.time.partition_point(|&time| time <= 0.5 * end));
+        (first.iter().copied().fold(0.0, larger), second.iter().copied().fold(0.0, larger))
+    }
+}
+
+/// How far apart the deformations of two motions are, along the motion.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Apart {
+    /// Elastic energy of the difference.
+    pub energy: Vec<f64>,
+    /// Largest difference of the deflections of any node that is looked at.
+    pub deflection: Vec<f64>,
+    /// Largest of their deflections in the reference.
+    pub largest_deflection: f64,
+}
+
+impl ErrorHistory {
+    /// The errors of `candidate`, whose deformation is `apart` from that of `reference`. What the nodes have
+    /// to say counts where no points are watched.
+    ///
+    /// # Panics
+    /// When the motions were not looked at in the same places.
+    pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
+        assert!(reference.time == candidate.time, "motions that were looked at in the same places");
+        let attitudes = reference.attitude.iter().zip(&candidate.attitude);
+        let (deflection, scale) = deflections(reference, candidate, apart);
+        let roots = reference.elastic.iter().map(|energy| energy.max(0.0).sqrt());
+        let energy = Peak::of(&reference.time, roots).value;
+        let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
+        Self {
+            time: reference.time.clone(),
+            attitude: attitudes.map(|(a, b)| angle(a, b)).collect(),
+            deflection: relative(deflection, scale.max(reference.resolution.deflection)),
+            stress: relative(stress, energy.max(reference.resolution.root_energy)),
+            reaction: reactions(reference, candidate),
+        }
+    }
+}
+
+/// `values` relative to `scale`; nothing without a scale.
+fn relative(values: Vec<f64>, scale: f64) -> Option<Vec<f64>> {
+    (scale > 0.0).then(|| values.into_iter().map(|value| value / scale).collect())
+}
+
+/// Differences of deflections along the motion, and the largest deflection of the reference: of the watched
+/// points, without any of the nodes that `apart` looked at.
+fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>, f64) {
+    if reference.deflections.is_empty() {
+        return (apart.deflection.clone(), apart.largest_deflection);
+    }
+    let pairs = || reference.deflections.iter().zip(&candidate.deflections);
+    let at = |i: usize| pairs().map(|(a, b)| (a[i] - b[i]).norm()).fold(0.0, larger);
+    let paths = reference.deflections.iter();
+    let largest = paths.map(|path| Peak::of(&reference.time, path.iter().map(|d| d.norm())).value);
+    ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, larger))
+}
+
+/// Errors of the force and the torque that prescribed motion takes, the larger of both.
+fn reactions(reference: &Trace, candidate: &Trace) -> Option<Vec<f64>> {
+    let both = [reference.reactions.as_deref()?, candidate.reactions.as_deref()?];
+    reaction_errors(&reference.time, both, reference.size, &reference.extremes)
+}
+
+/// The same for reactions at times: those of the reference, whose mass, radius of gyration and largest
+/// motion are given, and of what is held to it.
+pub fn reaction_errors(
+    time: &[f64],
+    [a, b]: [&[Reaction]; 2],
+    (mass, radius): (f64, f64),
+    extremes: &Extremes,
+) -> Option<Vec<f64>> {
+    let parts: [fn(&Reaction) -> Vector3<f64>; 2] = [|both| both.0, |both| both.1];
+    let largest = parts.map(|part| Peak::of(time, a.iter().map(|a| part(a).norm())).value);
+    let levers = [radius, 1.0];
+    let of_part = |k: usize| {
+        let (part, lever) = (parts[k], levers[k]);
+        // Forces that are rounding are no forces, however small the least that counts.
+        if largest[k] <= NO_TORQUE * extremes.internal / lever {
+            return None;
+        }
+        // Force and torque in units of torque: each counts from a part of the other.
+        let beside = LEAST_BESIDE * largest[1 - k] * levers[1 - k];
+        let least = (LEAST_REACTION * mass * (extremes.spin * radius).powi(2)).max(beside) / lever;
+        let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
+        relative(differences, largest[k].max(least))
+    };
+    match (of_part(0), of_part(1)) {
+        (Some(force), Some(torque)) => {
+            Some(force.into_iter().zip(torque).map(|(a, b)| larger(a, b)).collect())
+        }
+        (force, torque) => force.or(torque),
+    }
+}
+
+/// The angle between two attitudes.
+fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
+    let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a.0, b.0);
+    let (a, b) = (Vector3::new(a1, a2, a3), Vector3::new(b1, b2, b3));
+    let scalar = a0 * b0 + a.dot(&b);
+    let vector = b * a0 - a * b0 - a.cross(&b);
+    2.0 * vector.norm().atan2(scalar.abs())
+}
+
+/// The motion of a body that others are measured against.
+#[derive(Debug, Clone)]
+pub struct Measure<'r> {
+    body: &'r FlexBody,
+    trace: &'r Trace,
+    /// Nodes that are looked at where no points are watched.
+    nodes: Vec<usize>,
+    rows: LivelyNodes,
+    largest_deflection: f64,
+}
+
+impl<'r> Measure<'r> {
+    /// Measures against `trace`, a motion of `body`.
+    ///
+    /// # Panics
+    /// When the motion has another number of modes.
+    pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
+        assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
+        let nodes = if trace.deflections.is_empty() { along_principal_directions(body) } else { Vec::new() };
+        let rows = LivelyNodes::new(body, &nodes);
+        let largest_deflection = Peak::of(&trace.time, trace.q.iter().map(|q| rows.longest(q))).value;
+        Self { body, trace, nodes, rows, largest_deflection }
+    }
+
+    /// The body.
+    pub fn body(&self) -> &'r FlexBody {
+        self.body
+    }
+
+    /// The motion of the reference.
+    pub fn trace(&self) -> &'r Trace {
+        self.trace
+    }
+
+    /// Errors of the motion of a body that has the modes `kept` (from 0) of the reference, in this order.
+    ///
+    /// # Panics
+    /// When the reference has no such modes, or the motions were not looked at in the same places.
+    pub fn of_subset(&self, candidate: &Trace, kept: &[usize]) -> ErrorHistory {
+        let energy = self.body.invariants().modal_stiffness();
+        let apart = self.apart(candidate, |reference, own| {
+            let mut difference: Vec<f64> = reference.iter().map(|q| -q).collect();
+            kept.iter().zip(own).for_each(|(&mode, q)| difference[mode] += q);
+            let energy = 0.5 * quadratic(energy.as_ref(), &difference);
+            (energy, self.rows.longest(&difference))
+        });
+        ErrorHistory::new(self.trace, candidate, &apart)
+    }
+
+    /// Errors of the motion of a body with other modes of the same model.
+    ///
+    /// # Panics
+    /// When the motions were not looked at in the same places.
+    pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
+        let (energy, rows) =
+            (self.body.invariants().modal_stiffness(), LivelyNodes::new(modes.body, &self.nodes));
+        let apart = self.apart(candidate, |reference, own| {
+            let q = DVector::from_column_slice(own);
+            let difference = &modes.map * &q - DVector::from_column_slice(reference);
+            let outside = not_negative((&modes.outside * &q).dot(&q));
+            let displacements = rows.displacements(own).zip(self.rows.displacements(reference));
+            let deflection = longest(displacements.map(|(own, reference)| own - reference));
+            (0.5 * (quadratic(energy.as_ref(), difference.as_slice()) + outside), deflection)
+        });
+        ErrorHistory::new(self.trace, candidate, &apart)
+    }
+
+    fn apart(&self, candidate: &Trace, difference: impl Fn(&[f64], &[f64]) -> (f64, f64)) -> Apart {
+        let (energy, deflection) =
+            self.trace.q.iter().zip(&candidate.q).map(|(a, b)| difference(a, b)).unzip();
+        Apart { energy, deflection, largest_deflection: self.largest_deflection }
+    }
+}
+
+/// Modes of a candidate, seen from those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K
+/// Psi_r
+///
+/// ```text
+/// V(Psi_c q_c - Psi_r q_r) = d'L_r d / 2 + q_c'(L_c - G L_r^-1 G') q_c / 2,    d = L_r^-1 G' q_c - q_r
+/// ```
+///
+/// a part within the reference, and one outside of it, without the cancellation of the sum of squares.
+#[derive(Debug, Clone)]
+pub struct OtherModes<'c> {
+    body: &'c FlexBody,
+    /// L_r^-1 G' (nr x nc).
+    map: DMatrix<f64>,
+    /// L_c - G L_r^-1 G' (nc x nc).
+    outside: DMatrix<f64>,
+}
+
+impl<'c> OtherModes<'c> {
+    /// The modes of `candidate` seen from those of `reference`, with `shared` = G (nc x nr); `None` where the
+    /// bodies are not of one model, or the stiffness of the reference is not positive definite.
+    pub fn new(candidate: &'c FlexBody, reference: &FlexBody, shared: MatRef<'_, f64>) -> Option<Self> {
+        let (nc, nr) = (candidate.n_modes(), reference.n_modes());
+        // The centre of mass of a lumped mass is another point: deflections do not depend on it.
+        let same =
+            candidate.n_nodes() == reference.n_nodes() && candidate.frame().axes == reference.frame().axes;
+        if !same || (shared.nrows(), shared.ncols()) != (nc, nr) {
+            return None;
+        }
+        let stiffness = |body: &FlexBody| body.invariants().symmetric_stiffness();
+        let transposed = DMatrix::from_fn(nr, nc, |i, j| shared[(j, i)]);
+        let map = stiffness(reference).cholesky()?.solve(&transposed);
+        let outside = stiffness(candidate) - transposed.tr_mul(&map);
+        Some(Self { body: candidate, map, outside })
+    }
+}
+
+/// x'A x of a matrix that is not negative.
+fn quadratic(a: MatRef<'_, f64>, x: &[f64]) -> f64 {
+    let column =
+        |(j, xj): (usize, &f64)| xj * x.iter().enumerate().map(|(i, xi)| a[(i, j)] * xi).sum::<f64>();
+    not_negative(x.iter().enumerate().map(column).sum::<f64>())
+}

@@ -1,0 +1,256 @@
+//! The largest of everything over a continuous motion.
+
+use super::lively::{LivelyNodes, longest_of_all};
+use super::peak::Peak;
+use crate::dynamics::{Balance, BodyPoint};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::{larger, not_negative};
+use nalgebra::Vector3;
+
+/// Differences of energies up to so many roundings of the largest total energy are rounding.
+const ROUNDINGS: f64 = 16.0;
+
+/// The largest of everything over a continuous motion: at the steps of the integration, between them, and
+/// between the places where they are looked at. It does not depend on which instants are written.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Extremes {
+    /// Deflection of any node, relative to the largest extent of the body, and when it is largest.
+    pub deflection: Peak,
+    /// Deflections of the watched points, and when each is largest. Unit: length.
+    pub watched: Vec<Peak>,
+    /// |q| of every mode.
+    pub amplitudes: Vec<f64>,
+    /// Elastic energy.
+    pub elastic: f64,
+    /// Kinetic energy without that of flight, and elastic energy.
+    pub internal: f64,
+    /// Angular velocity |omega|.
+    pub spin: f64,
+    /// Components |omega_k| of it along the body axes.
+    pub spin_about: Vector3<f64>,
+    /// Angular velocities that are largest about axes that are apart, body axes.
+    pub spins: Vec<Vector3<f64>>,
+    /// Force and torque that the prescribed motion takes; zero without.
+    pub reaction: (f64, f64),
+    /// How well what cannot change did not.
+    pub drift: Drift,
+}
+
+/// How well what cannot change did not: largest differences over the motion, dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Drift {
+    /// Of energy less work, relative to the largest internal energy E (that of flight left out) or work.
+    pub energy: f64,
+    /// Of linear momentum less impulse, relative to the largest of both and of sqrt(2 m E).
+    pub linear: f64,
+    /// Of angular momentum less angular impulse, relative to the largest of both and of r sqrt(2 m E), r
+    /// being the radius of gyration.
+    pub angular: f64,
+}
+
+/// Sees a motion go by.
+pub(super) struct Survey<'b> {
+    body: &'b FlexBody,
+    watched: &'b [BodyPoint],
+    nodes: LivelyNodes,
+    /// Deflection among `nodes`, and where it was largest.
+    deflection: Peak,
+    bulges: Bulges,
+    paths: Vec<Peak>,
+    amplitudes: Vec<Peak>,
+    /// Roots of the energies: they grow like displacements do.
+    elastic: Peak,
+    internal: Peak,
+    spin: Peak,
+    spin_about: [Peak; 3],
+    spins: Spins,
+    reaction: [Peak; 2],
+    differences: Differences,
+}
+
+impl<'b> Survey<'b> {
+    pub(super) fn new(body: &'b FlexBody, watched: &'b [BodyPoint]) -> Self {
+        Self {
+            body,
+            watched,
+            nodes: LivelyNodes::of_modes(body),
+            deflection: Peak::default(),
+            bulges: Bulges::default(),
+            paths: vec![Peak::default(); watched.len()],
+            amplitudes: vec![Peak::default(); body.n_modes()],
+            elastic: Peak::default(),
+            internal: Peak::default(),
+            spin: Peak::default(),
+            spin_about: [Peak::default(); 3],
+            spins: Spins::default(),
+            reaction: [Peak::default(); 2],
+            differences: Differences::default(),
+        }
+    }
+
+    /// Sees the deformation at a place of the motion.
+    pub(super) fn see_shape(&mut self, time: f64, q: &[f64], elastic: f64) {
+        let deflection = self.nodes.longest(q);
+        self.deflection.see(time, deflection);
+        self.bulges.see(time, deflection, q);
+        self.elastic.see(time, elastic.max(0.0).sqrt());
+        for (peak, point) in self.paths.iter_mut().zip(self.watched) {
+            peak.see(time, point.deflection(q).norm());
+        }
+        self.amplitudes.iter_mut().zip(q).for_each(|(peak, q)| peak.see(time, q.abs()));
+    }
+
+    /// Sees what the prescribed motion takes.
+    pub(super) fn see_reaction(&mut self, time: f64, (force, torque): &(Vector3<f64>, Vector3<f64>)) {
+        self.reaction[0].see(time, force.norm());
+        self.reaction[1].see(time, torque.norm());
+    }
+
+    /// Sees energies and momenta at the end of a step.
+    pub(super) fn see_balance(&mut self, time: f64, balance: &Balance, omega: &Vector3<f64>) {
+        let internal = balance.kinetic - balance.flight + balance.elastic;
+        self.internal.see(time, internal.max(0.0).sqrt());
+        self.spin.see(time, omega.norm());
+        self.spin_about.iter_mut().zip(omega.iter()).for_each(|(peak, w)| peak.see(time, w.abs()));
+        self.spins.see(omega);
+        self.differences.see(balance);
+    }
+
+    /// The extremes of what was seen.
+    ///
+    /// * `size`: mass and radius of gyration of the body.
+    /// * `least_energy`: energies below it are rounding.
+    pub(super) fn extremes(self, size: (f64, f64), least_energy: f64) -> Extremes {
+        let deflection = self.bulges.largest(self.body, self.deflection.value);
+        let internal = self.internal.value.powi(2);
+        Extremes {
+            deflection,
+            watched: self.paths,
+            amplitudes: self.amplitudes.iter().map(|peak| peak.value).collect(),
+            elastic: self.elastic.value.powi(2),
+            internal,
+            spin: self.spin.value,
+            spin_about: Vector3::from(self.spin_about.map(|peak| peak.value)),
+            spins: self.spins.0,
+            reaction: (self.reaction[0].value, self.reaction[1].value),
+            drift: self.differences.drift(internal, size, least_energy),
+        }
+    }
+}
+
+/// Angular velocities about so many axes are kept, whose angles have cosines below the other number.
+const AXES: usize = 32;
+const SAME_AXIS: f64 = 0.95;
+
+/// The largest angular velocities about axes that are apart.
+#[derive(Debug, Clone, Default)]
+struct Spins(Vec<Vector3<f64>>);
+
+impl Spins {
+    fn see(&mut self, omega: &Vector3<f64>) {
+        let size = omega.norm();
+        let is_near = |other: &Vector3<f64>| other.dot(omega).abs() >= SAME_AXIS * other.norm() * size;
+        if size == 0.0 || self.0.iter().any(|other| is_near(other) && other.norm() >= size) {
+            return;
+        }
+        self.0.retain(|other| !is_near(other));
+        if self.0.len() < AXES {
+            self.0.push(*omega);
+        }
+    }
+}
+
+/// How many deformations are kept whose nodes are all looked at in the end.
+const KEPT: usize = 16;
+
+/// The deformations at which the nodes that the modes move most are deflected most. Another node may be
+/// deflected more then, or at another of these times.
+#[derive(Debug, Clone, Default)]
+struct Bulges {
+    /// Time, deflection and modal coordinates, the largest deflection first.
+    kept: Vec<(f64, f64, Vec<f64>)>,
+    /// The last one that was seen.
+    last: (f64, f64, Vec<f64>),
+    /// Whether the deflection grew until then.
+    grows: bool,
+}
+
+impl Bulges {
+    fn see(&mut self, time: f64, deflection: f64, q: &[f64]) {
+        if deflection < self.last.1 {
+            self.keep_last();
+        }
+        // Not a number is not less than anything, and nothing is less than it.
+        self.grows = self.last.2.is_empty() || deflection.is_nan() || deflection >= self.last.1;
+        (self.last.0, self.last.1) = (time, deflection);
+        self.last.2.clear();
+        self.last.2.extend_from_slice(q);
+    }
+
+    /// Keeps the last deformation where the deflection grew until then and it is one of the largest.
+    fn keep_last(&mut self) {
+        let at = self.kept.partition_point(|kept| kept.1 >= self.last.1);
+        if self.grows && at < KEPT {
+            self.kept.insert(at, self.last.clone());
+            self.kept.truncate(KEPT);
+        }
+    }
+
+    /// The largest deflection of any node relative to the extent of `body`. What the peak of the nodes that
+    /// the modes move most has beyond what was seen of them holds for the others.
+    fn largest(mut self, body: &FlexBody, peak: f64) -> Peak {
+        self.keep_last();
+        let seen = self.kept.first().map_or(0.0, |kept| kept.1);
+        let beyond = if seen > 0.0 { peak / seen } else { 1.0 };
+        let shape = body.modes().shape.as_ref();
+        let mut largest = Peak::default();
+        for (time, _, q) in &self.kept {
+            let value = longest_of_all(shape, q) * beyond / body.extent();
+            if value > largest.value || value.is_nan() {
+                largest = Peak::at(*time, value);
+            }
+        }
+        largest
+    }
+}
+
+/// Largest differences of what is conserved.
+#[derive(Debug, Clone, Copy, Default)]
+struct Differences {
+    first: Option<Balance>,
+    energy: f64,
+    linear: f64,
+    angular: f64,
+    /// Largest total energy, work, momenta and impulses.
+    total: f64,
+    work: f64,
+    most_linear: f64,
+    most_angular: f64,
+}
+
+impl Differences {
+    fn see(&mut self, now: &Balance) {
+        let first = *self.first.get_or_insert(*now);
+        let total = |balance: &Balance| balance.kinetic + balance.elastic;
+        let raise = |most: &mut f64, value: f64| *most = larger(*most, value);
+        raise(&mut self.energy, (total(now) - total(&first) - now.work).abs());
+        raise(&mut self.linear, (now.linear - first.linear - now.impulse).norm());
+        raise(&mut self.angular, (now.angular - first.angular - now.angular_impulse).norm());
+        raise(&mut self.total, total(now).abs());
+        raise(&mut self.work, now.work.abs());
+        raise(&mut self.most_linear, now.linear.norm().max(now.impulse.norm()));
+        raise(&mut self.most_angular, now.angular.norm().max(now.angular_impulse.norm()));
+    }
+
+    fn drift(&self, internal: f64, (mass, radius): (f64, f64), least_energy: f64) -> Drift {
+        let energy = internal.max(self.work).max(least_energy);
+        let momentum = (2.0 * mass * energy).sqrt();
+        // A body at rest, or one that only flies, has no energy that rounding could be relative to.
+        let difference = not_negative(self.energy - ROUNDINGS * f64::EPSILON * self.total);
+        Drift {
+            energy: difference / energy,
+            linear: self.linear / self.most_linear.max(momentum),
+            angular: self.angular / self.most_angular.max(momentum * radius),
+        }
+    }
+}

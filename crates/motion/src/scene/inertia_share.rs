@@ -1,0 +1,29 @@
+//! How much the stiffness of inertia is of the stiffness of a body in a scene.
+
+use super::{Scene, Stage, instants, trace};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+
+/// Largest part of the stiffness of any motion of `body` that its stiffness of inertia has along the motion of
+/// `scene`, an upper bound over the directions of spin and acceleration; `None` where it has none.
+///
+/// The bound at an instant is |omega|^2 s_w + |omega'| s_alpha + |a| s_a with the shares s of
+/// [`InertiaShares`](flexbody_body::invariants::InertiaShares) and a = V' + omega x V - g.
+///
+/// # Errors
+/// As [`simulate`](super::simulate).
+pub fn inertia_share(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<Option<f64>> {
+    let stage = Stage::new(body, scene)?;
+    let Some(inertia) = stage.body.inertia_stiffness() else { return Ok(None) };
+    let stiffness = stage.body.invariants().modal_stiffness();
+    let Some(shares) = inertia.shares(stiffness.as_ref()) else { return Ok(None) };
+    let (motion, _) = trace(body, scene, memory, |_| {})?;
+    let seen = instants(body, scene, &motion.time)?;
+    let at = seen.iter().map(|now| {
+        let acceleration = now.velocity_rate + now.omega.cross(&now.velocity) - now.gravity;
+        now.omega.norm_squared() * shares.spin_squared
+            + now.omega_rate.norm() * shares.angular_acceleration
+            + acceleration.norm() * shares.acceleration
+    });
+    Ok(Some(at.fold(0.0, f64::max)))
+}

@@ -1,0 +1,87 @@
+//! The complete state of a motion at some instants: what the equations of all nodes are evaluated with.
+
+use super::prepared::{Prepared, damped};
+use super::{Scene, Stage};
+use crate::dynamics::Motion;
+use crate::integration::{Failure, Sight};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use nalgebra::Vector3;
+
+/// State, accelerations and loads of a body at an instant. Vectors are along the axes of the frame of the
+/// [`Stage`], about its origin.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instant {
+    /// When.
+    pub time: f64,
+    /// V, the velocity of the frame's origin.
+    pub velocity: Vector3<f64>,
+    /// The rates of the components of V.
+    pub velocity_rate: Vector3<f64>,
+    /// omega, the angular velocity of the frame.
+    pub omega: Vector3<f64>,
+    /// The rates of the components of omega.
+    pub omega_rate: Vector3<f64>,
+    /// Modal coordinates (nf).
+    pub q: Vec<f64>,
+    /// Rates of the modal coordinates (nf).
+    pub qd: Vec<f64>,
+    /// Accelerations of the modal coordinates (nf).
+    pub qdd: Vec<f64>,
+    /// The acceleration of gravity.
+    pub gravity: Vector3<f64>,
+    /// Force and torque of every load of the scene; the torque as it works on the rotation vector of its
+    /// point.
+    pub loads: Vec<(Vector3<f64>, Vector3<f64>)>,
+}
+
+/// The motion of `body` in `scene` at the instants `times`, ascending from 0 to the end of the scene.
+///
+/// # Errors
+/// As [`simulate`](super::simulate).
+pub fn instants(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Vec<Instant>> {
+    let stage = Stage::new(body, scene)?;
+    let body = &*damped(&stage.body, &stage.scene)?;
+    let run = Prepared::new(body, &stage.scene)?;
+    let mut seen = Vec::with_capacity(times.len());
+    let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if sight == Sight::Instant {
+            seen.push(see(&run, time, state, motion)?);
+        }
+        Ok::<(), Failure>(())
+    };
+    run.integrate(times, 1, look)?;
+    Ok(seen)
+}
+
+fn see(
+    run: &Prepared<'_>,
+    time: f64,
+    state: &[f64],
+    motion: &mut Motion<'_>,
+) -> std::result::Result<Instant, Failure> {
+    let rates = motion.accelerations(time, state)?;
+    let (linear, angular, modal) = run.equations.split(rates);
+    let qdd = modal.to_vec();
+    let now = motion.evaluate(time, state)?;
+    let (place, evaluation) = (now.place(), now.evaluation());
+    let (velocity, omega) = evaluation.rigid_velocity();
+    let configuration = now.configuration();
+    let worked = run.forces.acting(time, place).map(|(point, force, torque)| {
+        let turned =
+            if torque == Vector3::zeros() { torque } else { point.turned_torque(evaluation, &torque) };
+        (force, turned)
+    });
+    Ok(Instant {
+        time,
+        velocity,
+        velocity_rate: linear,
+        omega,
+        omega_rate: angular,
+        gravity: run.forces.gravity(place),
+        loads: worked.collect(),
+        q: configuration.q,
+        qd: configuration.qd,
+        qdd,
+    })
+}

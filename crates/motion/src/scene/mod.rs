@@ -1,0 +1,64 @@
+//! What a body is to do: the scene file, and its simulation.
+
+mod axes;
+mod conditions;
+mod contradictions;
+mod description;
+mod driving;
+mod effort;
+mod equilibrium;
+mod errors;
+mod extremes;
+mod history;
+mod inertia_share;
+mod instants;
+mod liveliest;
+mod lively;
+mod nodal_point;
+mod peak;
+mod prepared;
+mod read;
+mod read_attitude;
+mod read_carried;
+mod read_cases;
+mod read_columns;
+mod read_numbers;
+mod read_requirements;
+mod read_values;
+mod recording;
+mod requirements;
+mod samples;
+mod settled;
+mod simulate;
+mod stage;
+mod surroundings;
+mod trace;
+mod vector_history;
+
+pub use axes::Axes;
+pub use description::{
+    Carried, CarriedSpin, Drive, Initial, Load, LoadCase, ModeStart, Point, Run, Scene, Scheme, SeriesFile,
+    Spin,
+};
+pub use driving::Driving;
+pub use effort::fastest_history;
+pub use errors::{Apart, ErrorHistory, Measure, OtherModes, OutputErrors};
+pub use errors::{LEAST_REACTION, reaction_errors};
+pub use extremes::{Drift, Extremes};
+pub use history::History;
+pub use inertia_share::inertia_share;
+pub use instants::{Instant, instants};
+pub use liveliest::liveliest_rate;
+pub use nodal_point::{find_nodal_point, nodal_point};
+pub use peak::Peak;
+pub use prepared::{damped, damped_once, ends_a_run};
+pub use read_cases::{read_case, read_cases, read_scene};
+pub use recording::{Path, Recording, Resolution, Setting};
+pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+pub use samples::{Interpolation, Sample, Samples, Sizes};
+pub use settled::unsettled_rate;
+pub use simulate::simulate;
+pub use stage::Stage;
+pub use surroundings::{body_point, points_of};
+pub use trace::{Trace, trace, trace_at};
+pub use vector_history::VectorHistory;

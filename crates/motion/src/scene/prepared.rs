@@ -1,0 +1,231 @@
+//! A scene made ready to be integrated.
+
+use super::effort::{Effort, longest_step};
+use super::equilibrium::settle;
+use super::extremes::Survey;
+use super::surroundings::SceneForces;
+use super::{Scene, Scheme};
+use crate::dynamics::{
+    BodyPoint, Configuration, EquationsOfMotion, Motion, Orientation, RotationVector, Surroundings,
+};
+use crate::integration::{Explicit, Failure, Gauss, Method, Sight, System, Work, integrate_closely};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::FlexBody;
+use nalgebra::Vector3;
+use std::borrow::Cow;
+
+/// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by
+/// much, or it would not be stable.
+pub(super) const PARTS: usize = 6;
+
+/// A body, with the damping of its scene, in this scene; both in one frame and ready to be integrated.
+pub(super) struct Prepared<'a> {
+    pub body: &'a FlexBody,
+    pub scene: &'a Scene,
+    pub forces: SceneForces<'a>,
+    pub watched: Vec<BodyPoint>,
+    pub equations: EquationsOfMotion,
+    pub start: Configuration,
+    pub duration: f64,
+    /// With the step that is taken.
+    pub scheme: Scheme,
+}
+
+/// What an integration leaves besides what was shown.
+pub(super) struct Finished {
+    pub work: Work,
+    /// Mass and radius of gyration of the body.
+    pub size: (f64, f64),
+    /// Energy that is rounding.
+    pub least_energy: f64,
+}
+
+/// Force and torque about the origin of the frame, axes of the body, that a prescribed motion takes.
+pub(super) type Reaction = (Vector3<f64>, Vector3<f64>);
+
+/// Reasons for an integration to end early.
+pub(super) enum Stop {
+    Failed(Failure),
+    /// There is no memory for more of the motion than until then.
+    Memory {
+        time: f64,
+    },
+    /// It took all steps that it may take until then.
+    Steps {
+        time: f64,
+    },
+}
+
+impl From<Failure> for Stop {
+    fn from(failure: Failure) -> Self {
+        Self::Failed(failure)
+    }
+}
+
+impl<'a> Prepared<'a> {
+    /// The equations of motion, loads, start and integration scheme of `body` in `scene`.
+    ///
+    /// # Errors
+    /// FB212 where the scene does not fit the body; FB550 and FB551, before any work.
+    pub(super) fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
+        let Some(duration) = scene.run.duration else {
+            let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
+            return Err(diagnostic.with_help("give `duration` in [run]").into());
+        };
+        let (forces, watched) = SceneForces::new(body, scene)?;
+        let equations = EquationsOfMotion::new(body, scene.run.terms);
+        let mut start = start(body, scene, &forces);
+        if scene.initial.settled {
+            settle(body, scene, &equations, &forces, &mut start)?;
+        }
+        let (scheme, effort) = Effort::plan(body, scene, duration)?;
+        effort.refuse_too_much(scene)?;
+        Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
+    }
+
+    /// Shows a place of the motion, between those that are written, to `survey`. Answers the reaction there
+    /// where something is prescribed.
+    ///
+    /// # Errors
+    /// Where the body has no motion at this state.
+    pub(super) fn survey(
+        &self,
+        survey: &mut Survey<'_>,
+        sight: Sight,
+        time: f64,
+        state: &[f64],
+        motion: &mut Motion<'_>,
+    ) -> std::result::Result<Option<Reaction>, Failure> {
+        let (_, q) = motion.shape(state);
+        survey.see_shape(time, q, self.equations.elastic_energy(q));
+        if sight == Sight::Within && !self.scene.prescribes() {
+            return Ok(None);
+        }
+        let now = motion.evaluate(time, state)?;
+        let reaction = now.reaction();
+        survey.see_reaction(time, &reaction);
+        if sight != Sight::Within {
+            survey.see_balance(time, &now.balance(), &now.configuration().omega);
+        }
+        Ok(self.scene.prescribes().then_some(reaction))
+    }
+
+    /// Integrates over `instants` and shows the motion, at so many parts of every explicit step.
+    ///
+    /// # Errors
+    /// FB540 when the integration cannot go on, FB550 when it takes more steps than it may, FB601 when `show`
+    /// has no memory left.
+    pub(super) fn integrate<E: From<Failure> + Into<Stop>>(
+        &self,
+        instants: &[f64],
+        parts: usize,
+        mut show: impl FnMut(Sight, f64, &[f64], &mut Motion<'_>) -> std::result::Result<(), E>,
+    ) -> Result<Finished> {
+        let (mut motion, mut state) = Motion::new(&self.equations, &self.forces, &self.start);
+        let mut observer = Motion::new(&self.equations, &self.forces, &self.start).0;
+        let mut method = match self.scheme {
+            Scheme::Adaptive { tolerance } => {
+                let longest = longest_step(self.scene, self.duration);
+                Method::Explicit(Explicit::new(motion.dimension(), tolerance, longest))
+            }
+            Scheme::Conserving { order, step } => Method::Gauss {
+                method: Gauss::new(motion.dimension(), order),
+                step: step.unwrap_or(self.duration),
+            },
+        };
+        let mut steps = 0;
+        let observe = |sight: Sight, time: f64, state: &[f64]| {
+            steps += u64::from(sight == Sight::End);
+            match steps > self.scene.run.most_steps {
+                true => Err(Stop::Steps { time }),
+                false => show(sight, time, state, &mut observer).map_err(Into::into),
+            }
+        };
+        let breaks = self.scene.breaks();
+        integrate_closely(&mut method, &mut motion, &mut state, instants, &breaks, parts, observe)
+            .map_err(|stop| stopped(self.scene, &method, stop))?;
+        Ok(Finished { work: method.work(), size: motion.size(), least_energy: motion.least_energy() })
+    }
+}
+
+/// The body, in the frame of the scene, with the damping of the scene where the scene states one.
+///
+/// # Errors
+/// [`SceneDamping`](Code::SceneDamping) when both state one and the scene does not replace that of the body; those of
+/// [`FlexBody::new`].
+pub fn damped<'b>(body: &'b FlexBody, scene: &Scene) -> Result<Cow<'b, FlexBody>> {
+    scene.requirements.damped(body, &format!("scene `{}`", scene.name))
+}
+
+/// The body with the damping of the scene, and the scene without: what looks at the pair again adds none.
+///
+/// # Errors
+/// As [`damped`].
+pub fn damped_once<'b, 's>(
+    body: Cow<'b, FlexBody>,
+    scene: Cow<'s, Scene>,
+) -> Result<(Cow<'b, FlexBody>, Cow<'s, Scene>)> {
+    if scene.requirements.damping.is_none() {
+        return Ok((body, scene));
+    }
+    let body = Cow::Owned(damped(&body, &scene)?.into_owned());
+    let mut scene = scene.into_owned();
+    scene.requirements.damping = None;
+    Ok((body, Cow::Owned(scene)))
+}
+
+/// The state at time zero. What is prescribed replaces what the scene says of it.
+fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configuration {
+    let initial = &scene.initial;
+    let (mut q, mut qd) = (vec![0.0; body.n_modes()], vec![0.0; body.n_modes()]);
+    for start in &initial.modes {
+        (q[start.mode], qd[start.mode]) = (start.amplitude, start.rate);
+    }
+    let attitude = RotationVector(initial.rotation);
+    let axes = attitude.axes();
+    let prescribed = forces.prescribed(0.0, &axes).0;
+    Configuration {
+        origin: initial.origin,
+        attitude: attitude.into(),
+        velocity: prescribed.linear.map_or(initial.velocity, |linear| linear.in_world(&axes)),
+        omega: prescribed.angular.map_or(initial.angular_velocity, |angular| angular.0),
+        q,
+        qd,
+    }
+}
+
+fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
+    let steps = method.work().steps;
+    match stop {
+        Stop::Memory { time } => {
+            let message = format!(
+                "the motion of `{}` fills the memory after {steps} steps, at t = {time:e}",
+                scene.name
+            );
+            Diagnostic::new(Code::MemoryShort, message)
+                .with_help("simulate a shorter `duration`, or fewer modes")
+                .into()
+        }
+        Stop::Steps { time } => {
+            let message = format!(
+                "the run of `{}` took the {steps} steps that are allowed until t = {time:e}",
+                scene.name
+            );
+            Diagnostic::new(Code::RunTooLong, message).into()
+        }
+        Stop::Failed(failure) => {
+            let message = format!("simulation of `{}` stopped after {steps} steps: {failure}", scene.name);
+            let help = match failure {
+                Failure::NotConverged { .. } => "take a shorter step, or the adaptive method",
+                _ => "the motion may leave the range of the model: look at spin, loads and dropped terms",
+            };
+            Diagnostic::new(Code::SimulationStopped, message).with_help(help).into()
+        }
+    }
+}
+
+/// Whether a run ended for a reason of its own: other models of the same scene may go on.
+pub fn ends_a_run(code: Code) -> bool {
+    matches!(code, Code::SimulationStopped | Code::RunTooLong)
+}

@@ -1,0 +1,330 @@
+//! Reads a scene of `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
+
+use super::contradictions::contradictions;
+use super::read_attitude::turning;
+use super::read_carried::carried;
+use super::read_columns::{HistoryFiles, columns_history};
+use super::read_numbers::{finite, place_of, positive};
+use super::read_requirements::{self, requirements};
+use super::read_values::{EVERY, axes, history, list, mode_number, place, transposed, vector};
+use super::{
+    Axes, History, Initial, Interpolation, Load, ModeStart, Run, Scene, Scheme, Spin, VectorHistory,
+};
+use crate::dynamics::Terms;
+use flexbody_base::diagnostic::Code;
+use flexbody_base::provenance::SourceFile;
+use flexbody_base::text::walk::{Table, Value, Walk, integer};
+use nalgebra::Vector3;
+use std::ops::Range;
+use toml::de::DeValue;
+
+pub(super) const TOP: &[&str] =
+    &["name", "run", "initial", "gravity", "load", "spin", "carried", "watch", "case"];
+const RUN: &[&str] = &["duration", "outputs", "most_steps", "method", "tolerance", "order", "step", "terms"];
+const INITIAL: &[&str] =
+    &["origin", "velocity", "rotation", "angular_velocity", "axes", "mode", "deformation"];
+const MODE: &[&str] = &["number", "amplitude", "rate"];
+const LOAD: &[&str] =
+    &["node", "interface", "force", "torque", "force_from", "torque_from", "axes", "history"];
+const SPIN: &[&str] = &["axis", "axes", "rate", "angular_velocity_from", "attitude_from", "hold"];
+const WATCH: &[&str] = &["node", "interface"];
+/// Instants recorded unless said.
+const OUTPUTS: i64 = 500;
+
+/// More than anybody plots, and less than memory holds.
+const MOST_OUTPUTS: i64 = 1_000_000;
+
+/// Tolerance of the adaptive method unless said: trajectories of some ten turns to 1e-7.
+const TOLERANCE: f64 = 1e-9;
+
+/// Tolerances that rounding leaves a meaning.
+const TOLERANCES: Range<f64> = 1e-14..0.1;
+
+/// A scene without cases, named `stem` where it has no name. `None` only with something in `found`, as
+/// everything here.
+pub(super) fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
+    let required = read_requirements::TABLES.map(|(name, _)| name);
+    walk.known_keys(top, "the scene", &[TOP, &required].concat());
+    let name = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
+    let run = match walk.table(top, "run") {
+        Some((table, span)) => run(walk, table, span),
+        None => run(walk, &Table::new(), 0..0),
+    };
+    let initial = match walk.table(top, "initial") {
+        Some((table, _)) => initial(walk, table),
+        None => Some(Initial::default()),
+    };
+    let files = HistoryFiles::new(run.as_ref());
+    let gravity = top.get("gravity").map(|value| vector(walk, "gravity", value));
+    let loads = list(walk, top, "load", |walk, table, span| load(walk, &files, table, span));
+    let spin = walk.table(top, "spin").map(|(table, span)| spin(walk, &files, table, span));
+    let carried = walk.table(top, "carried").map(|(table, span)| carried(walk, &files, table, span));
+    let watched = list(walk, top, "watch", |walk, table, span| {
+        walk.known_keys(table, "[[watch]]", WATCH);
+        place(walk, table, span)
+    });
+    let requirements = requirements(walk, top);
+    contradictions(walk, top);
+    Some(Scene {
+        name: name?,
+        run: run?,
+        initial: initial?,
+        gravity: transposed(gravity)?,
+        loads: loads?,
+        spin: transposed(spin)?,
+        carried: transposed(carried)?,
+        watched: watched?,
+        requirements: requirements?,
+        source: Some(SourceFile::new("scene", walk.path, walk.fingerprint())),
+        series: files.into_files(),
+        resolved: false,
+        case: None,
+    })
+}
+
+fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
+    walk.known_keys(table, "[run]", RUN);
+    let duration = match table.contains_key("duration") {
+        true => positive(walk, table, "duration", &span).map(Some),
+        false => Some(None),
+    };
+    let mut count = |key: &str, default: i64, most: i64| match table.get(key) {
+        None => Some(default),
+        Some(value) => {
+            let count = integer(value).filter(|count| (1..=most).contains(count));
+            if count.is_none() {
+                walk.wrong(value.span(), format!("`{key}` is not a number from 1 to {most}"));
+            }
+            count
+        }
+    };
+    let outputs = count("outputs", OUTPUTS, MOST_OUTPUTS);
+    let most_steps = count("most_steps", Run::MOST_STEPS as i64, i64::MAX);
+    let terms = match table.get("terms") {
+        None => Some(Terms::ALL),
+        Some(value) => terms(walk, value),
+    };
+    let scheme = scheme(walk, table, &span);
+    let outputs = usize::try_from(outputs?).ok()?;
+    let most_steps = most_steps? as u64;
+    Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms: terms? })
+}
+
+fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+    let method =
+        if table.contains_key("method") { walk.string(table, "method")? } else { "adaptive".to_owned() };
+    let mut refuse = |keys: &[&str]| {
+        for key in keys.iter().filter_map(|key| table.get(*key)) {
+            walk.wrong(key.span(), format!("method `{method}` has no such setting"));
+        }
+    };
+    match method.as_str() {
+        "adaptive" => {
+            refuse(&["order", "step"]);
+            adaptive(walk, table, span)
+        }
+        "conserving" => {
+            refuse(&["tolerance"]);
+            conserving(walk, table, span)
+        }
+        other => {
+            let message = format!("`method` is `{other}`, expected `adaptive` or `conserving`");
+            walk.wrong(place_of(table, "method", span), message);
+            None
+        }
+    }
+}
+
+fn adaptive(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+    let tolerance = match table.contains_key("tolerance") {
+        true => positive(walk, table, "tolerance", span)?,
+        false => TOLERANCE,
+    };
+    if !TOLERANCES.contains(&tolerance) {
+        let message =
+            format!("`tolerance` is {tolerance}, expected {} to {}", TOLERANCES.start, TOLERANCES.end);
+        walk.wrong(place_of(table, "tolerance", span), message);
+        return None;
+    }
+    Some(Scheme::Adaptive { tolerance })
+}
+
+fn conserving(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+    let order = match table.get("order") {
+        None => 4,
+        Some(value) => match integer(value) {
+            Some(order @ (2 | 4 | 6)) => order as usize,
+            _ => {
+                walk.mistyped("order", value, "2, 4 or 6");
+                return None;
+            }
+        },
+    };
+    let step = match table.contains_key("step") {
+        true => Some(positive(walk, table, "step", span)?),
+        false => None,
+    };
+    Some(Scheme::Conserving { order, step })
+}
+
+fn terms(walk: &mut Walk<'_>, value: &Value) -> Option<Terms> {
+    let DeValue::Array(names) = value.get_ref() else {
+        walk.mistyped("terms", value, "a list of \"W1\", \"W2\", \"W3\"");
+        return None;
+    };
+    let mut terms = Terms { geometric_stiffness: true, ..Terms::NONE };
+    for name in names.iter() {
+        match name.get_ref() {
+            DeValue::String(text) if text == "W1" => terms.w1 = true,
+            DeValue::String(text) if text == "W2" => terms.w2 = true,
+            DeValue::String(text) if text == "W3" => terms.w3 = true,
+            _ => {
+                walk.mistyped("terms", name, "\"W1\", \"W2\" or \"W3\"");
+                return None;
+            }
+        }
+    }
+    Some(terms)
+}
+
+fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
+    walk.known_keys(table, "[initial]", INITIAL);
+    let mut or_zero = |key: &str| match table.get(key) {
+        Some(value) => vector(walk, key, value),
+        None => Some(Vector3::zeros()),
+    };
+    let [origin, velocity, rotation, angular_velocity] =
+        ["origin", "velocity", "rotation", "angular_velocity"].map(&mut or_zero);
+    let axes = axes(walk, table, &EVERY, Axes::Model);
+    let modes = list(walk, table, "mode", |walk, table, span| {
+        walk.known_keys(table, "[[initial.mode]]", MODE);
+        let number = mode_number(walk, table, &span, "[[initial.mode]]");
+        let mut or_zero = |key: &str| {
+            if table.contains_key(key) { finite(walk, table, key, &span) } else { Some(0.0) }
+        };
+        let (amplitude, rate) = (or_zero("amplitude"), or_zero("rate"));
+        Some(ModeStart { mode: number?, amplitude: amplitude?, rate: rate? })
+    });
+    let settled = match table.get("deformation") {
+        None => Some(false),
+        Some(value) => settled(walk, value),
+    };
+    Some(Initial {
+        origin: origin?,
+        velocity: velocity?,
+        rotation: rotation?,
+        angular_velocity: angular_velocity?,
+        axes: axes?,
+        modes: modes?,
+        settled: settled?,
+    })
+}
+
+/// Whether `deformation` is static.
+fn settled(walk: &mut Walk<'_>, value: &Value) -> Option<bool> {
+    let settled = match value.get_ref() {
+        DeValue::String(text) if text == "static" => Some(true),
+        DeValue::String(text) if text == "none" => Some(false),
+        _ => None,
+    };
+    if settled.is_none() {
+        walk.mistyped("deformation", value, "\"none\" or \"static\"");
+    }
+    settled
+}
+
+fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<Load> {
+    walk.known_keys(table, "[[load]]", LOAD);
+    let at = place(walk, table, span.clone());
+    let factor = match table.get("history") {
+        Some(value) => history(walk, files, "history", value),
+        None => Some(History::Constant(1.0)),
+    };
+    let has = |key: &str| table.contains_key(key);
+    if !["force", "torque", "force_from", "torque_from"].into_iter().any(has) {
+        walk.wrong(span.clone(), "load has neither `force` nor `torque`".to_owned());
+    }
+    if has("history") && !has("force") && !has("torque") && (has("force_from") || has("torque_from")) {
+        let message = "`history` is given, but there is no `force` or `torque` that it is a factor of: columns have theirs";
+        walk.complain(Code::SceneContradicts, span.clone(), message.to_owned());
+    }
+    let mut part = |key: &str, key_of_columns: &str| match (table.get(key), table.get(key_of_columns)) {
+        (None, None) => Some(VectorHistory::nothing()),
+        (Some(value), None) => {
+            let direction = vector(walk, key, value)?;
+            Some(VectorHistory::Along { direction, factor: factor.clone()? })
+        }
+        (None, Some(value)) => columns_history(walk, files, key_of_columns, value, Interpolation::Linear),
+        (Some(_), Some(value)) => {
+            let message = format!("load has both `{key}` and `{key_of_columns}`");
+            walk.complain(Code::SceneContradicts, value.span(), message);
+            None
+        }
+    };
+    let (force, torque) = (part("force", "force_from"), part("torque", "torque_from"));
+    let axes = axes(walk, table, &EVERY, Axes::World);
+    Some(Load { at: at?, force: force?, torque: torque?, axes: axes? })
+}
+
+fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<Spin> {
+    walk.known_keys(table, "[spin]", SPIN);
+    let hold = match table.get("hold").map(|value| (value, value.get_ref())) {
+        None => Some(false),
+        Some((_, DeValue::Boolean(hold))) => Some(*hold),
+        Some((value, _)) => {
+            walk.mistyped("hold", value, "true or false");
+            None
+        }
+    };
+    let turning = turning(walk, files, table, span, "[spin]")?;
+    Some(Spin { velocity: turning.velocity, axes: turning.axes, start: turning.start, hold: hold? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::read_attitude::ATTITUDE;
+    use super::super::read_carried::{CARRIED, CARRIED_SPIN, TRANSLATION};
+    use super::super::read_columns::{COLUMN, COLUMNS};
+    use super::super::read_values::HISTORIES;
+    use super::*;
+
+    /// The schema and the reader name the same keys.
+    #[test]
+    fn schema_lists_the_keys_of_the_reader() {
+        let schema: serde_json::Value =
+            serde_json::from_str(include_str!("../../../../schemas/scene.schema.json")).expect("JSON");
+        let lists = [
+            ("/properties/run/properties", RUN),
+            ("/properties/initial/properties", INITIAL),
+            ("/properties/initial/properties/mode/items/properties", MODE),
+            ("/properties/load/items/properties", LOAD),
+            ("/properties/spin/properties", SPIN),
+            ("/properties/carried/properties", CARRIED),
+            ("/properties/carried/properties/spin/properties", CARRIED_SPIN),
+            ("/properties/carried/properties/translation/properties", TRANSLATION),
+            ("/properties/watch/items/properties", WATCH),
+            ("/$defs/history/anyOf/1/properties", HISTORIES[1].1),
+            ("/$defs/history/anyOf/2/properties", HISTORIES[2].1),
+            ("/$defs/history/anyOf/3/properties", HISTORIES[3].1),
+            ("/$defs/history/anyOf/4/properties", COLUMN),
+            ("/$defs/columns/properties", COLUMNS),
+            ("/$defs/attitude/properties", ATTITUDE),
+        ];
+        let required = read_requirements::TABLES;
+        let required = required.iter().map(|(name, keys)| (format!("/properties/{name}/properties"), *keys));
+        let top = [TOP, &read_requirements::TABLES.map(|(name, _)| name)].concat();
+        let of_case = super::super::read_cases::known_keys();
+        let lists = lists.into_iter().map(|(pointer, keys)| (pointer.to_owned(), keys));
+        let whole = [("/properties", &top[..]), ("/properties/case/items/properties", &of_case)]
+            .map(|(at, keys)| (at.to_owned(), keys));
+        for (pointer, known) in lists.chain(required).chain(whole) {
+            let pointer = &pointer;
+            let object = schema.pointer(pointer).and_then(|v| v.as_object()).expect(pointer);
+            let (mut listed, mut known): (Vec<&str>, Vec<&str>) =
+                (object.keys().map(String::as_str).collect(), known.to_vec());
+            listed.sort_unstable();
+            known.sort_unstable();
+            assert_eq!(listed, known, "{pointer}");
+        }
+    }
+}

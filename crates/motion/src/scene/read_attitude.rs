@@ -1,0 +1,188 @@
+//! Reads a rotation: a rate about one axis, three components of an angular velocity, or attitudes over time.
+
+use super::read_columns::{FromFile, HistoryFiles, columns_history, four_columns, tell};
+use super::read_values::{EVERY, axes, direction, history};
+use super::{Axes, Interpolation, Samples, VectorHistory};
+use crate::dynamics::{EulerParameters, Orientation, RotationVector};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::text::walk::{Table, Walk};
+use nalgebra::{Vector3, Vector4};
+use std::ops::Range;
+
+/// Keys of attitudes in a file: their values hold nowhere but between its rows, and have no unit.
+pub(super) const ATTITUDE: &[&str] = &["file", "time", "columns", "time_scale", "time_zero"];
+
+/// The three ways to say how something turns.
+const WAYS: [&str; 3] = ["rate", "angular_velocity_from", "attitude_from"];
+
+/// How far the length of Euler parameters may be from one: what two digits after the point leave.
+const LENGTH: f64 = 0.01;
+
+/// Largest angle between two rows, radians: beyond it the way from one to the other is a guess.
+const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_2;
+
+/// Largest angle, radians, that the interpolated angular velocity may lead away from the attitudes in the
+/// file: the tolerance of the attitude that scenes have unless they say otherwise.
+const LARGEST_LOSS: f64 = 1e-3;
+
+/// How something turns.
+pub(super) struct Turning {
+    pub velocity: VectorHistory,
+    pub axes: Axes,
+    /// The attitude at time zero, where the file has that.
+    pub start: Option<RotationVector>,
+}
+
+/// Reads the rotation in `table`, called `place`. `None` only with something in `found`.
+pub(super) fn turning(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &Table,
+    span: Range<usize>,
+    place: &str,
+) -> Option<Turning> {
+    let given: Vec<&str> = WAYS.into_iter().filter(|key| table.contains_key(*key)).collect();
+    let ways = "`rate`, `angular_velocity_from` and `attitude_from`";
+    let &[way] = &given[..] else {
+        let message = match given.is_empty() {
+            true => format!("key `rate` is missing in {place}"),
+            false => format!("{place} has more than one of {ways}"),
+        };
+        let wrong = walk.at(Code::SceneSyntax, span, message);
+        walk.found.push(wrong.with_help(format!("give one of {ways}")));
+        axis_of(walk, table);
+        axes(walk, table, &EVERY, Axes::Model);
+        return None;
+    };
+    let value = table.get(way)?;
+    if way != "rate" && table.contains_key("axis") {
+        let message = format!("`axis` of {place} is given, but `{way}` has all three components");
+        walk.complain(Code::SceneContradicts, span, message);
+        return None;
+    }
+    match way {
+        "rate" => {
+            let axis = axis_of(walk, table);
+            let axes = axes(walk, table, &EVERY, Axes::Model);
+            let factor = history(walk, files, "rate", value);
+            let velocity = VectorHistory::Along { direction: axis?, factor: factor? };
+            Some(Turning { velocity, axes: axes?, start: None })
+        }
+        "angular_velocity_from" => {
+            let axes = axes(walk, table, &EVERY, Axes::Model);
+            let velocity = columns_history(walk, files, way, value, Interpolation::Cubic)?;
+            Some(Turning { velocity, axes: axes?, start: None })
+        }
+        _ => {
+            // Of whose frame the attitudes are.
+            let axes = axes(walk, table, &[Axes::Model, Axes::Body], Axes::Model);
+            let read = four_columns(walk, files, way, value, ATTITUDE)?;
+            match Attitudes::new(&read).and_then(|attitudes| attitudes.followed(&read, files.end())) {
+                Ok((velocity, start)) => Some(Turning {
+                    velocity: VectorHistory::Columns(velocity),
+                    axes: axes?,
+                    start: Some(start),
+                }),
+                Err(diagnostic) => {
+                    tell(walk, vec![*diagnostic]);
+                    None
+                }
+            }
+        }
+    }
+}
+
+/// The axis of a rotation.
+fn axis_of(walk: &mut Walk<'_>, table: &Table) -> Option<Vector3<f64>> {
+    if table.contains_key("axis") { direction(walk, table, "axis") } else { Some(Vector3::z()) }
+}
+
+type Result<T> = std::result::Result<T, Box<Diagnostic>>;
+
+/// Euler parameters at the rows of a file, of unit length and without jumps from p to -p.
+struct Attitudes {
+    parameters: Vec<Vector4<f64>>,
+}
+
+impl Attitudes {
+    fn new(read: &FromFile) -> Result<Self> {
+        let mut parameters: Vec<Vector4<f64>> = Vec::with_capacity(read.times.len());
+        for (row, &line) in read.lines.iter().enumerate() {
+            let own = Vector4::from_fn(|k, _| read.columns[k][row]);
+            let length = own.norm();
+            if (length - 1.0).abs() > LENGTH {
+                let message = format!("Euler parameters have the length {length:.4}, a rotation has 1");
+                let help = "`columns` are the cosine of half the angle and the sine times the three components of the axis";
+                return Err(wrong(read, line, message, help));
+            }
+            let mut unit = own / length;
+            if let Some(before) = parameters.last() {
+                if before.dot(&unit) < 0.0 {
+                    unit = -unit;
+                }
+                let angle = 2.0 * before.dot(&unit).min(1.0).acos();
+                if angle > LARGEST_TURN {
+                    let message = format!(
+                        "the attitude turns by {:.0} degrees from the row before",
+                        angle.to_degrees()
+                    );
+                    return Err(wrong(read, line, message, "write more rows per turn"));
+                }
+            }
+            parameters.push(unit);
+        }
+        Ok(Self { parameters })
+    }
+
+    /// The angular velocity that follows the attitudes, along their axes, and the attitude at time zero.
+    ///
+    /// With the cubic spline s through the Euler parameters, which leaves unit length a little between the
+    /// rows, p = s / |s| turns with omega = G(p) p' = G(s) s' / |s|^2, since G(s) s = 0. At the rows s' has
+    /// one order more than elsewhere; the cubic spline through omega there has a continuous second
+    /// derivative.
+    fn followed(&self, read: &FromFile, end: Option<f64>) -> Result<(Samples<3>, RotationVector)> {
+        let splined = Samples::new(read.times.clone(), &self.parameters, Interpolation::Cubic, false);
+        let omega = |time: f64| {
+            let sample = splined.at(time);
+            EulerParameters(sample.value.into()).map() * sample.rate / sample.value.norm_squared()
+        };
+        let rows: Vec<Vector3<f64>> = read.times.iter().map(|&time| omega(time)).collect();
+        let velocity = Samples::new(read.times.clone(), &rows, Interpolation::Cubic, false);
+        self.refuse_loss(read, &velocity, end.unwrap_or(f64::INFINITY))?;
+        let start = EulerParameters(splined.at(0.0).value.into()).normalised();
+        Ok((velocity, start.into()))
+    }
+
+    /// Refuses rows that are so far apart that the angular velocity through them leads elsewhere until `end`:
+    /// it is integrated from row to row by the method of Magnus of order four, Omega = h (w_1 + w_2) / 2 +
+    /// sqrt(3) h^2 / 12 w_1 x w_2 at the two Gauss points, along axes that turn.
+    fn refuse_loss(&self, read: &FromFile, velocity: &Samples<3>, end: f64) -> Result<()> {
+        let axes = |row: usize| EulerParameters(self.parameters[row].into()).axes();
+        let mut own = axes(0);
+        for (row, ends) in read.times.windows(2).enumerate().take_while(|(_, ends)| ends[0] < end) {
+            let (middle, h) = (0.5 * (ends[0] + ends[1]), ends[1] - ends[0]);
+            let aside = h / 12f64.sqrt();
+            let [a, b] = [middle - aside, middle + aside].map(|time| velocity.at(time).value);
+            let turn = (a + b) * (0.5 * h) + a.cross(&b) * (3f64.sqrt() * h * h / 12.0);
+            own *= RotationVector(turn).axes();
+            let apart = RotationVector::of_axes(&axes(row + 1).tr_mul(&own)).0.norm();
+            if apart > LARGEST_LOSS {
+                let message = format!(
+                    "the rows until here are too far apart: the angular velocity through them leads {apart:.1e} radians away from the attitude"
+                );
+                return Err(wrong(
+                    read,
+                    read.lines[row + 1],
+                    message,
+                    "write more rows, or `angular_velocity_from`",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn wrong(read: &FromFile, line: usize, message: String, help: &str) -> Box<Diagnostic> {
+    let diagnostic = Diagnostic::new(Code::SeriesRow, message).in_file(read.file.path()).at_line(line);
+    Box::new(diagnostic.with_help(help))
+}

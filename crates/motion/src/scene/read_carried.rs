@@ -1,0 +1,118 @@
+//! Reads the table of a scene that says what carries the body.
+
+use super::read_attitude::turning;
+use super::read_columns::{HistoryFiles, columns_history};
+use super::read_values::{direction, history, place, transposed, vector};
+use super::{Carried, CarriedSpin, Drive, Interpolation, VectorHistory};
+use flexbody_base::diagnostic::Code;
+use flexbody_base::text::walk::{Table, Walk};
+use std::ops::Range;
+
+pub(super) const CARRIED: &[&str] = &["node", "interface", "spin", "translation"];
+pub(super) const CARRIED_SPIN: &[&str] =
+    &["axis", "axes", "through", "rate", "angular_velocity_from", "attitude_from"];
+pub(super) const TRANSLATION: &[&str] = &[
+    "direction",
+    "displacement",
+    "velocity",
+    "acceleration",
+    "displacement_from",
+    "velocity_from",
+    "acceleration_from",
+];
+
+/// `None` only with something in `found`, as everything here.
+pub(super) fn carried(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &Table,
+    span: Range<usize>,
+) -> Option<Carried> {
+    walk.known_keys(table, "[carried]", CARRIED);
+    let by = place(walk, table, span);
+    let mut part = |key: &str| {
+        let found = walk.table(table, key);
+        // What is there and no table was complained about.
+        if found.is_none() && table.contains_key(key) { Err(()) } else { Ok(found) }
+    };
+    let (spin_table, translation_table) = (part("spin"), part("translation"));
+    let spin = spin_table.map(|found| found.map(|(table, span)| spin(walk, files, table, span)));
+    let translation =
+        translation_table.map(|found| found.map(|(table, span)| translation(walk, files, table, span)));
+    Some(Carried { by: by?, spin: transposed(spin.ok()?)?, translation: transposed(translation.ok()?)? })
+}
+
+fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<CarriedSpin> {
+    walk.known_keys(table, "[carried.spin]", CARRIED_SPIN);
+    let through = table.get("through").map(|value| vector(walk, "through", value));
+    let turning = turning(walk, files, table, span, "[carried.spin]")?;
+    Some(CarriedSpin {
+        velocity: turning.velocity,
+        axes: turning.axes,
+        start: turning.start,
+        through: transposed(through)?,
+    })
+}
+
+/// Makes a drive of a history.
+type Driven = fn(VectorHistory) -> Drive;
+
+/// The derivatives that a translation can be given by: the key of a history along a direction, that of three
+/// columns, and what it makes.
+const DERIVATIVES: [(&str, &str, Driven); 3] = [
+    ("displacement", "displacement_from", Drive::Displacement),
+    ("velocity", "velocity_from", Drive::Velocity),
+    ("acceleration", "acceleration_from", Drive::Acceleration),
+];
+
+fn translation(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &Table,
+    span: Range<usize>,
+) -> Option<Drive> {
+    walk.known_keys(table, "[carried.translation]", TRANSLATION);
+    let all = DERIVATIVES
+        .into_iter()
+        .flat_map(|(along, columns, drive)| [(along, false, drive), (columns, true, drive)]);
+    let given: Vec<_> = all.filter(|(key, ..)| table.contains_key(*key)).collect();
+    let [(key, has_columns, drive)] = given[..] else {
+        let message = match given.is_empty() {
+            true => "[carried.translation] has none of `displacement`, `velocity` and `acceleration`",
+            false => {
+                "[carried.translation] has more than one of `displacement`, `velocity` and `acceleration`"
+            }
+        };
+        walk.wrong(span, message.to_owned());
+        return None;
+    };
+    let value = table.get(key)?;
+    let mut has_direction = true;
+    let history = if has_columns {
+        if let Some(direction) = table.get("direction") {
+            let message = format!(
+                "`direction` of [carried.translation] is given, but `{key}` has all three components"
+            );
+            walk.complain(Code::SceneContradicts, direction.span(), message);
+            return None;
+        }
+        columns_history(walk, files, key, value, Interpolation::Cubic)?
+    } else {
+        if !table.contains_key("direction") {
+            walk.wrong(span, "key `direction` is missing in [carried.translation]".to_owned());
+        }
+        let direction = direction(walk, table, "direction");
+        let factor = history(walk, files, key, value)?;
+        // Without a direction there is still something to say of the history.
+        has_direction = direction.is_some();
+        VectorHistory::Along { direction: direction.unwrap_or_default(), factor }
+    };
+    if matches!(drive(VectorHistory::nothing()), Drive::Displacement(_)) && !history.is_smooth() {
+        let message = format!(
+            "`{key}` has straight lines between points, at which the velocity jumps: give a velocity or an acceleration, a sine or a ramp, or `interpolation` = \"cubic\""
+        );
+        walk.wrong(value.span(), message);
+        return None;
+    }
+    has_direction.then(|| drive(history))
+}

@@ -1,0 +1,221 @@
+//! Reads the load cases of a scene file: what stands outside `[[case]]` is common, a case adds to it or takes
+//! its place.
+
+use super::read::{TOP, scene};
+use super::{LoadCase, Scene, read_requirements};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::text::walk::{Table, Value, Walk, read_toml};
+use std::ops::Range;
+use std::path::Path;
+use toml::Spanned;
+use toml::de::DeValue;
+
+/// Tables of settings that are independent of each other: a case replaces their keys one by one. Every other
+/// table is replaced as a whole.
+const BY_KEY: &[&str] = &["run", "initial", "motion", "attachment", "limits", "tolerance"];
+
+/// Lists whose items a case adds to those of the scene.
+const ADDED: &[&str] = &["load", "watch"];
+
+/// What a body is made with belongs to all cases.
+const ONLY_COMMON: &[&str] = &["case", "cost"];
+
+/// Reads the load cases of a scene file, in its order; of a file without `[[case]]` that is one scene.
+///
+/// # Errors
+/// FB101, FB106 when it or a file of its histories cannot be read; FB211 for syntax, unknown, missing or
+/// mistyped keys and values that cannot be; FB213 for what contradicts itself; FB215 to FB217 for what is
+/// wrong in files of histories. All of them, in the order of lines.
+pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<Scene>> {
+    let path = path.as_ref();
+    let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    read_toml(path, "scene", Code::SceneSyntax, |walk, top| match top.get("case") {
+        None => Some(vec![scene(walk, top, stem)?]),
+        Some(list) => cases(walk, top, list, stem),
+    })
+}
+
+/// Reads the case of that name, or with `None` a scene that has no cases.
+///
+/// # Errors
+/// Those of [`read_cases`]; FB219 where the scene has no case of that name, or has several and none is named.
+pub fn read_case(path: impl AsRef<Path>, name: Option<&str>) -> Result<Scene> {
+    let path = path.as_ref();
+    let mut scenes = read_cases(path)?;
+    let names: Vec<&str> = scenes.iter().filter_map(Scene::case_name).collect();
+    let refused = |message: String| Error::from(Diagnostic::new(Code::SceneCase, message).in_file(path));
+    let at = match (name, &names[..]) {
+        (None, []) => 0,
+        (None, names) => {
+            let message = format!("the scene has the load cases {}, and one is needed", names.join(", "));
+            return Err(refused(message));
+        }
+        (Some(name), []) => {
+            let message = format!("there is no case `{name}`: the scene has no cases");
+            let diagnostic = Diagnostic::new(Code::SceneCase, message).in_file(path);
+            return Err(diagnostic.with_help("leave --case out").into());
+        }
+        (Some(name), names) => {
+            let unknown =
+                || refused(format!("there is no case `{name}`: the scene has {}", names.join(", ")));
+            names.iter().position(|other| *other == name).ok_or_else(unknown)?
+        }
+    };
+    Ok(scenes.swap_remove(at))
+}
+
+/// Reads a scene that has no load cases.
+///
+/// # Errors
+/// As [`read_case`].
+pub fn read_scene(path: impl AsRef<Path>) -> Result<Scene> {
+    read_case(path, None)
+}
+
+/// `None` only with something in `found`, as everything here.
+fn cases(walk: &mut Walk<'_>, top: &Table<'_>, list: &Value<'_>, stem: String) -> Option<Vec<Scene>> {
+    let whole = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
+    let tables = tables(walk, list)?;
+    let names = names(walk, &tables);
+    let mut scenes = Vec::new();
+    let mut found_by_case = Vec::new();
+    let before = std::mem::take(&mut walk.found);
+    for ((table, _), name) in tables.iter().zip(&names) {
+        let full = format!("{}: {name}", whole.as_deref().unwrap_or_default());
+        walk.known_keys(table, "[[case]]", &known_keys());
+        let read = scene(walk, &merged(top, table), full);
+        scenes.extend(read);
+        found_by_case.push(std::mem::take(&mut walk.found));
+    }
+    walk.found = before;
+    walk.found.extend(each_once(found_by_case, &names));
+    if scenes.len() != tables.len() {
+        return None;
+    }
+    let spans: Vec<_> = tables.iter().map(|(_, span)| span.clone()).collect();
+    refuse_some_without_run(walk, &scenes, &names, &spans);
+    let whole = whole?;
+    for (scene, name) in scenes.iter_mut().zip(names) {
+        scene.case = Some(LoadCase { scene: whole.clone(), name });
+    }
+    Some(scenes)
+}
+
+/// The tables of the list of cases, and where they stand.
+fn tables<'t, 'i>(walk: &mut Walk<'_>, list: &'t Value<'i>) -> Option<Vec<(&'t Table<'i>, Range<usize>)>> {
+    let table = |value: &'t Value<'i>| match value.get_ref() {
+        DeValue::Table(table) => Some((table, value.span())),
+        _ => None,
+    };
+    let tables = match list.get_ref() {
+        DeValue::Array(items) => items.iter().map(table).collect::<Option<Vec<_>>>(),
+        _ => None,
+    };
+    let tables = tables.filter(|tables| !tables.is_empty());
+    if tables.is_none() {
+        walk.mistyped("case", list, "a list of [[case]] tables");
+    }
+    tables
+}
+
+/// The names of the cases; where one is wrong, that was complained about.
+fn names(walk: &mut Walk<'_>, tables: &[(&Table<'_>, Range<usize>)]) -> Vec<String> {
+    let mut names: Vec<String> = Vec::new();
+    for (table, span) in tables {
+        let Some(value) = table.get("name") else {
+            walk.wrong(span.clone(), "key `name` is missing in [[case]]".to_owned());
+            names.push(String::new());
+            continue;
+        };
+        let name = walk.string(table, "name").unwrap_or_default();
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+        if !name.chars().all(is_plain) {
+            let message = format!(
+                "`name` of [[case]] is `{name}`, expected letters, digits, `_` and `-`: files are named by it"
+            );
+            walk.wrong(value.span(), message);
+        }
+        // Some file systems do not tell capital letters from others.
+        if !name.is_empty() && names.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
+            walk.complain(Code::SceneContradicts, value.span(), format!("case `{name}` is there twice"));
+        }
+        names.push(name);
+    }
+    names
+}
+
+/// Keys of a case.
+pub(super) fn known_keys() -> Vec<&'static str> {
+    let required = read_requirements::TABLES.map(|(name, _)| name);
+    TOP.iter().chain(&required).copied().filter(|key| !ONLY_COMMON.contains(key)).collect()
+}
+
+/// The scene that a case is: what is `common`, with the tables of [`BY_KEY`] key by key and the lists of
+/// [`ADDED`] item by item joined by those of the case, and everything else of the case instead of what is
+/// common.
+fn merged<'t>(common: &Table<'t>, case: &Table<'t>) -> Table<'t> {
+    let mut merged = common.clone();
+    merged.remove("case");
+    merged.remove("name");
+    let known = known_keys();
+    for (key, value) in case {
+        let name = key.get_ref().as_ref();
+        if name == "name" || !known.contains(&name) {
+            continue;
+        }
+        let value = match common.get(name) {
+            Some(ours) => joined(name, ours, value),
+            None => value.clone(),
+        };
+        merged.insert(key.clone(), value);
+    }
+    merged
+}
+
+fn joined<'t>(name: &str, common: &Value<'t>, case: &Value<'t>) -> Value<'t> {
+    let joined = match (common.get_ref(), case.get_ref()) {
+        (DeValue::Table(ours), DeValue::Table(theirs)) if BY_KEY.contains(&name) => {
+            let mut table = ours.clone();
+            table.extend(theirs.iter().map(|(key, value)| (key.clone(), value.clone())));
+            DeValue::Table(table)
+        }
+        (DeValue::Array(ours), DeValue::Array(theirs)) if ADDED.contains(&name) => {
+            let mut list = ours.clone();
+            theirs.iter().for_each(|item| list.push(item.clone()));
+            DeValue::Array(list)
+        }
+        _ => return case.clone(),
+    };
+    Spanned::new(case.span(), joined)
+}
+
+/// Findings that all cases have once, for they are about what is common; others with the name of their case.
+fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
+    let is_common = |one: &Diagnostic| found.iter().all(|own| own.contains(one));
+    let mut told = Vec::new();
+    for (at, (own, name)) in found.iter().zip(names).enumerate() {
+        for one in own {
+            match is_common(one) {
+                true if at == 0 => told.push(one.clone()),
+                true => {}
+                false => told.push(one.clone().about(format!("case `{name}`"))),
+            }
+        }
+    }
+    told
+}
+
+/// A body is chosen by motion or by ranges, not by both.
+fn refuse_some_without_run(walk: &mut Walk<'_>, scenes: &[Scene], names: &[String], spans: &[Range<usize>]) {
+    if scenes.iter().all(|scene| scene.run.duration.is_none()) {
+        return;
+    }
+    for ((scene, name), span) in scenes.iter().zip(names).zip(spans) {
+        if scene.run.duration.is_none() {
+            let message = format!("case `{name}` does not say how long it lasts, and others do");
+            let diagnostic = walk.at(Code::SceneContradicts, span.clone(), message);
+            walk.found.push(diagnostic.with_help("give `duration` in [run] of the scene or of every case"));
+        }
+    }
+}

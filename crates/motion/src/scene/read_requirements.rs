@@ -1,0 +1,249 @@
+//! Reads the tables of a scene that say what is demanded of the body.
+
+use super::Axes;
+use super::read_numbers::{finite, place_of, positive};
+use super::read_values::{axes, list, mode_number, vector};
+use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
+use flexbody_base::text::walk::{Table, Value, Walk, integer, real};
+use flexbody_model::{DampingRatios, damping_bands};
+use nalgebra::{Matrix3, Vector3};
+use toml::de::DeValue;
+
+/// The tables, for the list of known ones.
+pub(super) const TABLES: [(&str, &[&str]); 7] = [
+    ("motion", &["angular_velocity", "angular_acceleration", "axes"]),
+    ("attachment", &["kind", "inertia", "axes", "first_frequency"]),
+    ("limits", &["deflection", "stress", "mode_stress", "mode"]),
+    ("band", &["frequency"]),
+    ("damping", &["ratio", "bands", "replace"]),
+    ("tolerance", &["attitude", "deflection", "stress", "reaction", "least_deflection"]),
+    ("cost", &["multiplications"]),
+];
+
+const LIMITED_MODE: &[&str] = &["number", "amplitude"];
+
+/// `None` only with something in `found`.
+pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requirements> {
+    let mut requirements = Requirements::default();
+    let mut complete = true;
+    for (name, keys) in TABLES {
+        match walk.table(top, name) {
+            Some((table, span)) => {
+                walk.known_keys(table, &format!("[{name}]"), keys);
+                let mut section = Section { walk, table, span };
+                complete &= section.read(name, &mut requirements).is_some();
+            }
+            // What is there and no table was complained about.
+            None => complete &= !top.contains_key(name),
+        }
+    }
+    complete.then_some(requirements)
+}
+
+/// One of the tables.
+struct Section<'s, 'w> {
+    walk: &'s mut Walk<'w>,
+    table: &'s Table<'s>,
+    span: std::ops::Range<usize>,
+}
+
+impl Section<'_, '_> {
+    fn read(&mut self, name: &str, requirements: &mut Requirements) -> Option<()> {
+        match name {
+            "motion" => requirements.motion = self.motion()?,
+            "attachment" => requirements.attachment = self.attachment()?,
+            "limits" => requirements.limits = limits(self.walk, self.table, &self.span)?,
+            "band" => requirements.band = Some(positive(self.walk, self.table, "frequency", &self.span)?),
+            "damping" => {
+                let (ratios, replaces) = (self.damping_ratios(), self.replaces_damping());
+                (requirements.damping, requirements.replaces_damping) = (Some(ratios?), replaces?);
+            }
+            "tolerance" => requirements.tolerance = self.tolerance()?,
+            _ => requirements.multiplications = Some(self.multiplications()?),
+        }
+        Some(())
+    }
+
+    /// A positive number that may be there.
+    fn optional(&mut self, key: &str) -> Option<Option<f64>> {
+        match self.table.contains_key(key) {
+            true => positive(self.walk, self.table, key, &self.span).map(Some),
+            false => Some(None),
+        }
+    }
+
+    fn motion(&mut self) -> Option<MotionRange> {
+        let [velocity, acceleration] =
+            ["angular_velocity", "angular_acceleration"].map(|key| range(self.walk, self.table, key));
+        let axes = turning_axes(self.walk, self.table);
+        Some(MotionRange { angular_velocity: velocity?, angular_acceleration: acceleration?, axes: axes? })
+    }
+
+    fn attachment(&mut self) -> Option<Attachment> {
+        let kind = kind(self.walk, self.table);
+        let inertia = attached_inertia(self.walk, self.table);
+        let first_frequency = self.optional("first_frequency");
+        let axes = turning_axes(self.walk, self.table);
+        Some(Attachment {
+            kind: kind?,
+            inertia: Matrix3::from_diagonal(&inertia?),
+            axes: axes?,
+            first_frequency: first_frequency?,
+        })
+    }
+
+    /// One ratio, or ratios by frequency.
+    fn damping_ratios(&mut self) -> Option<DampingRatios> {
+        match (self.table.get("bands"), self.table.contains_key("ratio")) {
+            (None, _) => positive(self.walk, self.table, "ratio", &self.span).map(DampingRatios::from),
+            (Some(_), true) => {
+                let message = "[damping] has both `ratio` and `bands`, expected one of them".to_owned();
+                self.walk.wrong(self.span.clone(), message);
+                None
+            }
+            (Some(value), false) => {
+                let ratios = DampingRatios::new(damping_bands(self.walk, value)?);
+                ratios.map_err(|problem| self.walk.wrong(value.span(), problem)).ok()
+            }
+        }
+    }
+
+    fn replaces_damping(&mut self) -> Option<bool> {
+        let Some(value) = self.table.get("replace") else { return Some(false) };
+        let DeValue::Boolean(replaces) = value.get_ref() else {
+            self.walk.mistyped("replace", value, "true or false");
+            return None;
+        };
+        Some(*replaces)
+    }
+
+    fn tolerance(&mut self) -> Option<Tolerance> {
+        let default = Tolerance::default();
+        let [attitude, deflection, stress, reaction] = [
+            ("attitude", default.attitude),
+            ("deflection", default.deflection),
+            ("stress", default.stress),
+            ("reaction", default.reaction),
+        ]
+        .map(|(key, default)| Some(self.optional(key)?.unwrap_or(default)));
+        let least_deflection = self.optional("least_deflection");
+        Some(Tolerance {
+            attitude: attitude?,
+            deflection: deflection?,
+            stress: stress?,
+            reaction: reaction?,
+            least_deflection: least_deflection?,
+        })
+    }
+
+    fn multiplications(&mut self) -> Option<usize> {
+        let value = self.table.get("multiplications");
+        let count =
+            value.and_then(integer).and_then(|count| usize::try_from(count).ok()).filter(|&count| count > 0);
+        if count.is_none() {
+            let message = "`multiplications` is not a positive whole number".to_owned();
+            self.walk.wrong(place_of(self.table, "multiplications", &self.span), message);
+        }
+        count
+    }
+}
+
+/// Axes that turn with the body.
+fn turning_axes(walk: &mut Walk<'_>, table: &Table) -> Option<Axes> {
+    axes(walk, table, &[Axes::Model, Axes::Body], Axes::Model)
+}
+
+/// A number that is not negative, or three of them.
+fn range(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Option<Range>> {
+    let Some(value) = table.get(key) else { return Some(None) };
+    if let DeValue::Array(_) = value.get_ref() {
+        let components = vector(walk, key, value)?;
+        return Some(Some(Range::Axes(not_negative(walk, key, value, components)?)));
+    }
+    let length = number(walk, key, value, "a number or a list of three")?;
+    not_negative(walk, key, value, Vector3::repeat(length)).map(|_| Some(Range::Any(length)))
+}
+
+fn attached_inertia(walk: &mut Walk<'_>, table: &Table) -> Option<Vector3<f64>> {
+    let Some(value) = table.get("inertia") else { return Some(Vector3::zeros()) };
+    let inertia = match value.get_ref() {
+        DeValue::Array(_) => vector(walk, "inertia", value)?,
+        _ => Vector3::repeat(number(walk, "inertia", value, "a number or a list of three")?),
+    };
+    not_negative(walk, "inertia", value, inertia)
+}
+
+fn number(walk: &mut Walk<'_>, key: &str, value: &Value, expected: &str) -> Option<f64> {
+    let number = real(value).filter(|number| number.is_finite());
+    if number.is_none() {
+        walk.mistyped(key, value, expected);
+    }
+    number
+}
+
+fn not_negative(
+    walk: &mut Walk<'_>,
+    key: &str,
+    value: &Value,
+    components: Vector3<f64>,
+) -> Option<Vector3<f64>> {
+    if components.iter().any(|component| *component < 0.0) {
+        walk.wrong(value.span(), format!("`{key}` is a magnitude and cannot be negative"));
+        return None;
+    }
+    Some(components)
+}
+
+fn kind(walk: &mut Walk<'_>, table: &Table) -> Option<AttachmentKind> {
+    let Some(value) = table.get("kind") else { return Some(AttachmentKind::default()) };
+    let kinds = [AttachmentKind::Free, AttachmentKind::Soft, AttachmentKind::Stiff];
+    let known = match value.get_ref() {
+        DeValue::String(text) => kinds.into_iter().find(|kind| kind.name() == text.as_ref()),
+        _ => None,
+    };
+    if known.is_none() {
+        walk.mistyped("kind", value, "\"free\", \"soft\" or \"stiff\"");
+    }
+    known
+}
+
+fn limits(walk: &mut Walk<'_>, table: &Table, span: &std::ops::Range<usize>) -> Option<Limits> {
+    let mut optional = |key: &str| match table.contains_key(key) {
+        true => positive(walk, table, key, span).map(Some),
+        false => Some(None),
+    };
+    let (deflection, stress) = (optional("deflection"), optional("stress"));
+    let mode_stress: Option<Option<Vec<f64>>> = match table.get("mode_stress") {
+        None => Some(None),
+        Some(value) => {
+            let list: Option<Vec<f64>> = match value.get_ref() {
+                DeValue::Array(list) => {
+                    list.iter().map(|item| real(item).filter(|v| v.is_finite() && *v >= 0.0)).collect()
+                }
+                _ => None,
+            };
+            if list.is_none() {
+                walk.wrong(value.span(), "`mode_stress` is not a list of numbers from 0".to_owned());
+            }
+            list.map(Some)
+        }
+    };
+    let modes = list(walk, table, "mode", |walk, table, span| {
+        walk.known_keys(table, "[[limits.mode]]", LIMITED_MODE);
+        let number = mode_number(walk, table, &span, "[[limits.mode]]");
+        let amplitude = finite(walk, table, "amplitude", &span).filter(|amplitude| *amplitude >= 0.0);
+        if amplitude.is_none() && table.contains_key("amplitude") {
+            walk.wrong(span, "`amplitude` is a magnitude and cannot be negative".to_owned());
+        }
+        Some((number?, amplitude?))
+    });
+    let stress = match (stress?, mode_stress?) {
+        (Some(limit), Some(modes)) => Some((limit, modes)),
+        (None, None) => None,
+        _ => {
+            walk.wrong(span.clone(), "`stress` and `mode_stress` need each other".to_owned());
+            return None;
+        }
+    };
+    Some(Limits { deflection: deflection?, stress, modes: modes? })
+}

@@ -1,0 +1,185 @@
+//! The simulation of a scene.
+
+use super::conditions::MeanAxes;
+use super::extremes::Survey;
+use super::prepared::{PARTS, Prepared, damped};
+use super::{Extremes, Path, Recording, Scene, Setting, Stage};
+use crate::dynamics::{BodyPoint, Evaluation, Motion};
+use crate::integration::{Failure, Sight, Work};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::memory::refuse_beyond;
+use flexbody_body::flex_body::{FlexBody, SOFTENING, axis_in_words};
+use flexbody_model::LoadKind;
+use nalgebra::Vector3;
+
+/// Deflections up to this part of the extent of the body are those of linear elasticity.
+const LINEAR_RANGE: f64 = 0.1;
+
+/// Bytes that a recorded number takes: itself, and as text of a table.
+const BYTES: f64 = 8.0 + 25.0;
+
+/// Numbers of an instant besides modes and watched points.
+const NUMBERS: usize = 47;
+
+/// Numbers of an instant of a watched point: place, deflection, velocity and acceleration.
+const WATCHED: usize = 12;
+
+/// The motion of `body` in `scene` at the instants that it writes, with warnings and notes about it.
+///
+/// * `memory`: bytes that there are for the recording and tables of it; `None` where it is not known.
+/// * `watch`: hears which part of the duration is done.
+///
+/// # Errors
+/// FB212 where the scene does not fit the body; FB550, before any work, when the run takes more steps than it
+/// may, and FB601, when the recording does not fit the memory; FB540 when the integration cannot go on.
+pub fn simulate(
+    body: &FlexBody,
+    scene: &Scene,
+    memory: Option<u64>,
+    mut watch: impl FnMut(f64),
+) -> Result<(Recording, Vec<Diagnostic>)> {
+    let stage = Stage::new(body, scene)?;
+    let body = &*damped(&stage.body, &stage.scene)?;
+    let scene = &*stage.scene;
+    let run = Prepared::new(body, scene)?;
+    refuse_too_much(body, scene, memory)?;
+    let outputs = scene.run.outputs;
+    let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
+    let mut recorder = Recorder::new(body, scene, &run, time.len());
+    let mut survey = Survey::new(body, &run.watched);
+    let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
+        if sight != Sight::Instant {
+            watch(time / run.duration);
+            return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
+        }
+        recorder.record(time, state, motion)
+    };
+    let finished = run.integrate(&time, PARTS, record)?;
+    let mut recording = recorder.recording;
+    recording.work = finished.work;
+    recording.extremes = survey.extremes(finished.size, finished.least_energy);
+    let found = [stage.found, remarks(body, scene, &recording.extremes)].concat();
+    Ok((recording, found))
+}
+
+/// A recording that is filled instant by instant.
+struct Recorder<'r> {
+    recording: Recording,
+    watched: &'r [BodyPoint],
+    conditions: Option<MeanAxes>,
+    /// Places of the watched points in the undeformed body.
+    rest: Vec<Vector3<f64>>,
+}
+
+impl<'r> Recorder<'r> {
+    fn new(body: &FlexBody, scene: &Scene, run: &'r Prepared<'_>, instants: usize) -> Self {
+        let undeformed = Evaluation::new(&run.equations);
+        let conditions = if scene.carried.is_some() { None } else { MeanAxes::new(body) };
+        Self {
+            recording: Recording {
+                scene: scene.name.clone(),
+                body: body.source().name.clone(),
+                scheme: run.scheme,
+                time: Vec::with_capacity(instants),
+                states: Vec::with_capacity(instants),
+                balances: Vec::with_capacity(instants),
+                reactions: scene.prescribes().then(Vec::new),
+                conditions: conditions.is_some().then(Vec::new),
+                setting: Setting::new(body, scene),
+                paths: scene.watched.iter().map(|point| Path::new(point.to_string())).collect(),
+                work: Work::default(),
+                extremes: Extremes::default(),
+            },
+            watched: &run.watched,
+            conditions,
+            rest: run.watched.iter().map(|point| point.place(&undeformed)).collect(),
+        }
+    }
+
+    fn record(
+        &mut self,
+        time: f64,
+        state: &[f64],
+        motion: &mut Motion<'_>,
+    ) -> std::result::Result<(), Failure> {
+        let accelerations = motion.accelerations(time, state)?.to_vec();
+        let now = motion.evaluate(time, state)?;
+        self.recording.time.push(time);
+        self.recording.states.push(now.configuration());
+        self.recording.balances.push(now.balance());
+        if let Some(reactions) = &mut self.recording.reactions {
+            reactions.push(now.reaction());
+        }
+        if let (Some(torques), Some(conditions)) = (&mut self.recording.conditions, &self.conditions) {
+            let evaluation = now.evaluation();
+            torques.push(conditions.torque(evaluation.modal_coordinates(), evaluation.modal_velocity()));
+        }
+        for ((path, point), rest) in self.recording.paths.iter_mut().zip(self.watched).zip(&self.rest) {
+            let (place, evaluation) = (now.place(), now.evaluation());
+            let at = point.place(evaluation);
+            path.place.push(place.origin + place.axes * at);
+            path.deflection.push(at - rest);
+            path.velocity.push(place.axes * point.velocity(evaluation));
+            path.acceleration.push(place.axes * point.acceleration(evaluation, &accelerations));
+        }
+        Ok(())
+    }
+}
+
+/// # Errors
+/// FB601 when the recording does not fit the memory.
+fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
+    let numbers = NUMBERS + 2 * body.n_modes() + WATCHED * scene.watched.len();
+    let instants = scene.run.outputs + 1;
+    let needed = instants as f64 * numbers as f64 * BYTES;
+    refuse_beyond(memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
+}
+
+/// Warnings about a motion with these extremes: where it leaves the range in which the model holds.
+pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Vec<Diagnostic> {
+    let (mut found, unit) = (Vec::new(), body.units().time.name());
+    let deflection = extremes.deflection;
+    if deflection.value > LINEAR_RANGE {
+        let message = format!(
+            "a node is deflected by {:.0} % of the largest extent of the body at t = {} {unit}: modes are those of small deformation",
+            100.0 * deflection.value,
+            rounded(deflection.time)
+        );
+        found.push(Diagnostic::new(Code::LinearRangeLeft, message));
+    }
+    let stiffened = scene.run.terms.geometric_stiffness
+        && body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    if scene.run.terms.w2 && !stiffened {
+        found.extend(softening(body, extremes));
+    }
+    found
+}
+
+/// A warning where spin takes more than a hundredth of the stiffness of some motion.
+fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
+    if extremes.spins.is_empty() {
+        return None;
+    }
+    let (_, worst) = body.worst_spin()?;
+    if worst * extremes.spin.powi(2) <= SOFTENING {
+        return None;
+    }
+    let part = |omega: &Vector3<f64>| Some((body.softening(omega)?, *omega));
+    let (part, omega) = extremes.spins.iter().filter_map(part).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (part > SOFTENING).then(|| {
+        let message = format!(
+            "spin about {} reaches {} rad/{}: without geometric stiffness it takes {:.2} % of the stiffness of some motion",
+            axis_in_words(&omega),
+            rounded(omega.norm()),
+            body.units().time.name(),
+            100.0 * part
+        );
+        Diagnostic::new(Code::SpinSoftens, message)
+    })
+}
+
+/// Four digits are enough to find a place.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}

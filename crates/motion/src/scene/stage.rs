@@ -1,0 +1,300 @@
+//! A scene and its body in one frame: axes of the model, origin at the centre of mass or at what carries the
+//! body.
+//!
+//! A flex-body file has its frame where the conversion put it, along the axes of the model or others. What a scene
+//! means does not depend on that: everything is computed in this frame, and vectors of the results are along
+//! its axes, which are those of the model.
+
+use super::{Axes, Load, Point, Range, Scene, VectorHistory};
+use crate::dynamics::{Orientation, RotationVector};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::{Carrier, FlexBody};
+use nalgebra::{Matrix3, Vector3};
+use std::borrow::Cow;
+
+/// Centres of mass within this part of the extent of the body from the origin are at the origin.
+const AT_ORIGIN: f64 = 1e-10;
+
+/// How far a prescribed rotation may be above what the scene allows, by rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Coupling of acceleration and modes below this part of its bound is rounding.
+pub(super) const UNCOUPLED: f64 = 1e-8;
+
+/// A body in the frame of a scene, that scene, and warnings and notes about the two.
+#[derive(Debug, Clone)]
+pub struct Stage<'a> {
+    /// The body, in the frame of the scene.
+    pub body: Cow<'a, FlexBody>,
+    /// The scene, with all vectors along the axes of this frame or of the world.
+    pub scene: Cow<'a, Scene>,
+    /// Warnings.
+    pub found: Vec<Diagnostic>,
+}
+
+impl<'a> Stage<'a> {
+    /// Brings `body` and `scene` together; a scene that was resolved already, and the body that it was
+    /// resolved for, stay.
+    ///
+    /// # Errors
+    /// FB212 and FB214 where the body has not what the scene carries it by; FB213 for a prescribed motion
+    /// beyond what the scene allows.
+    pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
+        if scene.resolved {
+            return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
+        }
+        refuse_beyond_range(scene, &body.frame().axes)?;
+        let (staged, mut found) = match &scene.carried {
+            Some(carried) => {
+                let carrier = carrier(&carried.by);
+                let own = body.carried(&carrier)?;
+                let mut found = Vec::from_iter(own.unresolved(&carrier, body));
+                found.extend(body.softened(&carrier));
+                if body.loses_geometric_stiffness() {
+                    let message = format!(
+                        "geometric stiffness of the body does not act while {carrier} carries it: the stress comes from the reaction there"
+                    );
+                    found.push(Diagnostic::new(Code::CarriedGeometricStiffness, message));
+                }
+                (Cow::Owned(own), found)
+            }
+            None => {
+                refuse_numbered_modes(body, scene)?;
+                (centred(body)?, Vec::new())
+            }
+        };
+        let resolved = resolved(scene, &body.frame().axes, &staged.frame().origin);
+        found.extend(idle(&staged, &resolved));
+        Ok(Self { body: staged, scene: Cow::Owned(resolved), found })
+    }
+}
+
+/// Refuses a start of modes by their numbers for a body that is simulated in mean axes, where it has other modes.
+fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
+    if body.conditions().is_mean() || scene.initial.modes.is_empty() {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: without a carrier the body is simulated in mean axes, where the mode numbers of [initial] mean other modes",
+        body.conditions()
+    );
+    let help = "convert with --frame com, or start from the static equilibrium of a load";
+    Err(Diagnostic::new(Code::SceneContradicts, message).with_help(help).into())
+}
+
+/// The carrier of a body that hangs from `point`.
+fn carrier(point: &Point) -> Carrier {
+    match point {
+        Point::Node(number) => Carrier::Node(*number),
+        Point::Interface(name) => Carrier::Interface(name.clone()),
+    }
+}
+
+/// The body in mean axes along the axes of the model, with its origin at the centre of mass.
+fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
+    let mean = body.in_mean_axes()?;
+    let invariants = mean.invariants();
+    let centre = invariants.first_moment() / invariants.mass();
+    let shift = if centre.norm() <= AT_ORIGIN * body.extent() { Vector3::zeros() } else { centre };
+    if shift == Vector3::zeros() && mean.frame().axes == Matrix3::identity() {
+        return Ok(mean);
+    }
+    Ok(Cow::Owned(mean.in_model_axes(shift)?))
+}
+
+/// The scene with its vectors along the axes of the model; `axes` are those of the body in the model,
+/// `origin` is that of its frame.
+fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene {
+    let mut scene = scene.clone();
+    start_with_the_motion(&mut scene, axes);
+    let attitude = RotationVector(scene.initial.rotation).axes();
+    let in_model = |vector: &mut Vector3<f64>, given: &mut Axes| {
+        *vector = match given {
+            Axes::Model => *vector,
+            Axes::Body => axes * *vector,
+            Axes::World => attitude.tr_mul(vector),
+        };
+        *given = Axes::Model;
+    };
+    let initial = &mut scene.initial;
+    initial.origin += attitude * origin;
+    in_model(&mut initial.angular_velocity, &mut initial.axes);
+    let turn = |velocity: &mut VectorHistory, given: &mut Axes| match given {
+        Axes::Model => (),
+        // The axes of columns stay where they are in space, however the body turns.
+        Axes::World if velocity.direction().is_none() => (),
+        Axes::Body => (*velocity, *given) = (velocity.turned(axes), Axes::Model),
+        Axes::World => (*velocity, *given) = (velocity.turned(&attitude.transpose()), Axes::Model),
+    };
+    if let Some(spin) = &mut scene.spin {
+        turn(&mut spin.velocity, &mut spin.axes);
+    }
+    if let Some(spin) = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut()) {
+        turn(&mut spin.velocity, &mut spin.axes);
+    }
+    for Load { force, torque, axes: given, .. } in &mut scene.loads {
+        if *given == Axes::Body {
+            (*force, *torque, *given) = (force.turned(axes), torque.turned(axes), Axes::Model);
+        }
+    }
+    let demands = &mut scene.requirements;
+    if demands.motion.axes == Axes::Body {
+        let ranges = [&mut demands.motion.angular_velocity, &mut demands.motion.angular_acceleration];
+        for range in ranges.into_iter().flatten() {
+            if let Range::Axes(components) = range {
+                *components = axes * *components;
+            }
+        }
+        demands.motion.axes = Axes::Model;
+    }
+    if demands.attachment.axes == Axes::Body {
+        demands.attachment.inertia = axes * demands.attachment.inertia * axes.transpose();
+        demands.attachment.axes = Axes::Model;
+    }
+    scene.resolved = true;
+    scene
+}
+
+/// The attitude at time zero is that of the prescribed motion, where that has one; `axes` are those of the
+/// body in the model.
+fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
+    let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
+    let spin = scene.spin.as_mut().map(|spin| (&mut spin.start, spin.axes));
+    let Some((start, of)) = spin.or(carried.map(|spin| (&mut spin.start, spin.axes))) else { return };
+    let Some(start) = start.take() else { return };
+    scene.initial.rotation = match of {
+        Axes::Body => RotationVector::of_axes(&(start.axes() * axes.transpose())).0,
+        Axes::Model | Axes::World => start.0,
+    };
+}
+
+/// Refuses a start or a prescribed rotation beyond what [motion] allows; `axes` are those of the body in the
+/// model.
+fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
+    let motion = &scene.requirements.motion;
+    let mut found = Vec::new();
+    let mut refuse = |what: &str, key: &str| {
+        let message = format!("{what} is beyond `{key}` of [motion]");
+        found.push(Diagnostic::new(Code::SceneContradicts, message).with_help(
+            "[motion] has the largest rotation that the body ever has, that of the scene included",
+        ));
+    };
+    let given = scene.spin.as_ref().map(|spin| (&spin.velocity, spin.axes, "[spin]"));
+    let carried = scene.carried.as_ref().and_then(|carried| carried.spin.as_ref());
+    let carried = carried.map(|spin| (&spin.velocity, spin.axes, "[carried.spin]"));
+    match given.or(carried) {
+        Some((history, kind, table)) => {
+            let end = scene.run.duration.unwrap_or(f64::INFINITY);
+            let (velocity, acceleration) = history.largest_until(end);
+            let beyond =
+                |range: &Option<Range>, length: f64, components: fn(&VectorHistory, f64) -> Vector3<f64>| {
+                    let any_direction = matches!(range, Some(Range::Any(_)));
+                    match (history.direction(), kind) {
+                        // Which components a rotation about axes of the world has in the body is known when
+                        // it has run.
+                        (None, Axes::World) => {
+                            range.is_some_and(|range| length > range.length() * (1.0 + ROUNDING))
+                        }
+                        _ if any_direction => is_beyond(range, Vector3::x() * length),
+                        (None, _) => {
+                            is_beyond(range, components(&in_range_axes(scene, axes, history, kind), end))
+                        }
+                        (Some(direction), _) => {
+                            let along = along_range(scene, axes, direction, kind).try_normalize(0.0);
+                            is_beyond(range, along.unwrap_or_default() * length)
+                        }
+                    }
+                };
+            if beyond(&motion.angular_velocity, velocity, |history, end| history.components_until(end).0) {
+                refuse(&format!("the rate {velocity} of {table}"), "angular_velocity");
+            }
+            if beyond(&motion.angular_acceleration, acceleration, |history, end| {
+                history.components_until(end).1
+            }) {
+                refuse(&format!("the acceleration {acceleration} of {table}"), "angular_acceleration");
+            }
+        }
+        None => {
+            let initial = &scene.initial;
+            let start = along_range(scene, axes, &initial.angular_velocity, initial.axes);
+            if is_beyond(&motion.angular_velocity, start) {
+                refuse("`angular_velocity` of [initial]", "angular_velocity");
+            }
+        }
+    }
+    if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
+}
+
+/// Columns that are `given` along axes that turn with the body, along those of the ranges in [motion].
+fn in_range_axes(scene: &Scene, axes: &Matrix3<f64>, history: &VectorHistory, given: Axes) -> VectorHistory {
+    match (given, scene.requirements.motion.axes) {
+        (Axes::Body, Axes::Model | Axes::World) => history.turned(axes),
+        (Axes::Model, Axes::Body) => history.turned(&axes.transpose()),
+        _ => history.clone(),
+    }
+}
+
+/// A vector that is `given` along some axes, along those of the ranges in [motion].
+fn along_range(scene: &Scene, axes: &Matrix3<f64>, vector: &Vector3<f64>, given: Axes) -> Vector3<f64> {
+    let in_model = match given {
+        Axes::Body => axes * vector,
+        Axes::World => RotationVector(scene.initial.rotation).axes().tr_mul(vector),
+        Axes::Model => *vector,
+    };
+    if scene.requirements.motion.axes == Axes::Body { axes.tr_mul(&in_model) } else { in_model }
+}
+
+/// Whether a vector leaves a range by more than rounding.
+fn is_beyond(range: &Option<Range>, vector: Vector3<f64>) -> bool {
+    match range {
+        None => false,
+        Some(Range::Any(length)) => vector.norm() > length * (1.0 + ROUNDING),
+        Some(Range::Axes(components)) => {
+            let slack = ROUNDING * (vector.norm() + components.norm());
+            (0..3).any(|k| vector[k].abs() > components[k] + slack)
+        }
+    }
+}
+
+/// Warnings about loads that do nothing.
+fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
+    let mut found = Vec::new();
+    let mut tell = |message: String, help: Option<&str>| {
+        let diagnostic = Diagnostic::new(Code::LoadIdle, message);
+        found.push(match help {
+            Some(help) => diagnostic.with_help(help),
+            None => diagnostic,
+        });
+    };
+    let leave = Some("leave it out, or give it its size");
+    let end = scene.run.duration.unwrap_or(f64::INFINITY);
+    for load in &scene.loads {
+        let place = &load.at;
+        if load.force.is_zero_until(end) && load.torque.is_zero_until(end) {
+            tell(format!("the load at {place} is zero all the time"), leave);
+        } else if scene.carried.as_ref().is_some_and(|carried| carried.by == *place) {
+            let message = format!(
+                "the load at {place} bends nothing: {place} is carried, and the reaction takes the load"
+            );
+            tell(message, Some("load another place of the body, or let nothing carry this one"));
+        }
+    }
+    let Some(gravity) = &scene.gravity else { return found };
+    if *gravity == Vector3::zeros() {
+        tell("`gravity` is zero".to_owned(), leave);
+    } else if scene.spin.as_ref().is_some_and(|spin| spin.hold) && is_uncoupled(body) {
+        let message = "`gravity` bends nothing: [spin] holds the body at its centre of mass and mean axes, that is by all of its mass";
+        tell(message.to_owned(), None);
+    }
+    found
+}
+
+/// Whether accelerations of the frame excite no mode.
+pub(super) fn is_uncoupled(body: &FlexBody) -> bool {
+    let (invariants, modal) = (body.invariants(), body.invariants().modal_mass());
+    (0..body.n_modes()).all(|j| {
+        let bound = (invariants.mass() * modal[(j, j)]).sqrt();
+        (0..3).all(|k| invariants.c1()[(k, j)].abs() <= UNCOUPLED * bound)
+    })
+}

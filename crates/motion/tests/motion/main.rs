@@ -1,0 +1,23 @@
+//! Equations of motion and their integration, and the physics that must come out.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod body_units;
+mod dynamics;
+mod dynamics_conservation;
+mod dynamics_forms;
+mod dynamics_geometric;
+mod dynamics_loads;
+mod equilibrium;
+mod general_equations;
+mod integration;
+mod motion;
+mod nodal_equations;
+mod nodal_motion;
+mod nodal_turning;
+mod output_errors;
+mod partial_bodies;
+mod rotation;
+mod settled_rates;
+mod turning_nodes;
+mod watched;

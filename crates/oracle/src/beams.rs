@@ -1,0 +1,201 @@
+//! Small frames of beams: nodes with three displacements and three rotations.
+
+use faer::Mat;
+use flexbody_linalg::CscMatrix;
+use flexbody_model::{DofLabel, Nodes, RawModel};
+use nalgebra::{Matrix3, Vector3};
+
+/// How the mass of a frame is distributed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BeamMass {
+    /// Cubic deflections, linear extension and twist.
+    Consistent,
+    /// The same with the rotary inertia of the sections.
+    Rotary,
+    /// Half of every beam at each of its nodes, nothing on the rotations.
+    Lumped,
+}
+
+/// Young's modulus of [`shaft`], whose density is 1.
+pub const SHAFT_YOUNGS: f64 = 4.0;
+
+/// Beams of one square section; Euler's and Bernoulli's assumptions.
+struct Section {
+    width: f64,
+    youngs: f64,
+    shear: f64,
+    density: f64,
+}
+
+/// A star of six stubby rubber beams that join in one node: three nodes at either end along x.
+pub fn star(mass: BeamMass) -> RawModel {
+    let positions: [[f64; 3]; 7] = [
+        [0.0, 0.0, 0.0],
+        [0.0, 0.5, 0.1],
+        [0.05, 0.2, 0.4],
+        [0.5, 0.22, 0.12],
+        [1.0, 0.05, 0.0],
+        [0.95, 0.45, 0.05],
+        [1.0, 0.25, 0.35],
+    ];
+    let beams = [(0, 3), (1, 3), (2, 3), (3, 4), (3, 5), (3, 6)];
+    let section = Section { width: 0.2, youngs: 4.0, shear: 1.5, density: 1.0 };
+    frame("star of beams", &positions, &beams, &section, mass)
+}
+
+/// A tube of unit radius around z: rings of `around` beams at a distance of a half, and beams along between them, of
+/// consistent mass. Beside it the eigenvalue of its rings in their planes with two waves around, where the beams along
+/// are moved without being deformed (Blevins, Formulas for Natural Frequency and Mode Shape, table 9-2).
+pub fn tube(around: usize, rings: usize, width: f64) -> (RawModel, f64) {
+    const APART: f64 = 0.5;
+    let angle = |i: usize| std::f64::consts::TAU * i as f64 / around as f64;
+    let node = |ring: usize, i: usize| ring * around + i % around;
+    let places =
+        |ring: usize| (0..around).map(move |i| [angle(i).cos(), angle(i).sin(), APART * ring as f64]);
+    let positions: Vec<[f64; 3]> = (0..rings).flat_map(places).collect();
+    let closed = |ring: usize| (0..around).map(move |i| (node(ring, i), node(ring, i + 1)));
+    let along = |ring: usize| (0..around).map(move |i| (node(ring, i), node(ring + 1, i)));
+    let beams: Vec<_> = (0..rings).flat_map(closed).chain((0..rings - 1).flat_map(along)).collect();
+    let section = Section { width, youngs: 4.0, shear: 1.5, density: 1.0 };
+    let of_rings = std::f64::consts::TAU * rings as f64;
+    let part = of_rings / (of_rings + APART * (around * (rings - 1)) as f64);
+    let first = part * 36.0 / 5.0 * section.youngs * width * width / 12.0;
+    (frame("tube of beams", &positions, &beams, &section, BeamMass::Consistent), first)
+}
+
+/// An elbow of two legs that lie along no axis, of `parts` consistent beams each.
+pub fn elbow(parts: usize) -> RawModel {
+    let corners = [Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.9, 0.5, 0.1), Vector3::new(1.1, 0.2, 0.9)];
+    let along =
+        |leg: usize, i: usize| corners[leg] + (corners[leg + 1] - corners[leg]) * (i as f64 / parts as f64);
+    let positions: Vec<[f64; 3]> =
+        (0..=2 * parts).map(|i| if i <= parts { along(0, i) } else { along(1, i - parts) }.into()).collect();
+    chain("elbow of beams", &positions)
+}
+
+/// Consistent beams of rubber from each place to the next.
+pub fn chain(name: &str, positions: &[[f64; 3]]) -> RawModel {
+    let beams: Vec<_> = (1..positions.len()).map(|i| (i - 1, i)).collect();
+    let section = Section { width: 0.05, youngs: 4.0, shear: 1.5, density: 1.0 };
+    frame(name, positions, &beams, &section, BeamMass::Consistent)
+}
+
+/// A straight shaft of unit length along x, of `parts` beams with rotary inertia, whose square section has this width.
+pub fn shaft(parts: usize, width: f64) -> RawModel {
+    let positions: Vec<[f64; 3]> = (0..=parts).map(|i| [i as f64 / parts as f64, 0.0, 0.0]).collect();
+    let beams: Vec<_> = (0..parts).map(|i| (i, i + 1)).collect();
+    let section = Section { width, youngs: SHAFT_YOUNGS, shear: 1.5, density: 1.0 };
+    frame("shaft", &positions, &beams, &section, BeamMass::Rotary)
+}
+
+/// Beams of one section between nodes.
+fn frame(
+    name: &str,
+    positions: &[[f64; 3]],
+    beams: &[(usize, usize)],
+    section: &Section,
+    mass: BeamMass,
+) -> RawModel {
+    let n = 6 * positions.len();
+    let (mut k, mut m) = (Mat::<f64>::zeros(n, n), Mat::<f64>::zeros(n, n));
+    for &(a, b) in beams {
+        let ends = [a, b].map(|node| Vector3::from(positions[node]));
+        let rows = |r: usize| if r < 6 { 6 * a + r } else { 6 * b + r - 6 };
+        let (ke, me) = section.beam(ends, mass);
+        for i in 0..12 {
+            for j in 0..12 {
+                k[(rows(i), rows(j))] += ke[(i, j)];
+                m[(rows(i), rows(j))] += me[(i, j)];
+            }
+        }
+    }
+    let ids = (1..=positions.len() as i64).collect::<Vec<_>>();
+    let labels = ids.iter().flat_map(|&node| (1..=6).map(move |direction| DofLabel { node, direction }));
+    let dofs = Some(labels.collect());
+    let nodes = Nodes { ids, positions: positions.to_vec() };
+    RawModel { dofs, ..RawModel::in_memory(name, sparse(&k), sparse(&m), nodes) }
+}
+
+impl Section {
+    /// Stiffness and mass (12 x 12) in the axes of the model.
+    fn beam(&self, ends: [Vector3<f64>; 2], mass: BeamMass) -> (Mat<f64>, Mat<f64>) {
+        let along = ends[1] - ends[0];
+        let length = along.norm();
+        let x = along / length;
+        let aside = if x.z.abs() < 0.9 { Vector3::z() } else { Vector3::y() };
+        let y = aside.cross(&x).normalize();
+        let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
+        let turn = Mat::from_fn(12, 12, |i, j| if i / 3 == j / 3 { axes[(i % 3, j % 3)] } else { 0.0 });
+        let m = match mass {
+            BeamMass::Consistent => self.consistent(length),
+            BeamMass::Rotary => self.consistent(length) + self.rotary(length),
+            BeamMass::Lumped => {
+                let half = 0.5 * self.density * self.width * self.width * length;
+                Mat::from_fn(12, 12, |i, j| if i == j && i % 6 < 3 { half } else { 0.0 })
+            }
+        };
+        let turned = |a: Mat<f64>| &turn * a * turn.transpose();
+        (turned(self.stiffness(length)), turned(m))
+    }
+
+    fn stiffness(&self, l: f64) -> Mat<f64> {
+        let area = self.width * self.width;
+        let bending = area * area / 12.0;
+        let mut k = Mat::zeros(12, 12);
+        add_bar(&mut k, 0, self.youngs * area / l, [1.0, -1.0]);
+        add_bar(&mut k, 3, self.shear * 2.0 * bending / l, [1.0, -1.0]);
+        let scale = self.youngs * bending / (l * l * l);
+        add_bending(&mut k, l, scale, [12.0, 6.0, -12.0, 6.0, 4.0, -6.0, 2.0, 12.0, -6.0, 4.0]);
+        k
+    }
+
+    /// Rotary inertia of the sections across the beam, with cubic deflections.
+    fn rotary(&self, l: f64) -> Mat<f64> {
+        let area = self.width * self.width;
+        let mut m = Mat::zeros(12, 12);
+        let scale = self.density * area * area / 12.0 / (30.0 * l);
+        add_bending(&mut m, l, scale, [36.0, 3.0, -36.0, 3.0, 4.0, -3.0, -1.0, 36.0, -3.0, 4.0]);
+        m
+    }
+
+    fn consistent(&self, l: f64) -> Mat<f64> {
+        let area = self.width * self.width;
+        let mass = self.density * area * l;
+        let polar = area / 6.0;
+        let mut m = Mat::zeros(12, 12);
+        add_bar(&mut m, 0, mass / 6.0, [2.0, 1.0]);
+        add_bar(&mut m, 3, mass * polar / 6.0, [2.0, 1.0]);
+        add_bending(&mut m, l, mass / 420.0, [156.0, 22.0, 54.0, -13.0, 4.0, 13.0, -3.0, 156.0, -22.0, 4.0]);
+        m
+    }
+}
+
+/// Adds a bar along one direction: `diagonal` of each end, and what couples them.
+fn add_bar(a: &mut Mat<f64>, at: usize, scale: f64, [diagonal, coupling]: [f64; 2]) {
+    for (i, j, value) in [(0, 0, diagonal), (6, 6, diagonal), (0, 6, coupling), (6, 0, coupling)] {
+        a[(at + i, at + j)] += scale * value;
+    }
+}
+
+/// Adds bending in both planes; `upper` holds the rows of the upper triangle for (v, l v') of either end.
+fn add_bending(a: &mut Mat<f64>, l: f64, scale: f64, upper: [f64; 10]) {
+    // The deflection along z falls where the section turns about y.
+    for (rows, slope) in [([1, 5, 7, 11], l), ([2, 4, 8, 10], -l)] {
+        let factor = [1.0, slope, 1.0, slope];
+        let mut values = upper.iter();
+        for i in 0..4 {
+            for j in i..4 {
+                let value = scale * factor[i] * factor[j] * values.next().expect("ten of them");
+                a[(rows[i], rows[j])] += value;
+                if i != j {
+                    a[(rows[j], rows[i])] += value;
+                }
+            }
+        }
+    }
+}
+
+fn sparse(a: &Mat<f64>) -> CscMatrix {
+    let entries = (0..a.ncols()).flat_map(|j| (0..a.nrows()).map(move |i| (i as u32, j as u32, a[(i, j)])));
+    CscMatrix::from_triplets(a.nrows(), a.ncols(), &entries.filter(|e| e.2 != 0.0).collect::<Vec<_>>())
+}

@@ -1,0 +1,138 @@
+//! Bodies of every kind for the tests of exports: all fixture models, with free modes and with those of their
+//! interfaces, damped, in the plane, general, partial.
+#![allow(dead_code)] // every test file uses a part of it
+
+use super::flexible::soft_block;
+use super::general::raw_fixture;
+use super::partial::{combinations, with_groups};
+use super::plane::rectangle;
+use crate::fixtures;
+use flexbody_body::basis::{BasisChoice, CraigBampton};
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_eigen::Wanted;
+use flexbody_formats::export::{ExportOptions, Exported};
+use flexbody_formats::{export, find_format};
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{Coupling, Damping, FeModel, RawModel};
+use std::sync::OnceLock;
+
+/// Names of all fixture models.
+pub fn models() -> Vec<String> {
+    let folders = std::fs::read_dir(fixtures().join("models")).expect("fixtures");
+    let mut names: Vec<String> =
+        folders.map(|entry| entry.expect("a folder").file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// What flexbody makes of a model with seven modes.
+pub fn body_of(raw: RawModel, basis: BasisChoice, frame: BodyFrame) -> FlexBody {
+    let model = FeModel::from_raw(raw).expect("a body").model;
+    let mut settings = ConvertSettings { basis, frame, ..ConvertSettings::default() };
+    settings.modes.wanted = Wanted::Lowest(7);
+    convert(&model, &settings, SILENT).expect("converts").body
+}
+
+/// A fixture model with its interfaces coupled to reference points and Craig-Bampton modes.
+pub fn jointed(
+    name: &str,
+    coupling: Coupling,
+    damping: Option<Damping<flexbody_model::RawMatrix>>,
+) -> FlexBody {
+    let mut raw = RawModel { damping, ..raw_fixture(name) };
+    raw.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(coupling));
+    body_of(raw, BasisChoice::CraigBampton(CraigBampton), BodyFrame::Model)
+}
+
+/// Fixture models with interfaces.
+pub const JOINTED: [&str; 4] = ["robot_link", "bracket_hex20", "satellite", "car_frame"];
+
+/// Bodies with K and M in the motions of frames.
+pub fn jointed_bodies() -> &'static [(String, FlexBody)] {
+    static BODIES: OnceLock<Vec<(String, FlexBody)>> = OnceLock::new();
+    BODIES.get_or_init(|| {
+        let rigid =
+            JOINTED.iter().map(|name| (format!("{name}, jointed"), jointed(name, Coupling::Rigid, None)));
+        let rayleigh = Damping::Rayleigh { alpha: 12.0, beta: 3e-6 };
+        let others = [
+            (
+                "robot_link, averaging, Rayleigh".to_owned(),
+                jointed("robot_link", Coupling::Averaging, Some(rayleigh)),
+            ),
+            (
+                "satellite, ratio".to_owned(),
+                jointed("satellite", Coupling::Rigid, Some(Damping::Ratio(0.02))),
+            ),
+        ];
+        rigid.chain(others).collect()
+    })
+}
+
+/// All bodies, by what they are.
+pub fn bodies() -> &'static [(String, FlexBody)] {
+    static BODIES: OnceLock<Vec<(String, FlexBody)>> = OnceLock::new();
+    BODIES.get_or_init(|| {
+        let free = |raw| body_of(raw, BasisChoice::default(), BodyFrame::Principal);
+        let mut all: Vec<(String, FlexBody)> =
+            models().into_iter().map(|name| (name.clone(), free(raw_fixture(&name)))).collect();
+        all.extend(jointed_bodies().iter().cloned());
+        let damped = RawModel {
+            damping: Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }),
+            ..raw_fixture("frame_beams")
+        };
+        all.push((
+            "frame_beams, Rayleigh, not at its centre".to_owned(),
+            body_of(damped, BasisChoice::default(), BodyFrame::Model),
+        ));
+        all.extend(on_interfaces());
+        all.push(("a plane solid".to_owned(), free(rectangle(5, 2, 0.7, [1.0, 2.0]))));
+        let (solid, general) = (soft_block(5), all[6].1.clone());
+        all.push(("soft block in short floats".to_owned(), solid.rounded_to_f32().expect("a body")));
+        for groups in combinations() {
+            all.push((format!("soft block with {groups:?}"), with_groups(&solid, groups)));
+            all.push((format!("{} with {groups:?}", all[6].0), with_groups(&general, groups)));
+        }
+        all
+    })
+}
+
+/// Bodies whose frame stands on an interface: of solids, and of beams and shells with rotations, with damping.
+pub fn on_interfaces() -> Vec<(String, FlexBody)> {
+    let made = |name: &str| {
+        let mut raw =
+            RawModel { damping: Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }), ..raw_fixture(name) };
+        raw.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(Coupling::Rigid));
+        let interface_frame = Some(raw.interfaces[0].name.clone());
+        let model = FeModel::from_raw(raw).expect("a body").model;
+        let basis = BasisChoice::CraigBampton(CraigBampton);
+        let mut settings = ConvertSettings { basis, interface_frame, ..ConvertSettings::default() };
+        settings.modes.wanted = Wanted::Lowest(4);
+        let body = convert(&model, &settings, SILENT).expect("converts").body;
+        (format!("{name}, frame on an interface"), body)
+    };
+    ["bracket_hex20", "robot_link", "satellite", "car_frame"].map(made).to_vec()
+}
+
+/// What an export writes, told or not.
+pub fn exported(
+    body: &FlexBody,
+    format: &str,
+    dialect: Option<&str>,
+) -> flexbody_base::error::Result<Exported> {
+    let options = ExportOptions { dialect: dialect.map(str::to_owned), ..ExportOptions::default() };
+    export(body, find_format(format).expect("a format"), &options, true).map(|(exported, _)| exported)
+}
+
+/// The single file of an export.
+pub fn file(body: &FlexBody, format: &str, dialect: Option<&str>) -> Vec<u8> {
+    let Exported { file, beside } = exported(body, format, dialect).expect("writes");
+    assert!(beside.is_empty());
+    file
+}
+
+/// What a format cannot hold of a body.
+pub fn losses(body: &FlexBody, format: &str) -> Vec<String> {
+    find_format(format).expect("a format").losses(body, &ExportOptions::default())
+}

@@ -1,0 +1,214 @@
+//! Flexible bodies for tests of their equations of motion, and the oracles that belong to them.
+
+use super::elements::{Kind, MassRule, Material};
+use super::equations::{ReducedBody, State};
+use super::general::{GeneralBody, dense, quasi_velocities};
+use super::mesh::{Mesh, grid};
+use super::nodal::reduced;
+use super::random::Random;
+use faer::Mat;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::basis::ModeSettings;
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::flex_body::{
+    Certificate, FlexBody, Frame, MassStructure, Modes, Parts, ReferenceConditions, Source, Storage,
+};
+use flexbody_body::invariants::{BodyFrame, GeneralTerms, Groups, Invariants, PrimaryData};
+use flexbody_eigen::Wanted;
+use flexbody_input::{read_manifest, read_model};
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
+use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+/// What flexbody makes of a model.
+pub fn body_of(raw: RawModel, modes: usize, frame: BodyFrame) -> FlexBody {
+    let model = FeModel::from_raw(raw).expect("a body").model;
+    let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
+    let settings = ConvertSettings { modes, frame, ..ConvertSettings::default() };
+    convert(&model, &settings, SILENT).expect("converts").body
+}
+
+/// What flexbody makes of a model of the fixtures.
+pub fn fixture(name: &str, modes: usize, frame: BodyFrame) -> FlexBody {
+    let folder = crate::root().join("fixtures/models").join(name);
+    let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
+    body_of(raw, modes, frame)
+}
+
+/// A rubber-like block without any symmetry: W1, W2 and W3 all count.
+pub fn soft_block(modes: usize) -> FlexBody {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
+        [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
+    });
+    body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), modes, BodyFrame::Principal)
+}
+
+/// The oracle that has the body's invariants.
+pub fn oracle(body: &FlexBody) -> GeneralBody {
+    let own = body.invariants();
+    GeneralBody { reduced: reduced(own), w0: dense(&own.w0()) }
+}
+
+/// The primary data of given invariants; `solid` where M = Ms kron I3.
+pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
+    let GeneralBody { reduced, w0 } = body;
+    let ReducedBody { c1, c2, w1, w2, w3, .. } = reduced;
+    let nf = c1.ncols();
+    let faer = |a: &DMatrix<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)]);
+    let ibar = |k: usize, l: usize, j: usize| {
+        if k == l {
+            let trace: f64 = (0..3).map(|b| w1[(b, b * nf + j)]).sum();
+            return 0.25 * trace - 0.5 * w1[(k, k * nf + j)];
+        }
+        let skew = if (k + 1) % 3 == l { c2[(3 - k - l, j)] } else { -c2[(3 - k - l, j)] };
+        0.5 * (skew - w1[(k, l * nf + j)])
+    };
+    let s = |k: usize, l: usize, i: usize, j: usize| {
+        if k == l {
+            let trace: f64 = (0..3).map(|b| w2[(b * nf + i, b * nf + j)]).sum();
+            return 0.5 * trace - w2[(k * nf + i, k * nf + j)];
+        }
+        -w2[(l * nf + i, k * nf + j)]
+    };
+    Invariants::new(PrimaryData {
+        mass: reduced.mass,
+        first_moment: reduced.first_moment,
+        second_moment: Matrix3::identity() * (0.5 * reduced.inertia.trace()) - reduced.inertia,
+        c1: faer(c1),
+        ibar: [0, 1, 2].map(|k| [0, 1, 2].map(|l| (0..nf).map(|j| ibar(k, l, j)).collect())),
+        s: [0, 1, 2].map(|k| [0, 1, 2].map(|l| Mat::from_fn(nf, nf, |i, j| s(k, l, i, j)))),
+        modal_stiffness: faer(&reduced.modal_stiffness),
+        general: (!solid).then(|| GeneralTerms {
+            w0: faer(w0),
+            w3: faer(w3),
+            modal_mass: faer(&reduced.modal_mass),
+            plane: false,
+        }),
+        groups: Groups::ALL,
+    })
+}
+
+/// A body with these invariants, some nodes and damping.
+pub fn made_of(
+    invariants: Invariants,
+    positions: Vec<[f64; 3]>,
+    shape: Mat<f64>,
+    damping: Mat<f64>,
+) -> FlexBody {
+    let nf = invariants.n_modes();
+    let general = invariants.general().is_some();
+    FlexBody::new(Parts {
+        source: Source {
+            name: "random".to_owned(),
+            files: Vec::new(),
+            number: None,
+            n_dofs: 3 * positions.len(),
+            mass_structure: if general { MassStructure::General } else { MassStructure::RotationInvariant },
+            approximation: None,
+            settings: serde_json::Value::Null,
+        },
+        dimension: 3,
+        units: UnitSystem::default(),
+        frame: Frame::model(),
+        conditions: ReferenceConditions::MeanAxes,
+        nodes: Nodes { ids: (1..=positions.len() as i64).collect(), positions },
+        modes: Modes {
+            eigenvalue: (1..=nf).map(|j| j as f64).collect(),
+            residual: vec![0.0; nf],
+            provenance: Vec::new(),
+            truncation: Vec::new(),
+            damping_ratio: vec![0.0; nf],
+            modal_damping: Some(damping),
+            shape,
+            rotation: None,
+            internal: None,
+        },
+        invariants,
+        geometric_stiffness: Vec::new(),
+        inertia_stiffness: None,
+        lumped: Vec::new(),
+        certificate: Certificate {
+            proved_modes: None,
+            shift: 1.0,
+            negative_pivots: None,
+            rigid_modes: 6,
+            remark: String::new(),
+            rigid_noise: 0.0,
+            rigid_residual: 0.0,
+            eigenvalue_rounding: 0.0,
+            inertia_rounding: 0.0,
+            guarantee: None,
+            fixed_interface: None,
+        },
+        interfaces: Vec::new(),
+        coordinates: None,
+        terms: Vec::new(),
+        mesh: None,
+        storage: Storage::F64,
+    })
+    .expect("valid parts")
+}
+
+/// `body` without the terms of second order that its turning nodes make: what oracles of first order describe.
+pub fn to_first_order(body: FlexBody) -> FlexBody {
+    let mut parts = body.into_parts();
+    parts.inertia_stiffness = None;
+    FlexBody::new(parts).expect("valid parts")
+}
+
+/// `body` with random geometric stiffness for all loads of the given kinds, entries up to `size`.
+pub fn stressed(body: FlexBody, kinds: &[LoadKind], size: f64, random: &mut Random) -> FlexBody {
+    let (nf, dimension) = (body.n_modes(), body.dimension());
+    let mut parts = body.into_parts();
+    for kind in kinds {
+        for &component in kind.of_dimension(dimension) {
+            let a = Mat::from_fn(nf, nf, |_, _| 0.5 * size * random.signed());
+            let matrix = Mat::from_fn(nf, nf, |i, j| a[(i, j)] + a[(j, i)]);
+            let load = UnitLoad { kind: kind.clone(), component };
+            parts.geometric_stiffness.push(GeometricStiffness { load, matrix });
+        }
+    }
+    FlexBody::new(parts).expect("valid parts")
+}
+
+/// Puts an evaluation to the state of an oracle.
+pub fn set(evaluation: &mut Evaluation<'_>, state: &State) {
+    evaluation.set(state.q.as_slice(), quasi_velocities(state).as_slice());
+}
+
+/// (R'' world, alpha body, q'') under forces that `load` adds.
+pub fn accelerations(
+    equations: &EquationsOfMotion,
+    state: &State,
+    load: impl Fn(&Evaluation<'_>, &mut [f64]),
+) -> DVector<f64> {
+    let mut evaluation = Evaluation::new(equations);
+    set(&mut evaluation, state);
+    let mut forces = vec![0.0; equations.n_velocities()];
+    load(&evaluation, &mut forces);
+    let mut found = DVector::zeros(forces.len());
+    evaluation.accelerations(&forces, found.as_mut_slice()).expect("a body with mass");
+    let own = found.fixed_rows::<3>(0).into_owned();
+    let velocity = state.axes.transpose() * state.velocity;
+    found.rows_mut(0, 3).copy_from(&(state.axes * (own + state.omega.cross(&velocity))));
+    found
+}
+
+/// A state whose rates and deformation suit a body: spin and modes of one time scale, so that no force hides
+/// the others.
+pub fn lively_state(random: &mut Random, body: &FlexBody) -> State {
+    let (nf, inertia) = (body.n_modes(), body.invariants().inertia());
+    let size = inertia.norm().sqrt();
+    let lambda = &body.modes().eigenvalue;
+    let rate = lambda[0].sqrt();
+    State {
+        origin: Vector3::from(random.vector::<3>()),
+        axes: random.rotation(),
+        velocity: Vector3::from(random.vector::<3>()) * (rate * size / body.invariants().mass().sqrt()),
+        omega: Vector3::from(random.vector::<3>()) * (0.5 * rate),
+        q: DVector::from_fn(nf, |j, _| 0.1 * size * lambda[0] / lambda[j] * random.signed()),
+        qd: DVector::from_fn(nf, |j, _| 0.1 * size * rate * (lambda[0] / lambda[j]).sqrt() * random.signed()),
+    }
+}

@@ -1,0 +1,157 @@
+//! The modes that two bodies have in common, where one has fewer than the other.
+
+use super::clusters::close;
+use super::numbers::{counted, significant};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+
+/// Which modes of two bodies are compared with each other (indices from 0, ascending, the same number of
+/// both), and what is left out.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CommonModes {
+    pub a: Vec<usize>,
+    pub b: Vec<usize>,
+    /// What was compared and what was left out, in sentences.
+    pub notes: Vec<String>,
+}
+
+impl CommonModes {
+    /// Every mode of the body that has fewer gets a partner of the other, in ascending order, so that the
+    /// ratios of frequencies deviate as little as possible. A mode that differs is compared with its
+    /// neighbour and not taken for one that the other body lacks. Of a repeated eigenvalue all modes are
+    /// compared or none: those of a part of it are not determined.
+    ///
+    /// # Errors
+    /// [`BodyIncomparable`](Code::BodyIncomparable) when no mode is left.
+    pub(crate) fn of(a: &FlexBody, b: &FlexBody) -> Result<Self> {
+        let (of_a, of_b) = (&a.modes().eigenvalue, &b.modes().eigenvalue);
+        let (fewer, more) = if of_a.len() <= of_b.len() { (of_a, of_b) } else { (of_b, of_a) };
+        let partners = partners(fewer, more);
+        let (kept, split): (Vec<usize>, Vec<usize>) =
+            (0..fewer.len()).partition(|&i| is_whole(more, &partners, partners[i]));
+        if kept.is_empty() {
+            let message = "the bodies have no mode in common but parts of a repeated eigenvalue";
+            return Err(Diagnostic::new(Code::BodyIncomparable, message)
+                .with_help("convert both with all modes of the repeated eigenvalue")
+                .into());
+        }
+        let of_more: Vec<usize> = kept.iter().map(|&i| partners[i]).collect();
+        let (a_modes, b_modes) = if of_a.len() <= of_b.len() { (kept, of_more) } else { (of_more, kept) };
+        let mut notes = vec![format!(
+            "{} in common {} compared: {} of the first body with {} of the second",
+            counted(a_modes.len(), "mode"),
+            if a_modes.len() == 1 { "is" } else { "are" },
+            some_of(&a_modes, of_a.len()),
+            some_of(&b_modes, of_b.len()),
+        )];
+        for (body, compared, which) in [(a, &a_modes, "first"), (b, &b_modes, "second")] {
+            notes.extend(left_out(body, compared, which));
+        }
+        if !split.is_empty() {
+            notes.push(
+                "modes of a repeated eigenvalue of which one body has a part only are not determined and left out".to_owned(),
+            );
+        }
+        Ok(Self { a: a_modes, b: b_modes, notes })
+    }
+}
+
+/// For each of `fewer` eigenvalues the index of its partner among `more` (both ascending): the ascending
+/// choice with the smallest sum of
+/// |ln(lambda_i / lambda_j)|, by dynamic programming.
+fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
+    let (n, m) = (fewer.len(), more.len());
+    let distance = |i: usize, j: usize| (fewer[i] / more[j]).ln().abs();
+    // Smallest sums of the first i partners among the first j.
+    let mut sums = vec![vec![f64::INFINITY; m + 1]; n + 1];
+    sums[0].fill(0.0);
+    for i in 1..=n {
+        for j in i..=m {
+            sums[i][j] = sums[i][j - 1].min(sums[i - 1][j - 1] + distance(i - 1, j - 1));
+        }
+    }
+    let (mut found, mut j) = (vec![0; n], m);
+    for i in (1..=n).rev() {
+        while j > i && sums[i][j] == sums[i][j - 1] {
+            j -= 1;
+        }
+        j -= 1;
+        found[i - 1] = j;
+    }
+    found
+}
+
+/// Whether every mode of the cluster that the mode `of` belongs to is among the `partners`.
+fn is_whole(more: &[f64], partners: &[usize], of: usize) -> bool {
+    let below = (1..=of).rev().take_while(|&j| close(more, j)).count();
+    let above = (of + 1..more.len()).take_while(|&j| close(more, j)).count();
+    (of - below..=of + above).all(|j| partners.binary_search(&j).is_ok())
+}
+
+/// `all`, `modes 1 to 12`, `modes 1, 2, 5 to 7`, numbered from 1.
+fn some_of(modes: &[usize], of: usize) -> String {
+    if modes.len() == of {
+        return format!("all {of}");
+    }
+    let mut ranges: Vec<(usize, usize)> = Vec::new();
+    for &mode in modes {
+        match ranges.last_mut() {
+            Some((_, last)) if *last + 1 == mode => *last = mode,
+            _ => ranges.push((mode, mode)),
+        }
+    }
+    let range = |&(first, last): &(usize, usize)| match last - first {
+        0 => (first + 1).to_string(),
+        1 => format!("{}, {}", first + 1, last + 1),
+        _ => format!("{} to {}", first + 1, last + 1),
+    };
+    let ranges: Vec<String> = ranges.iter().map(range).collect();
+    format!("{} {}", if modes.len() == 1 { "mode" } else { "modes" }, ranges.join(", "))
+}
+
+fn left_out(body: &FlexBody, compared: &[usize], which: &str) -> Option<String> {
+    let rest: Vec<usize> = (0..body.n_modes()).filter(|j| compared.binary_search(j).is_err()).collect();
+    let (first, last) = (*rest.first()?, *rest.last()?);
+    let hertz = body.frequencies_hz();
+    let range = if rest.len() == 1 {
+        format!("at {} Hz", significant(hertz[first], 5))
+    } else {
+        format!("from {} to {} Hz", significant(hertz[first], 5), significant(hertz[last], 5))
+    };
+    Some(format!("not compared: {} of the {which} body, {range}", some_of(&rest, usize::MAX)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn partners_are_nearest_in_ascending_order() {
+        assert_eq!(partners(&[1.0, 2.0], &[1.0, 2.0, 3.0]), [0, 1]);
+        assert_eq!(partners(&[2.0, 9.0], &[1.0, 2.0, 3.0, 4.0, 9.0]), [1, 4]);
+        assert_eq!(
+            partners(&[1.0, 2.2, 3.0], &[1.0, 2.0, 3.0, 4.0]),
+            [0, 1, 2],
+            "a mode that differs keeps its place"
+        );
+        assert_eq!(partners(&[5.0, 5.0], &[5.0, 5.0, 5.0]).len(), 2);
+        assert!(partners(&[], &[1.0]).is_empty());
+    }
+
+    #[test]
+    fn a_part_of_a_repeated_eigenvalue_is_no_mode_in_common() {
+        let more = [1.0, 2.0, 2.0, 3.0];
+        assert!(is_whole(&more, &[0, 1, 2], 1));
+        assert!(!is_whole(&more, &[0, 1], 1));
+        assert!(is_whole(&more, &[0, 1], 0));
+    }
+
+    #[test]
+    fn modes_are_named_by_ranges() {
+        assert_eq!(some_of(&[0, 1, 2], 3), "all 3");
+        assert_eq!(some_of(&[0, 1, 2], 5), "modes 1 to 3");
+        assert_eq!(some_of(&[1], 5), "mode 2");
+        assert_eq!(some_of(&[0, 1, 4, 6, 7, 8], 20), "modes 1, 2, 5, 7 to 9");
+    }
+}

@@ -1,0 +1,535 @@
+//! Two bodies side by side, insensitive to the signs of modes, to the basis inside repeated eigenvalues, to
+//! the order of the nodes and to the body frame.
+
+use super::clusters::clusters;
+use super::common_modes::CommonModes;
+use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
+use super::numbers::{plain, significant};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatRef, Par};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::{FlexBody, Frame, Group, ReferenceConditions};
+use flexbody_body::invariants::{CauchySchwarz, Invariants, compare_invariants};
+use flexbody_linalg::larger;
+use nalgebra::{Matrix3, Vector3};
+use serde::Serialize;
+use std::collections::HashMap;
+use std::ops::Range;
+
+mod interfaces;
+mod modal_matrices;
+mod nodal_rows;
+mod not_compared;
+
+/// Largest differences that pass, all relative.
+///
+/// The defaults are those of two computations of the same model on different machines. Bodies from matrices
+/// that were written with few digits, or from another mesh, need larger ones.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerances {
+    /// Of each frequency. Default 1e-9: a residual of 1e-10 bounds eigenvalues far below that.
+    pub frequency: f64,
+    /// Of the mass. Default 1e-9: three orders above rounding; catches a single missing element of a large
+    /// model.
+    pub mass: f64,
+    /// Of the inertia about the centre of mass, each entry relative to sqrt(I_kk I_ll). Default 1e-9, as the
+    /// mass.
+    pub inertia: f64,
+    /// Of invariants and shapes, relative to the Cauchy-Schwarz bounds, and of damping and of the stiffness of unit
+    /// loads, relative to their largest entries. Default 1e-8: vectors of modes are known to residual / gap, less
+    /// than eigenvalues.
+    pub invariants: f64,
+    /// Of the centre of mass, of node positions and of the reference points of interfaces, relative to the radius
+    /// of gyration. Default 1e-9, as the mass.
+    pub centre_of_mass: f64,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Self { frequency: 1e-9, mass: 1e-9, inertia: 1e-9, invariants: 1e-8, centre_of_mass: 1e-9 }
+    }
+}
+
+/// One compared quantity.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparisonRow {
+    /// Name, stable.
+    pub quantity: &'static str,
+    /// What the difference is relative to.
+    pub meaning: &'static str,
+    /// Largest difference, dimensionless; 0 is equal.
+    pub difference: f64,
+    /// Largest difference that passes: the one asked for, and what the digits of a distant origin allow.
+    pub tolerance: f64,
+    /// `difference <= tolerance`; a NaN never passes.
+    pub passed: bool,
+}
+
+/// Result of [`compare`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BodyComparison {
+    a: String,
+    b: String,
+    passed: bool,
+    same_nodes: bool,
+    rows: Vec<ComparisonRow>,
+    notes: Vec<String>,
+    not_compared: Vec<String>,
+}
+
+/// Compares `b` with `a`, in the frame of `a`.
+///
+/// With the same node numbers in both (in any order), `b` is turned and shifted into the frame of `a`, its
+/// modes are aligned inside each cluster of close eigenvalues ([`align`](flexbody_body::invariants::align),
+/// plain product of the nodal components), and positions, shapes and every primary invariant are compared.
+/// Otherwise only what needs no common node is: mass, centre of mass, inertia, frequencies, and the norms of
+/// the invariants over clusters of modes, which no choice of signs or basis changes. Damping, geometric stiffness,
+/// stiffness of inertia and interfaces are compared in both cases. [`BodyComparison::not_compared`] lists the
+/// entries of the file that are not. A body that comes from a
+/// file of another program does not know where its frame is in the model; with such a one the body frames are
+/// taken as the same.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units, dimensions or numbers of modes differ; [`compare_common`]
+/// compares bodies with different numbers of modes.
+pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
+    comparable(a, b)?;
+    let placed = is_placed(a) && is_placed(b);
+    let (in_own_a, in_own_b);
+    let (a, b) = if placed {
+        (a, b)
+    } else {
+        (in_own_a, in_own_b) = (in_own_frame(a)?, in_own_frame(b)?);
+        (&in_own_a, &in_own_b)
+    };
+    let mut comparison = BodyComparison {
+        a: a.source().name.clone(),
+        b: b.source().name.clone(),
+        passed: true,
+        same_nodes: false,
+        rows: Vec::new(),
+        notes: Vec::new(),
+        not_compared: Vec::new(),
+    };
+    comparison.rigid(a, b, tolerances);
+    let change = FrameChange::new(a, b);
+    let in_a = b.invariants().shifted(change.shift).rotated(&change.axes);
+    let groups = clusters(&a.modes().eigenvalue, &b.modes().eigenvalue);
+    let pair = Pair { a, b, change, in_a, groups };
+    let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
+    comparison.not_compared = not_compared::entries(a, b, order.is_some());
+    let basis = match order {
+        Some(order) => Some(comparison.mode_by_mode(&pair, &order, tolerances)),
+        None => {
+            comparison.norms_only(&pair, tolerances.invariants);
+            None
+        }
+    };
+    comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
+    comparison.interfaces(&pair, tolerances.centre_of_mass);
+    if !placed {
+        let note = "a body comes from a file of another program, which does not tell where its frame is in the model: the body frames are taken as the same";
+        comparison.notes.push(note.to_owned());
+    }
+    comparison.say_what_is_dropped(a, b);
+    if a.storage() != b.storage() {
+        comparison.notes.push("one of the bodies is rounded to 32-bit floats".to_owned());
+    }
+    if a.units().stated != b.units().stated {
+        comparison
+            .notes
+            .push("only one of the bodies has stated units, the other assumes m, kg, s".to_owned());
+    }
+    comparison.passed = comparison.rows.iter().all(|row| row.passed);
+    Ok(comparison)
+}
+
+/// The same of two bodies one of which may have fewer modes: each of its modes is compared with that of the
+/// other whose frequency is nearest, in ascending order. The notes say which modes were compared and which
+/// were not.
+///
+/// # Errors
+/// [`BodyIncomparable`](Code::BodyIncomparable) when units differ, or no mode is in common.
+pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<BodyComparison> {
+    if a.n_modes() == b.n_modes() {
+        return compare(a, b, tolerances);
+    }
+    let common = CommonModes::of(a, b)?;
+    let some = |body: &FlexBody, modes: &[usize]| body.reduced(modes, body.groups(), Vec::new());
+    let mut comparison = compare(&some(a, &common.a)?, &some(b, &common.b)?, tolerances)?;
+    comparison.notes.splice(0..0, common.notes);
+    Ok(comparison)
+}
+
+/// Whether it is known where in the model the body frame is.
+fn is_placed(body: &FlexBody) -> bool {
+    body.source().n_dofs > 0
+}
+
+/// The body with its frame as that of the model.
+fn in_own_frame(body: &FlexBody) -> Result<FlexBody> {
+    let mut parts = body.parts().clone();
+    parts.frame = Frame { origin: Vector3::zeros(), axes: Matrix3::identity() };
+    FlexBody::new(parts)
+}
+
+fn comparable(a: &FlexBody, b: &FlexBody) -> Result<()> {
+    let mut problems = Vec::new();
+    let incomparable = |message: String| Diagnostic::new(Code::BodyIncomparable, message);
+    let (ua, ub) = (a.units(), b.units());
+    for (what, x, y) in
+        [("length", &ua.length, &ub.length), ("mass", &ua.mass, &ub.mass), ("time", &ua.time, &ub.time)]
+    {
+        if x.to_si() != y.to_si() {
+            problems.push(incomparable(format!(
+                "unit of {what} is `{}` in the first body and `{}` in the second",
+                x.name(),
+                y.name()
+            )));
+        }
+    }
+    if !have_the_same_modes(a.conditions(), b.conditions()) {
+        let (a, b) = (a.conditions(), b.conditions());
+        let message = format!(
+            "the modes are those of other reference conditions: in the first body {a}, in the second {b}"
+        );
+        let help = "convert both with the same --frame";
+        problems.push(incomparable(message).with_help(help));
+    }
+    if a.dimension() != b.dimension() {
+        let (a, b) = (a.dimension(), b.dimension());
+        problems.push(incomparable(format!("the first body has dimension {a}, the second {b}")));
+    }
+    if a.n_modes() != b.n_modes() {
+        let message = format!("the first body has {} modes, the second {}", a.n_modes(), b.n_modes());
+        let help = "--common compares the modes that both have, and names those that it leaves out";
+        problems.push(incomparable(message).with_help(help));
+    }
+    if problems.is_empty() { Ok(()) } else { Err(Error::new(problems)) }
+}
+
+/// True if reference conditions may be the same: a file of another program does not state its own.
+fn have_the_same_modes(a: &ReferenceConditions, b: &ReferenceConditions) -> bool {
+    use ReferenceConditions::{MeanAxes, Unstated};
+    match (a, b) {
+        (Unstated, MeanAxes) | (MeanAxes, Unstated) => false,
+        (Unstated, _) | (_, Unstated) => true,
+        _ => a == b,
+    }
+}
+
+/// Two bodies brought together.
+struct Pair<'a> {
+    a: &'a FlexBody,
+    b: &'a FlexBody,
+    change: FrameChange,
+    /// Invariants of b in the frame of a, in the basis of b.
+    in_a: Invariants,
+    /// Clusters of close eigenvalues.
+    groups: Vec<Range<usize>>,
+}
+
+/// From the frame of b to that of a: x_a = axes' (x_b - shift).
+struct FrameChange {
+    shift: Vector3<f64>,
+    axes: Matrix3<f64>,
+}
+
+impl FrameChange {
+    fn new(a: &FlexBody, b: &FlexBody) -> Self {
+        let (a, b) = (a.frame(), b.frame());
+        // Equal frames change nothing, not even the last bit.
+        let axes = if a.axes == b.axes { Matrix3::identity() } else { b.axes.transpose() * a.axes };
+        Self { shift: b.axes.transpose() * (a.origin - b.origin), axes }
+    }
+
+    fn point(&self, x: &[f64; 3]) -> Vector3<f64> {
+        self.axes.transpose() * (Vector3::from(*x) - self.shift)
+    }
+}
+
+/// Index into b of each node of a; `None` when the node numbers are not the same.
+fn common_nodes(a: &[i64], b: &[i64]) -> Option<Vec<usize>> {
+    let places: HashMap<i64, usize> = b.iter().enumerate().map(|(i, &id)| (id, i)).collect();
+    (a.len() == b.len()).then(|| a.iter().map(|id| places.get(id).copied()).collect()).flatten()
+}
+
+/// |difference| / scale; 0 when nothing differs, whatever the scale.
+fn relative(difference: f64, scale: f64) -> f64 {
+    if difference == 0.0 { 0.0 } else { difference.abs() / scale }
+}
+
+/// What shifting J by `distance` costs relative to its smallest entry: about a distant frame J is m d^2, with
+/// the body's own moments in its last digits.
+fn lost_by_shift(mass: f64, distance: f64, smallest: f64) -> f64 {
+    8.0 * f64::EPSILON * relative(mass * distance * distance, smallest)
+}
+
+impl BodyComparison {
+    /// Whether every difference is within its tolerance.
+    pub fn passed(&self) -> bool {
+        self.passed
+    }
+
+    /// The compared quantities.
+    pub fn rows(&self) -> &[ComparisonRow] {
+        &self.rows
+    }
+
+    /// Whether shapes and invariants were compared mode by mode: both bodies have the same node numbers.
+    pub fn same_nodes(&self) -> bool {
+        self.same_nodes
+    }
+
+    /// Notes on what limits the comparison.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// Entries of the flex-body file that were not compared, each with its paths: `lumped comparators (/lumped,
+    /// /comparison)`.
+    pub fn not_compared(&self) -> &[String] {
+        &self.not_compared
+    }
+
+    /// Notes, and a sentence for every entry that was not compared.
+    pub(super) fn remarks(&self) -> Vec<String> {
+        let left_out = self.not_compared.iter().map(|entry| format!("not compared: {entry}"));
+        self.notes.iter().cloned().chain(left_out).collect()
+    }
+
+    /// As JSON: `a`, `b`, `passed`, `same_nodes`, `rows`, `notes`, `not_compared`.
+    pub fn json(&self) -> serde_json::Value {
+        serde_json::to_value(self).expect("plain data with text keys")
+    }
+
+    /// As a table for a terminal.
+    pub fn text(&self) -> String {
+        let mut text = format!("{:22} {:>12} {:>12}\n", "quantity", "difference", "tolerance");
+        for row in &self.rows {
+            let mark = if row.passed { "" } else { "  DIFFERS" };
+            let (difference, tolerance) = (significant(row.difference, 3), significant(row.tolerance, 3));
+            text.push_str(&format!("{:22} {difference:>12} {tolerance:>12}{mark}\n", row.quantity));
+        }
+        for note in &self.notes {
+            text.push_str(&format!("note: {}\n", plain(note)));
+        }
+        for entry in &self.not_compared {
+            text.push_str(&format!("not compared: {entry}\n"));
+        }
+        let failed = self.rows.iter().filter(|row| !row.passed).count();
+        text.push_str(&match failed {
+            0 => "the bodies agree\n".to_owned(),
+            1 => "the bodies DIFFER in 1 quantity\n".to_owned(),
+            count => format!("the bodies DIFFER in {count} quantities\n"),
+        });
+        text
+    }
+
+    /// True if one of the bodies comes from a file of another program, which may have no place for what `has` finds,
+    /// and has none; `name (paths)` is then listed as not compared, if the other has some.
+    fn leave_out(
+        &mut self,
+        pair: &Pair<'_>,
+        name: &str,
+        paths: &str,
+        has: impl Fn(&FlexBody) -> bool,
+    ) -> bool {
+        let may_lack = |body: &FlexBody| !is_placed(body) && !has(body);
+        let left_out = may_lack(pair.a) || may_lack(pair.b);
+        if left_out && (has(pair.a) || has(pair.b)) {
+            let entry = format!("{name}, of which a body of another program has none ({paths})");
+            self.not_compared.push(entry);
+        }
+        left_out
+    }
+
+    fn row(&mut self, quantity: &'static str, meaning: &'static str, difference: f64, tolerance: f64) {
+        self.rows.push(ComparisonRow {
+            quantity,
+            meaning,
+            difference,
+            tolerance,
+            passed: difference <= tolerance,
+        });
+    }
+
+    /// A group of the kinetic energy that one body lacks is not compared, and not taken for zero.
+    fn say_what_is_dropped(&mut self, a: &FlexBody, b: &FlexBody) {
+        for group in Group::ALL {
+            let whose = match (a.groups().has(group), b.groups().has(group)) {
+                (true, true) => continue,
+                (false, true) => "the first body",
+                (true, false) => "the second body",
+                (false, false) => "both bodies",
+            };
+            self.notes.push(format!("{} was dropped from {whose}: it is not compared", group.name()));
+        }
+    }
+
+    /// Mass, centre of mass, inertia about it, frequencies.
+    fn rigid(&mut self, a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) {
+        let (ia, ib) = (a.invariants(), b.invariants());
+        self.row("mass", "relative", relative(ib.mass() - ia.mass(), ia.mass()), tolerances.mass);
+        let radius = gyration_radius(ia);
+        let com =
+            |body: &FlexBody| body.frame().origin + body.frame().axes * centre_of_mass(body.invariants());
+        let spacing = relative(com(a).amax().max(com(b).amax()), radius) * f64::EPSILON;
+        self.row(
+            "centre of mass",
+            "distance / radius of gyration",
+            relative((com(b) - com(a)).norm(), radius),
+            tolerances.centre_of_mass + 8.0 * spacing,
+        );
+        let axes = FrameChange::new(a, b).axes;
+        let (ja, jb) = (inertia_about_com(ia), axes.transpose() * inertia_about_com(ib) * axes);
+        let mut largest = 0.0;
+        for k in 0..3 {
+            for l in 0..3 {
+                let scale = (ja[(k, k)] * ja[(l, l)]).sqrt();
+                largest = larger(largest, relative(jb[(k, l)] - ja[(k, l)], scale));
+            }
+        }
+        let offset = centre_of_mass(ia).norm().max(centre_of_mass(ib).norm());
+        let lost = lost_by_shift(ia.mass(), offset, ja.diagonal().min());
+        self.row("inertia", "largest entry / sqrt(I_kk I_ll)", largest, tolerances.inertia + lost);
+        let frequency = |(fa, fb): (&f64, &f64)| relative(fb - fa, *fa);
+        let largest = a.frequencies_hz().iter().zip(&b.frequencies_hz()).map(frequency).fold(0.0, larger);
+        self.row("frequency", "relative, largest of all modes", largest, tolerances.frequency);
+    }
+
+    /// Compares positions, shapes and invariants; `order` gives the node of b for each of a. Returns the basis change
+    /// that carries the modes of b to those of a.
+    fn mode_by_mode(&mut self, pair: &Pair<'_>, order: &[usize], tolerances: &Tolerances) -> Mat<f64> {
+        let Pair { a, b, change, in_a, groups } = pair;
+        self.same_nodes = true;
+        let (pa, pb) = (&a.nodes().positions, &b.nodes().positions);
+        let distance = |(x, &i): (&[f64; 3], &usize)| (change.point(&pb[i]) - Vector3::from(*x)).norm();
+        let largest = pa.iter().zip(order).map(distance).fold(0.0, larger);
+        let radius = gyration_radius(a.invariants());
+        let origin = a.frame().origin.amax().max(b.frame().origin.amax());
+        self.row(
+            "node positions",
+            "largest distance / radius of gyration",
+            relative(largest, radius),
+            tolerances.centre_of_mass + 8.0 * f64::EPSILON * relative(origin, radius),
+        );
+
+        let shapes_a = a.modes().shape.as_ref();
+        let shapes_b = turned(b.modes().shape.as_ref(), &change.axes, order);
+        let gram = product(shapes_a.transpose(), shapes_b.as_ref());
+        let (alignment, differences) = compare_invariants(a.invariants(), in_a, gram.as_ref(), groups);
+        let aligned = product(shapes_b.as_ref(), alignment.basis.as_ref());
+        let by_group: Vec<f64> =
+            groups.iter().map(|g| shape_difference(shapes_a, aligned.as_ref(), g)).collect();
+        let largest = by_group.iter().copied().fold(0.0, larger);
+        self.row("mode shapes", "|psi_a - psi_b| / |psi_a|, nodal norm", largest, tolerances.invariants);
+        let rest = &by_group[..by_group.len().saturating_sub(1)];
+        let shapes_agree = largest <= tolerances.invariants;
+        if !shapes_agree && rest.iter().all(|d| *d <= tolerances.invariants) {
+            self.notes.push(
+                "only the last modes differ: other modes of the same repeated eigenvalue may have been left out"
+                    .to_owned(),
+            );
+        }
+        // J of a mass with inertia of its own may have no positive diagonal.
+        let smallest = match a.invariants().general() {
+            Some(_) => a.invariants().inertia().diagonal().min(),
+            None => a.invariants().second_moment().diagonal().min(),
+        };
+        let lost = lost_by_shift(a.invariants().mass(), change.shift.norm(), smallest);
+        for (name, difference) in differences {
+            // Mass has a row of its own.
+            if let Some((_, quantity, meaning)) = PRIMARY.iter().find(|(known, ..)| *known == name) {
+                let lost = if name == "second_moment" { lost } else { 0.0 };
+                self.row(quantity, meaning, difference, tolerances.invariants + lost);
+            }
+        }
+        self.nodal_rows(pair, order, alignment.basis.as_ref(), tolerances.invariants);
+        alignment.basis
+    }
+
+    /// Norms of the invariants over groups of modes, which no orthogonal change inside the groups alters.
+    fn norms_only(&mut self, pair: &Pair<'_>, tolerance: f64) {
+        let Pair { a, b, in_a, groups, .. } = pair;
+        let (na, nb) = (a.n_nodes(), b.n_nodes());
+        let count = if na == nb { format!("{na} with other numbers") } else { format!("{na} and {nb}") };
+        self.notes.push(format!(
+            "the bodies have different nodes ({count}): shapes are not compared, invariants only by their norms over groups of modes"
+        ));
+        let exact = a.invariants();
+        let bound = CauchySchwarz::of(exact);
+        let size = |g: &Range<usize>| g.clone().map(|p| bound.mode(p).powi(2)).sum::<f64>().sqrt();
+        let norm = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0f64, |sum, v| sum.hypot(v));
+        let (mut c1, mut ibar, mut s) = (0.0, 0.0, 0.0);
+        for g in groups {
+            for k in 0..3 {
+                let x = |body: &Invariants| norm(&mut g.clone().map(|p| body.c1()[(k, p)]));
+                c1 = larger(c1, relative(x(in_a) - x(exact), exact.mass().sqrt() * size(g)));
+                for l in 0..3 {
+                    let x = |body: &Invariants| {
+                        body.ibar().map_or(0.0, |ibar| norm(&mut g.clone().map(|p| ibar[k][l][p])))
+                    };
+                    // ibar() is sqrt(J_kk) |psi_p|.
+                    let scale = norm(&mut g.clone().map(|p| bound.ibar(k, p)));
+                    ibar = larger(ibar, relative(x(in_a) - x(exact), scale));
+                    for h in groups {
+                        let x = |body: &Invariants| {
+                            let products = |block: &Mat<f64>| {
+                                norm(&mut g.clone().flat_map(|p| h.clone().map(move |q| block[(p, q)])))
+                            };
+                            body.s().map_or(0.0, |s| products(&s[k][l]))
+                        };
+                        s = larger(s, relative(x(in_a) - x(exact), size(g) * size(h)));
+                    }
+                }
+            }
+        }
+        self.row("norms of C1", "over groups of modes / sqrt(m) |psi|", c1, tolerance);
+        let held = exact.groups().and(in_a.groups());
+        if held.w1 {
+            self.row("norms of Ibar", "over groups of modes / sqrt(J_kk) |psi|", ibar, tolerance);
+        }
+        if held.w2 {
+            self.row("norms of S", "over groups of modes / |psi_p| |psi_q|", s, tolerance);
+        }
+    }
+}
+
+/// Names of `primary_differences`, of the rows, and what each is relative to.
+const PRIMARY: [(&str, &str, &str); 10] = [
+    ("first_moment", "first moment", "about the frame origin of the first body / sqrt(m J_kk)"),
+    ("second_moment", "second moment", "about the frame origin of the first body / sqrt(J_kk J_ll)"),
+    ("C1", "C1", "largest entry / sqrt(m) |psi_p|"),
+    ("Ibar", "Ibar (W1, C2)", "largest entry / sqrt(J_kk) |psi_p|"),
+    ("C2", "C2", "largest entry / sqrt(I0_kk) |psi_p|"),
+    ("S", "S (W2, W3, m_ff)", "largest entry / |psi_p| |psi_q|"),
+    ("modal_stiffness", "modal stiffness", "largest entry / sqrt(K_pp K_qq)"),
+    ("W0", "W0", "largest entry / sqrt(m) |psi_p|"),
+    ("W3", "W3", "largest entry / |psi_p| |psi_q|"),
+    ("modal_mass", "modal mass", "largest entry / |psi_p| |psi_q|"),
+];
+
+/// A B on one thread: the same bits at any number of threads.
+fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let mut c = Mat::zeros(a.nrows(), b.ncols());
+    matmul(&mut c, Accum::Replace, a, b, 1.0, Par::Seq);
+    c
+}
+
+/// Shapes (3n x nf) with their nodes in the given order and their components along other axes.
+fn turned(shapes: MatRef<'_, f64>, axes: &Matrix3<f64>, order: &[usize]) -> Mat<f64> {
+    Mat::from_fn(3 * order.len(), shapes.ncols(), |row, p| {
+        let (node, k) = (order[row / 3], row % 3);
+        (0..3).map(|l| axes[(l, k)] * shapes[(3 * node + l, p)]).sum()
+    })
+}
+
+/// |A - B|_F / |A|_F of a group of columns.
+fn shape_difference(a: MatRef<'_, f64>, b: MatRef<'_, f64>, group: &Range<usize>) -> f64 {
+    let square = |value: &dyn Fn(usize, usize) -> f64| {
+        group.clone().map(|p| (0..a.nrows()).map(|i| value(i, p).powi(2)).sum::<f64>()).sum::<f64>()
+    };
+    relative(square(&|i, p| a[(i, p)] - b[(i, p)]).sqrt(), square(&|i, p| a[(i, p)]).sqrt())
+}

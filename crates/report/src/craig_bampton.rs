@@ -1,0 +1,149 @@
+//! A Craig-Bampton body in its own terms: what its coordinates are, what is proved of them, and up to which
+//! frequency it stands for the free body.
+
+use super::numbers::{counted, percent, significant};
+use flexbody_body::flex_body::{FixedInterface, FlexBody};
+use serde::Serialize;
+
+/// Part by which a frequency may be too high to be called right.
+const RIGHT: f64 = 0.01;
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct CraigBamptonFacts {
+    pub fixed_interface_modes: usize,
+    /// Number of fixed-interface modes that was asked for; `None`: not known, or all below a frequency.
+    pub fixed_interface_asked: Option<usize>,
+    /// Frequency below which all fixed-interface modes were asked for.
+    pub fixed_interface_asked_below_hz: Option<f64>,
+    /// Frequencies of the fixed-interface modes; `None`: the body keeps a part of the modes only, or an older file.
+    pub fixed_interface_hz: Option<Vec<f64>>,
+    pub interface_motions: usize,
+    pub rigid_modes: usize,
+    /// Fixed-interface modes below `shift_hz` by the inertia count; `None`: not counted.
+    pub counted: Option<usize>,
+    /// `None`: a negative shift.
+    pub shift_hz: Option<f64>,
+    /// First fixed-interface mode that is left out; `None`: not computed.
+    pub next_hz: Option<f64>,
+    /// Worst residual of the fixed-interface modes.
+    pub worst_residual: f64,
+    /// Frequencies of the free body as estimated (nf): upper bounds.
+    pub free_hz: Vec<f64>,
+    /// Lower bounds; `None`: none.
+    pub free_lower_hz: Vec<Option<f64>>,
+    /// Parts by which the frequencies of the reduced body are too high, as estimated.
+    pub too_high: Vec<f64>,
+    /// The same at most; `None`: without a bound.
+    pub too_high_at_most: Vec<Option<f64>>,
+    /// How many of the lowest frequencies are at most 1 % too high.
+    pub within_one_percent: usize,
+    /// Whether that free body keeps some interfaces rigid, as the basis does.
+    pub rigid_interfaces: bool,
+}
+
+impl CraigBamptonFacts {
+    pub(crate) fn of(body: &FlexBody) -> Option<Self> {
+        let fixed = body.certificate().fixed_interface.as_ref()?;
+        let (theta, nf) = (&body.modes().eigenvalue, body.n_modes());
+        let hertz = |lambda: f64| body.units().frequency_of(lambda);
+        let asked = &body.source().settings;
+        Some(Self {
+            fixed_interface_modes: fixed.modes,
+            fixed_interface_asked: asked["modes"].as_u64().and_then(|count| usize::try_from(count).ok()),
+            fixed_interface_asked_below_hz: asked["max_eigenvalue"].as_f64().map(hertz),
+            fixed_interface_hz: fixed_interface_eigenvalues(body)
+                .map(|all| all.into_iter().map(hertz).collect()),
+            interface_motions: fixed.interface_motions,
+            rigid_modes: body.certificate().rigid_modes,
+            counted: fixed.counted,
+            shift_hz: (fixed.shift >= 0.0).then(|| hertz(fixed.shift)),
+            next_hz: fixed.next.map(hertz),
+            worst_residual: fixed.residual,
+            free_hz: fixed.free_estimate.iter().copied().map(hertz).collect(),
+            free_lower_hz: fixed.free_lower.iter().map(|l| (*l > 0.0).then(|| hertz(*l))).collect(),
+            too_high: (0..nf).map(|j| fixed.excess(j, theta[j])).collect(),
+            too_high_at_most: (0..nf).map(|j| fixed.largest_excess(j, theta[j])).collect(),
+            within_one_percent: fixed.holding(theta, RIGHT),
+            rigid_interfaces: body.has_rigid_interfaces(),
+        })
+    }
+
+    /// Returns the frequencies of the fixed-interface modes, where there are some and they are known.
+    pub(crate) fn held_hz(&self) -> Option<&[f64]> {
+        self.fixed_interface_hz.as_deref().filter(|hz| !hz.is_empty())
+    }
+
+    /// `10 fixed-interface modes (10 asked for) + 12 interface motions - 6 rigid-body motions`.
+    pub(crate) fn made_of(&self) -> String {
+        let asked = match (self.fixed_interface_asked, self.fixed_interface_asked_below_hz) {
+            (Some(count), _) => format!(" ({count} asked for)"),
+            (None, Some(hertz)) => format!(" (all below {} Hz asked for)", significant(hertz, 5)),
+            (None, None) => String::new(),
+        };
+        format!(
+            "{}{asked} + {} - {}",
+            counted(self.fixed_interface_modes, "fixed-interface mode"),
+            counted(self.interface_motions, "interface motion"),
+            counted(self.rigid_modes, "rigid-body motion")
+        )
+    }
+
+    /// Up to which frequency the reduced body stands for the free one, and what the first does that is
+    /// beyond; `hertz` are its own frequencies.
+    pub(crate) fn holds(&self, hertz: &[f64]) -> String {
+        let good = self.within_one_percent;
+        let kept = if self.rigid_interfaces { " (with the same rigid interfaces)" } else { "" };
+        let holds = match good {
+            0 => format!("no frequency is within 1 % of the free body's{kept}"),
+            1 => format!("mode 1 ({} Hz) is within 1 % of the free body's{kept}", significant(hertz[0], 5)),
+            _ => format!(
+                "modes 1 to {good} (up to {} Hz) are within 1 % of the free body's{kept}",
+                significant(hertz[good - 1], 5)
+            ),
+        };
+        let Some(own) = hertz.get(good) else { return holds };
+        let most = self.too_high_at_most[good]
+            .map_or_else(String::new, |most| format!(", {} at most", percent(most)));
+        format!(
+            "{holds}; mode {} ({} Hz) is too high by about {}{most}",
+            good + 1,
+            significant(*own, 5),
+            percent(self.too_high[good])
+        )
+    }
+}
+
+/// Returns the eigenvalues of the fixed-interface modes, which stand in the stiffness matrix of the interface coordinates.
+fn fixed_interface_eigenvalues(body: &FlexBody) -> Option<Vec<f64>> {
+    let coordinates = body.coordinates()?;
+    let first = body.certificate().fixed_interface.as_ref()?.interface_motions;
+    Some((first..coordinates.names.len()).map(|i| coordinates.stiffness[(i, i)]).collect())
+}
+
+/// What is proved of the fixed-interface modes of a body.
+pub(super) fn judge(fixed: &FixedInterface, body: &FlexBody) -> (bool, String) {
+    let hertz = |lambda: f64| significant(body.units().frequency_of(lambda.max(0.0)), 5);
+    let modes = counted(fixed.modes, "fixed-interface mode");
+    let Some(count) = fixed.counted else {
+        return (false, format!("NOT PROVED: no inertia count was made of the {modes}"));
+    };
+    let counted_below = format!("inertia count {count} below {} Hz", hertz(fixed.shift));
+    if !fixed.is_proved() {
+        return (false, format!("NOT PROVED: the body has {modes}, but the {counted_below}"));
+    }
+    let proof = match (fixed.modes, fixed.next) {
+        (0, Some(next)) => format!(
+            "static condensation, without fixed-interface modes, of which the first is at {} Hz ({counted_below})",
+            hertz(next)
+        ),
+        (_, Some(next)) => format!("{modes}, of which the next is at {} Hz ({counted_below})", hertz(next)),
+        _ => format!("{modes} below {} Hz (inertia count {count})", hertz(fixed.shift)),
+    };
+    let whole = (fixed.modes + fixed.interface_motions).saturating_sub(body.certificate().rigid_modes);
+    let kept = if body.n_modes() < whole {
+        format!("; {} of {whole} modes of the basis are kept", body.n_modes())
+    } else {
+        String::new()
+    };
+    (true, format!("proved: {proof}{kept}"))
+}

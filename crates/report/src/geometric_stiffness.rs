@@ -1,0 +1,106 @@
+//! Geometric stiffness of a body, or what is without it.
+
+use super::numbers::significant;
+use flexbody_body::flex_body::{FlexBody, LoadKind};
+use flexbody_body::invariants::relative_norm;
+use nalgebra::Matrix3;
+use serde::Serialize;
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct GeometricStiffnessFacts {
+    /// `spin xx`, along body axes.
+    pub load: String,
+    /// By which part of its own a unit of the load changes the stiffness of any motion at the most.
+    pub relative_norm: f64,
+    /// True if the axes of the body are not those of the model.
+    #[serde(skip)]
+    is_turned: bool,
+}
+
+impl GeometricStiffnessFacts {
+    pub(crate) fn of(body: &FlexBody) -> Vec<Self> {
+        let stiffness = body.invariants().modal_stiffness().as_ref();
+        let is_turned = body.frame().axes != Matrix3::identity();
+        body.geometric_stiffness()
+            .iter()
+            .map(|one| Self {
+                load: one.load.to_string(),
+                relative_norm: relative_norm(one.matrix.as_ref(), stiffness).unwrap_or(f64::NAN),
+                is_turned,
+            })
+            .collect()
+    }
+
+    /// `spin xx: up to 1.2e-3 of the stiffness of a motion per unit`; of axes that are not the model's `spin xx (body
+    /// axes): ...`.
+    pub(crate) fn in_words(&self) -> String {
+        format!(
+            "{}{}: up to {} of the stiffness of a motion per unit",
+            self.load,
+            if self.is_turned { " (body axes)" } else { "" },
+            significant(self.relative_norm, 3)
+        )
+    }
+}
+
+/// Motions at which the stiffness of inertia counts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct InertiaStiffnessFacts {
+    /// Spin in hertz, acceleration and angular acceleration of the frame at which it has 1 % of the stiffness of a
+    /// motion, whatever their direction; null where it is zero.
+    pub one_percent_spin_hz: Option<f64>,
+    pub one_percent_acceleration: Option<f64>,
+    pub one_percent_angular_acceleration: Option<f64>,
+    #[serde(skip)]
+    words: String,
+}
+
+impl InertiaStiffnessFacts {
+    pub(crate) fn of(body: &FlexBody) -> Option<Self> {
+        let rates = body.inertia_rates(0.01)?;
+        Some(Self {
+            one_percent_spin_hz: rates.spin_hz,
+            one_percent_acceleration: rates.acceleration,
+            one_percent_angular_acceleration: rates.angular_acceleration,
+            words: rates.in_words(body.units(), |_| true),
+        })
+    }
+
+    /// `of turning nodes: 1 % of a stiffness at a spin of 12.3 Hz, ...`.
+    pub(crate) fn in_words(&self) -> String {
+        match self.words.as_str() {
+            "" => "of turning nodes: none".to_owned(),
+            words => format!("of turning nodes: 1 % of the stiffness of a motion at {words}"),
+        }
+    }
+}
+
+/// Spin about each axis of the model, in hertz, at which the centrifugal term takes 1 % of the stiffness of the
+/// motion that it softens most. Nothing for a body with geometric stiffness for spin, or without W2; no
+/// number where nothing moves across the axis, nor about axes that a plane body does not spin about.
+pub(super) fn softening_hz(body: &FlexBody) -> Option<[Option<f64>; 3]> {
+    let given = body.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);
+    (!given && body.groups().w2).then(|| {
+        [0, 1, 2].map(|axis| {
+            let spins = body.dimension() == 3 || axis == 2;
+            let rate = spins.then(|| body.softening_rate(axis)).flatten();
+            rate.map(|rate| body.units().frequency_of(rate * rate))
+        })
+    })
+}
+
+/// `no geometric stiffness: 1 % softer at 12.5, 80.1, 79.9 Hz (x, y, z of the model)`.
+pub(super) fn softening_in_words(hertz: &[Option<f64>; 3]) -> String {
+    let axes = ["x", "y", "z"].into_iter().zip(hertz);
+    let known: Vec<(&str, f64)> = axes.filter_map(|(axis, hz)| Some((axis, (*hz)?))).collect();
+    if known.is_empty() {
+        return "the centrifugal term softens nothing".to_owned();
+    }
+    let rates: Vec<String> = known.iter().map(|(_, hz)| significant(*hz, 3)).collect();
+    let axes: Vec<&str> = known.iter().map(|(axis, _)| *axis).collect();
+    format!(
+        "no geometric stiffness: 1 % softer at {} Hz ({} of the model)",
+        rates.join(", "),
+        axes.join(", ")
+    )
+}

@@ -1,0 +1,84 @@
+//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two
+//! bodies; simulations; selections; trade studies; frequency responses; audits; the page that shows a body in
+//! motion.
+
+#![deny(
+    clippy::exit,
+    clippy::print_stderr,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used
+)]
+
+mod audit;
+mod bar_chart;
+mod batch;
+mod clusters;
+mod common_modes;
+mod comparison;
+mod comparison_report;
+mod completeness;
+mod craig_bampton;
+mod errors_in_words;
+mod facts;
+mod frequency_chart;
+mod geometric_stiffness;
+mod glossary;
+mod guarantee;
+mod heat_map;
+mod html;
+mod html_body;
+mod html_lumped;
+mod html_modes;
+mod identities;
+mod lacks;
+mod line_chart;
+mod lumped;
+mod lumped_effect;
+mod markup;
+mod mass_properties;
+mod numbers;
+mod output;
+mod picture;
+mod render;
+mod response;
+mod run_data;
+#[cfg(feature = "hdf5")]
+mod scatter_chart;
+mod selection;
+mod selection_cases;
+mod selection_verdict;
+mod simulation;
+mod summary;
+mod term_facts;
+mod text;
+#[cfg(feature = "hdf5")]
+mod trade;
+#[cfg(feature = "hdf5")]
+mod trade_cases;
+#[cfg(feature = "hdf5")]
+mod trade_nodes;
+#[cfg(feature = "hdf5")]
+mod trade_verdict;
+mod unit_names;
+#[cfg(feature = "hdf5")]
+mod view;
+
+pub use audit::{audit_json, audit_text};
+pub use batch::{BatchFacts, BatchRow};
+pub use comparison::{BodyComparison, ComparisonRow, Tolerances, compare, compare_common};
+pub use comparison_report::{ComparisonFormat, ComparisonReport};
+pub use facts::Facts;
+pub use identities::{diagnostics_json, identities_json, identities_text};
+pub use output::output_json;
+pub use render::{Format, render};
+pub use response::{ResponseFacts, response_csv};
+pub use run_data::{LumpedModes, Phase, RunData};
+pub use selection::SelectionFacts;
+pub use simulation::{SimulationFacts, simulation_csv};
+pub use summary::{Screen, summary};
+pub use term_facts::dropped_text;
+#[cfg(feature = "hdf5")]
+pub use trade::{TradeFacts, trade_csv};
+#[cfg(feature = "hdf5")]
+pub use view::View;

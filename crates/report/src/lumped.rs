@@ -1,0 +1,160 @@
+//! What the lumped masses would have cost, ready to be told.
+
+use super::lumped_effect::{LumpedEffect, in_words};
+use super::run_data::LumpedModes;
+use flexbody_body::flex_body::LumpedBody;
+use flexbody_body::invariants::{ERROR_NORMS, Invariants};
+use serde::{Serialize, Serializer};
+use std::collections::{HashMap, HashSet};
+
+/// One error norm and what it measures.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct ErrorNorm {
+    /// `W2_spectral`, ...
+    pub name: String,
+    /// `W2`.
+    pub invariant: String,
+    pub value: f64,
+    /// Its formula; empty for a name that this version does not know.
+    pub meaning: &'static str,
+}
+
+impl ErrorNorm {
+    fn new((name, value): &(String, f64)) -> Self {
+        let meaning = ERROR_NORMS.iter().find(|(known, _)| known == name).map_or("", |(_, meaning)| meaning);
+        Self { name: name.clone(), invariant: invariant_of(name).to_owned(), value: *value, meaning }
+    }
+
+    /// Kind of norm in a word.
+    pub(crate) fn kind(&self) -> &'static str {
+        match self.name.rsplit('_').next() {
+            Some("frobenius") => "Frobenius",
+            Some("spectral") => "spectral",
+            Some("max") => "entry",
+            _ => "relative",
+        }
+    }
+}
+
+/// `I0` of `I0_frobenius`; names without a kind of norm stand for themselves.
+fn invariant_of(name: &str) -> &str {
+    ["_frobenius", "_spectral", "_max"].iter().find_map(|kind| name.strip_suffix(kind)).unwrap_or(name)
+}
+
+/// Names in the order of their first appearance.
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut seen = HashSet::new();
+    names.filter(|name| seen.insert(*name)).collect()
+}
+
+/// Errors by name: an object in JSON, in the order of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Norms(pub Vec<(String, f64)>);
+
+impl Serialize for Norms {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, value)| (name, value)))
+    }
+}
+
+/// Error norms of one scheme, with the worst of all and of each invariant.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Errors {
+    pub worst: Option<ErrorNorm>,
+    pub worst_by_invariant: Vec<ErrorNorm>,
+    pub error_norms: Norms,
+}
+
+impl Errors {
+    fn new(comparison: &[(String, f64)]) -> Self {
+        let mut by_invariant: Vec<ErrorNorm> = Vec::new();
+        let mut places: HashMap<String, usize> = HashMap::new();
+        for norm in comparison.iter().map(ErrorNorm::new) {
+            match places.get(&norm.invariant) {
+                Some(&place) if exceeds(norm.value, by_invariant[place].value) => by_invariant[place] = norm,
+                Some(_) => {}
+                None => {
+                    places.insert(norm.invariant.clone(), by_invariant.len());
+                    by_invariant.push(norm);
+                }
+            }
+        }
+        let worse = |a: ErrorNorm, b: &ErrorNorm| if exceeds(b.value, a.value) { b.clone() } else { a };
+        let worst = by_invariant.split_first().map(|(first, rest)| rest.iter().fold(first.clone(), worse));
+        Self { worst, worst_by_invariant: by_invariant, error_norms: Norms(comparison.to_vec()) }
+    }
+}
+
+/// NaN is worse than any number: an error that is not known must not look small.
+fn exceeds(a: f64, b: f64) -> bool {
+    (a.is_nan() && !b.is_nan()) || a > b
+}
+
+/// Question (a) of theory section 9: the same modes, the invariants from lumped masses.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct LumpedFacts {
+    pub scheme: String,
+    pub mass: f64,
+    pub negative_masses: usize,
+    #[serde(skip)]
+    pub effect: LumpedEffect,
+    #[serde(flatten)]
+    pub errors: Errors,
+}
+
+impl LumpedFacts {
+    pub(crate) fn of(lumped: &LumpedBody, exact: &Invariants) -> Self {
+        Self {
+            scheme: lumped.scheme.clone(),
+            mass: lumped.invariants.mass(),
+            negative_masses: lumped.negative_masses,
+            effect: LumpedEffect::of(exact, &lumped.invariants),
+            errors: Errors::new(&lumped.comparison),
+        }
+    }
+
+    /// What is wrong with it; with `explained`, what the invariants of the modes are for.
+    pub(crate) fn in_words(&self, explained: bool) -> String {
+        let norms = &self.errors.worst_by_invariant;
+        let norms: Vec<(&str, f64)> = norms.iter().map(|n| (n.invariant.as_str(), n.value)).collect();
+        match norms.is_empty() && self.negative_masses == 0 {
+            true => "not compared".to_owned(),
+            false => in_words(self.negative_masses, &self.effect, &norms, explained),
+        }
+    }
+}
+
+/// Question (b): the modes from the lumped masses too.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct LumpedModesFacts {
+    pub scheme: String,
+    pub done: bool,
+    pub remark: String,
+    pub caution: String,
+    pub frequency_hz: Vec<f64>,
+    /// Relative change of the frequency that changes most, in ascending order of each; `None` without modes.
+    pub worst_frequency_change: Option<f64>,
+    /// Mode (from 1) of that frequency.
+    pub worst_frequency_mode: Option<usize>,
+    pub subspace_cosine: f64,
+    #[serde(flatten)]
+    pub errors: Errors,
+}
+
+impl LumpedModesFacts {
+    pub(crate) fn of(lumped: &LumpedModes, exact_hz: &[f64]) -> Self {
+        let changes = lumped.frequencies_hz.iter().zip(exact_hz).map(|(lumped, exact)| lumped / exact - 1.0);
+        let worst = changes.enumerate().reduce(|a, b| if exceeds(b.1.abs(), a.1.abs()) { b } else { a });
+        Self {
+            scheme: lumped.scheme.clone(),
+            done: lumped.remark.is_empty(),
+            remark: lumped.remark.clone(),
+            caution: lumped.caution.clone(),
+            frequency_hz: lumped.frequencies_hz.clone(),
+            worst_frequency_change: worst.map(|(_, change)| change),
+            worst_frequency_mode: worst.map(|(mode, _)| mode + 1),
+            subspace_cosine: lumped.subspace_cosine,
+            errors: Errors::new(&lumped.comparison),
+        }
+    }
+}

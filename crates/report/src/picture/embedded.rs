@@ -1,0 +1,58 @@
+//! A body in a report: drawn to be turned and moved in its modes where scripts run, a still picture where
+//! they do not, and on paper.
+
+use super::arrays::script;
+use super::drawing::Drawing;
+use super::shown::{SCRIPT, ShownBody};
+use super::still::still;
+use crate::numbers::counted;
+use flexbody_body::flex_body::FlexBody;
+
+const PANEL: &str = include_str!("panel.html");
+
+/// Room for positions, shapes and mesh in a report, in bytes: it stays below 4 MB.
+const ROOM: usize = 2_600_000;
+/// Modes that a report moves at the most.
+const MODES: usize = 60;
+
+/// The parts of a report that draw its body.
+pub(crate) struct Embedded {
+    /// Where the body is seen.
+    pub panel: String,
+    /// Elements for the end of the page: numbers and script.
+    pub scripts: String,
+}
+
+impl Embedded {
+    /// `None` for a body that has nothing to draw.
+    pub(crate) fn of(body: &FlexBody) -> Option<Self> {
+        let still = still(body)?;
+        let drawing = Drawing::new(body, None, ROOM, MODES);
+        let shown = ShownBody::<()>::new(body, &drawing, Vec::new(), None);
+        let arrays: String = drawing.arrays().iter().map(script).collect();
+        let panel = PANEL.replace("{{STILL}}", &still).replace("{{DRAWN}}", &drawn(body, &drawing));
+        if drawing.modes() == 0 {
+            return Some(Self { panel, scripts: String::new() });
+        }
+        let scripts = format!(
+            "<script type=\"application/json\" id=\"data\">{}</script>\n{arrays}<script>\n{SCRIPT}</script>\n",
+            shown.json()
+        );
+        Some(Self { panel, scripts })
+    }
+}
+
+/// What is drawn, where that is not all.
+fn drawn(body: &FlexBody, drawing: &Drawing<'_>) -> String {
+    let mut told = vec![match drawing.kind() {
+        "points" => "nodes as points, since the file has no surface".to_owned(),
+        _ => drawing.in_words(),
+    }];
+    if drawing.vertices() < body.n_nodes() {
+        told.push(format!("{} of {}", drawing.vertices(), counted(body.n_nodes(), "node")));
+    }
+    if drawing.modes() < body.n_modes() {
+        told.push(format!("the first {} of {}", drawing.modes(), counted(body.n_modes(), "mode")));
+    }
+    told.join("; ")
+}

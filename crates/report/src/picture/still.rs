@@ -1,0 +1,222 @@
+//! A still picture of a body for print and for pages whose scripts do not run: SVG, drawn from the back to
+//! the front.
+
+use super::drawing::Drawing;
+use super::shown::Placed;
+use flexbody_body::flex_body::FlexBody;
+use nalgebra::{Matrix3, Rotation3, Vector3};
+use std::fmt::Write;
+
+/// Triangles at the most.
+const TRIANGLES: usize = 1800;
+/// Room for the places of nodes without a surface, in bytes: some 1500 points.
+const ROOM: usize = 60_000;
+/// Size on the page, in its own units; the height follows the part.
+const WIDTH: f64 = 560.0;
+const LEAST_HEIGHT: f64 = 200.0;
+const MOST_HEIGHT: f64 = 460.0;
+const MARGIN: f64 = 26.0;
+/// Length of the principal axes, relative to the radius of the drawing.
+const AXIS: f64 = 0.75;
+/// Steps of the page that surfaces are drawn in, for each of its units.
+const FINE: f64 = 5.0;
+/// Steps of the shading.
+const SHADES: f64 = 14.0;
+/// The colour of the part in full light.
+const PART: [f64; 3] = [185.0, 198.0, 214.0];
+
+/// The picture; `None` where there is nothing to draw.
+pub(crate) fn still(body: &FlexBody) -> Option<String> {
+    let drawing = Drawing::new(body, Some(TRIANGLES), ROOM, 0);
+    if drawing.vertices() == 0 {
+        return None;
+    }
+    let placed = Placed::of(body);
+    let view = Projection::onto_page(&drawing, &placed, body.dimension() == 2)?;
+    let mut svg = format!(
+        "<svg class=\"still\" viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"The part, undeformed, with its principal axes of inertia 1, 2 and 3 at the centre of mass and the axes of the model in the corner.\">\n",
+        view.height
+    );
+    match drawing.triangle_corners().is_empty() && drawing.edge_ends().is_empty() {
+        true => points(&mut svg, &drawing, &view),
+        false => surface(&mut svg, &drawing, &view),
+    }
+    principal_axes(&mut svg, &placed, &view);
+    corner(&mut svg, &view);
+    svg.push_str("</svg>\n");
+    Some(svg)
+}
+
+/// From model coordinates to the page, seen as the moving picture is at first.
+struct Projection {
+    turn: Matrix3<f64>,
+    centre: Vector3<f64>,
+    radius: f64,
+    scale: f64,
+    /// Of the page, of the point that the corner of the box around the part is drawn at.
+    shift: [f64; 2],
+    height: f64,
+}
+
+impl Projection {
+    fn onto_page(drawing: &Drawing<'_>, placed: &Placed, plane: bool) -> Option<Self> {
+        let turned = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
+        let turn = match plane {
+            true => turned(Vector3::x_axis(), -0.35),
+            false => turned(Vector3::x_axis(), -1.12) * turned(Vector3::z_axis(), -0.6),
+        };
+        let mut own = Self {
+            turn: turn.into_inner(),
+            centre: drawing.centre().into(),
+            radius: drawing.radius(),
+            scale: 1.0,
+            shift: [0.0; 2],
+            height: 0.0,
+        };
+        let axes = placed.principal.map(|axis| placed.axis_end(&axis, AXIS * own.radius));
+        let seen: Vec<Vector3<f64>> = drawing.places().iter().chain(&axes).map(|x| own.turned(x)).collect();
+        let bound =
+            |k: usize, pick: fn(f64, f64) -> f64, from: f64| seen.iter().map(|p| p[k]).fold(from, pick);
+        let low = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
+        let high = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
+        let [wide, tall] = [0, 1].map(|k| high[k] - low[k]);
+        let room = [WIDTH - 2.0 * MARGIN, MOST_HEIGHT - 2.0 * MARGIN];
+        own.scale = (room[0] / wide).min(room[1] / tall);
+        own.height = (own.scale * tall + 2.0 * MARGIN).max(LEAST_HEIGHT);
+        own.shift = [
+            0.5 * (WIDTH - own.scale * (low[0] + high[0])),
+            0.5 * (own.height + own.scale * (low[1] + high[1])),
+        ];
+        let numbers = [own.scale, own.height, own.shift[0], own.shift[1]];
+        numbers.iter().all(|x| x.is_finite()).then_some(own)
+    }
+
+    /// Relative to the middle of the part, in the axes of the page; the third points to the eye.
+    fn turned(&self, x: &[f64; 3]) -> Vector3<f64> {
+        self.turn * (Vector3::from(*x) - self.centre)
+    }
+
+    fn at(&self, seen: &Vector3<f64>) -> [f64; 2] {
+        [self.shift[0] + self.scale * seen.x, self.shift[1] - self.scale * seen.y]
+    }
+}
+
+/// A piece of the drawing: how far to the front, and how it is painted.
+struct Piece {
+    depth: f64,
+    paint: Paint,
+    path: String,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Paint {
+    Face(u8),
+    Edge,
+}
+
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // colours are from 0 to 255
+/// Triangles and edges from the back to the front; pieces of one paint that follow each other are one path.
+fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
+    let seen: Vec<Vector3<f64>> = drawing.places().iter().map(|x| view.turned(x)).collect();
+    let mut pieces: Vec<Piece> = Vec::new();
+    for corners in drawing.triangle_corners() {
+        let corners = corners.map(|i| seen[i as usize]);
+        let path = path(view, &corners) + "Z";
+        let depth = corners.iter().map(|p| p.z).sum::<f64>() / 3.0;
+        pieces.push(Piece { depth, paint: Paint::Face(shade(&corners)), path });
+    }
+    for ends in drawing.edge_ends() {
+        let ends = ends.map(|i| seen[i as usize]);
+        // An edge lies before the faces that it belongs to.
+        let depth = 0.5 * (ends[0].z + ends[1].z) + 0.02 * view.radius;
+        pieces.push(Piece { depth, paint: Paint::Edge, path: path(view, &ends) });
+    }
+    pieces.sort_by(|a, b| a.depth.total_cmp(&b.depth));
+    let _ = writeln!(svg, "<g class=\"faces\" transform=\"scale({})\">", 1.0 / FINE);
+    let mut rest = pieces.as_slice();
+    while let Some(first) = rest.first() {
+        let count = rest.iter().take_while(|piece| piece.paint == first.paint).count();
+        let (run, behind) = rest.split_at(count);
+        let paths: String = run.iter().map(|piece| piece.path.as_str()).collect();
+        let _ = match first.paint {
+            Paint::Face(shade) => {
+                let light = f64::from(shade) / SHADES;
+                let [r, g, b] = PART.map(|part| (part * light).round() as u8);
+                writeln!(svg, "<path color=\"#{r:02x}{g:02x}{b:02x}\" d=\"{paths}\"/>")
+            }
+            Paint::Edge => writeln!(svg, "<path class=\"edge\" d=\"{paths}\"/>"),
+        };
+        rest = behind;
+    }
+    svg.push_str("</g>\n");
+}
+
+/// `M10 20l5-3`: the first point, and the way to each of the others.
+fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
+    let mut path = String::new();
+    let mut before = [0.0; 2];
+    for (i, point) in points.iter().enumerate() {
+        let at = view.at(point).map(|x| (FINE * x).round());
+        let [x, y] = [0, 1].map(|k| at[k] - before[k]);
+        let _ = match i {
+            0 => write!(path, "M{x} {y}l"),
+            _ => write!(path, "{}{x} {y}", if i == 1 || x < 0.0 { "" } else { " " }),
+        };
+        before = at;
+    }
+    path
+}
+
+/// How bright a triangle is, by its angle to the light.
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 to 1 before
+fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
+    let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
+    let light = Vector3::new(0.25, 0.35, 1.0).normalize();
+    ((0.45 + 0.55 * normal.dot(&light).abs()) * SHADES).round() as u8
+}
+
+/// Nodes as points: those at the back are drawn fainter.
+fn points(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
+    let mut layers = [const { String::new() }; 3];
+    for place in drawing.places() {
+        let seen = view.turned(place);
+        let layer = match seen.z / view.radius {
+            depth if depth < -0.25 => 0,
+            depth if depth < 0.25 => 1,
+            _ => 2,
+        };
+        let [x, y] = view.at(&seen);
+        let _ = write!(layers[layer], "M{x:.1} {y:.1}h0");
+    }
+    let size = if drawing.vertices() > 400 { 2.2 } else { 4.0 };
+    for (layer, path) in layers.iter().enumerate().filter(|(_, path)| !path.is_empty()) {
+        let _ = writeln!(svg, "<path class=\"node n{layer}\" stroke-width=\"{size}\" d=\"{path}\"/>");
+    }
+}
+
+fn principal_axes(svg: &mut String, placed: &Placed, view: &Projection) {
+    let from = view.at(&view.turned(&placed.centre_of_mass));
+    for (k, axis) in placed.principal.iter().enumerate() {
+        let end = placed.axis_end(axis, AXIS * view.radius);
+        arrow(svg, &format!("a{k}"), &(k + 1).to_string(), from, view.at(&view.turned(&end)));
+    }
+}
+
+/// The axes of the model.
+fn corner(svg: &mut String, view: &Projection) {
+    let from = [34.0, view.height - 34.0];
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+        let axis = view.turn.column(k);
+        arrow(svg, "model", name, from, [from[0] + 24.0 * axis[0], from[1] - 24.0 * axis[1]]);
+    }
+}
+
+/// A line with its name at the end.
+fn arrow(svg: &mut String, class: &str, name: &str, [x, y]: [f64; 2], [to_x, to_y]: [f64; 2]) {
+    let away = |from: f64, to: f64| if (to - from).abs() < 1.0 { 0.0 } else { 9.0 * (to - from).signum() };
+    let (near, below) = (to_x + away(x, to_x), to_y + 0.6 * away(y, to_y) + 4.0);
+    let _ = writeln!(
+        svg,
+        "<line class=\"axis {class}\" x1=\"{x:.1}\" y1=\"{y:.1}\" x2=\"{to_x:.1}\" y2=\"{to_y:.1}\"/><text class=\"{class}\" x=\"{near:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{name}</text>"
+    );
+}

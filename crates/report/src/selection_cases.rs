@@ -1,0 +1,105 @@
+//! What a selection for several load cases is in each of them.
+
+use super::errors_in_words::errors_in_words;
+use super::lacks::LackFacts;
+use super::markup::{escape, table};
+use super::numbers::significant;
+use flexbody_body::flex_body::Group;
+use flexbody_motion::scene::OutputErrors;
+use flexbody_study::selection::CaseSelection;
+use serde::Serialize;
+
+/// Facts of a load case.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct CaseFacts<'a> {
+    name: &'a str,
+    tolerance: CaseTolerance,
+    /// Errors of the selected model.
+    errors: Option<OutputErrors>,
+    /// Its largest error over the tolerance.
+    worst: Option<f64>,
+    /// The output that this is of.
+    output: Option<&'static str>,
+    /// What is left of the tolerances.
+    budget: Option<f64>,
+    passed: bool,
+    /// What the selection holds because of this case more than of any other: groups, and `modes`.
+    binds: Vec<&'static str>,
+    /// What the body lacks of the model in this case, and those before it that were enriched.
+    reference: Vec<LackFacts>,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct CaseTolerance {
+    attitude: f64,
+    deflection: f64,
+    stress: f64,
+    reaction: f64,
+}
+
+impl<'a> CaseFacts<'a> {
+    pub(crate) fn new(case: &'a CaseSelection) -> Self {
+        let tolerance = &case.tolerance;
+        let chosen = case.chosen.as_ref();
+        let errors = chosen.and_then(|trial| trial.errors);
+        let groups = case.binds_groups.iter().copied().map(Group::name);
+        Self {
+            name: &case.name,
+            tolerance: CaseTolerance {
+                attitude: tolerance.attitude,
+                deflection: tolerance.deflection,
+                stress: tolerance.stress,
+                reaction: tolerance.reaction,
+            },
+            errors,
+            worst: chosen.map(|trial| trial.worst).filter(|worst| worst.is_finite()),
+            output: errors.map(|errors| errors.decisive(tolerance).0),
+            budget: chosen.map(|trial| trial.budget),
+            passed: chosen.is_none_or(|trial| trial.passed()),
+            binds: groups.chain(case.binds_modes.then_some("modes")).collect(),
+            reference: case.lacks.iter().map(LackFacts::new).collect(),
+        }
+    }
+
+    fn part(&self) -> String {
+        self.worst
+            .map_or_else(|| "not known".to_owned(), |worst| format!("{} %", significant(100.0 * worst, 2)))
+    }
+
+    fn binds_in_words(&self) -> String {
+        if self.binds.is_empty() { "nothing".to_owned() } else { self.binds.join(", ") }
+    }
+
+    fn lacks_in_words(&self) -> String {
+        self.reference.last().map_or_else(|| "not known".to_owned(), LackFacts::parts)
+    }
+
+    /// `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
+    pub(crate) fn in_words(&self) -> String {
+        let binds = match self.binds.is_empty() {
+            true => "decides nothing".to_owned(),
+            false => format!("decides {}", self.binds_in_words()),
+        };
+        match &self.errors {
+            Some(errors) => {
+                let beyond = if self.passed { "" } else { ", too much" };
+                let errors = errors_in_words(errors);
+                format!("{}: {errors}: {} of what is allowed{beyond}; {binds}", self.name, self.part())
+            }
+            None => format!("{}: {binds}", self.name),
+        }
+    }
+}
+
+/// The errors of the selected model in every load case, and what each decides.
+pub(super) fn cases_table(html: &mut String, cases: &[CaseFacts<'_>]) {
+    let head =
+        ["Load case", "Errors", "Of what is allowed", "Decides", "The body lacks of the model (estimated)"];
+    let row = |case: &CaseFacts<'_>| {
+        let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
+        vec![escape(case.name), errors, case.part(), case.binds_in_words(), case.lacks_in_words()]
+    };
+    let rows: Vec<Vec<String>> = cases.iter().map(row).collect();
+    let caption = "The selected model, measured against everything in each load case. A case decides a group or the number of modes where the model without it is furthest beyond what is allowed.";
+    table(html, caption, &head.map(str::to_owned), &[1, 3, 4], &rows);
+}

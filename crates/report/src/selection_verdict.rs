@@ -1,0 +1,189 @@
+//! A selection in five lines: what was asked, what to take, why, the error, and what it saves.
+
+use super::errors_in_words::{errors_in_words, ranges};
+use super::lacks::LackFacts;
+use super::numbers::{counted, significant};
+use flexbody_body::flex_body::Group;
+use flexbody_study::reference::ReferenceError;
+use flexbody_study::selection::{Ground, Selection};
+use serde::Serialize;
+
+/// The five lines.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct SelectionVerdict {
+    /// Whether what was asked for is reached.
+    pub holds: bool,
+    pub asked: String,
+    pub take: String,
+    pub why: String,
+    pub error: String,
+    pub saves: String,
+}
+
+impl SelectionVerdict {
+    pub(crate) fn new(selection: &Selection) -> Self {
+        Self {
+            holds: selection.holds(),
+            asked: asked(selection),
+            take: take(selection),
+            why: why(selection),
+            error: error(selection),
+            saves: saves(selection),
+        }
+    }
+
+    /// With their labels.
+    pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
+        let take = if self.holds { "Take" } else { "Best found" };
+        let lines = [&self.asked, &self.take, &self.why, &self.error, &self.saves].map(String::as_str);
+        let [asked, taken, why, error, saves] = lines;
+        [("Asked", asked), (take, taken), ("Why", why), ("Error", error), ("Saves", saves)]
+    }
+}
+
+/// What a group of terms stands for.
+fn meaning(group: Group) -> &'static str {
+    match group {
+        Group::W1 => "centrifugal load, and inertia that follows the deflection",
+        Group::W2 => "centrifugal softening, and inertia of second order",
+        Group::W3 => "Coriolis and Euler forces on the modes",
+    }
+}
+
+fn per_cent(part: f64) -> String {
+    format!("{} %", significant(100.0 * part, 2))
+}
+
+/// An error of an output in words.
+fn size(output: &str, error: f64) -> String {
+    if output == "attitude" { format!("{} rad", significant(error, 2)) } else { per_cent(error) }
+}
+
+fn asked(selection: &Selection) -> String {
+    if let Some(most) = selection.most_multiplications {
+        return format!(
+            "{}{}: the most accurate of at most {most} multiplications per evaluation",
+            selection.scene,
+            cases_in_words(selection)
+        );
+    }
+    let [attitude, deflection, stress, reaction] = selection.tolerance;
+    format!(
+        "{}{}: errors of at most {} in attitude, {} in deflection, {} in stress, {} in reactions",
+        selection.scene,
+        cases_in_words(selection),
+        size("attitude", attitude),
+        per_cent(deflection),
+        per_cent(stress),
+        per_cent(reaction)
+    )
+}
+
+/// The load cases, and whether the tolerances that are told are the least of theirs.
+fn cases_in_words(selection: &Selection) -> String {
+    let Some(first) = selection.cases.first() else { return String::new() };
+    let names: Vec<&str> = selection.cases.iter().map(|case| case.name.as_str()).collect();
+    let least = if selection.cases.iter().all(|case| case.tolerance == first.tolerance) {
+        ""
+    } else {
+        ", the least of theirs"
+    };
+    format!(" in each of {} load cases ({}){least}", names.len(), names.join(", "))
+}
+
+/// ` in case ...` of what belongs to one of several load cases.
+fn in_case(case: Option<usize>, selection: &Selection) -> String {
+    let case = case.and_then(|at| selection.cases.get(at));
+    case.map_or_else(String::new, |case| format!(" in case {}", case.name))
+}
+
+fn take(selection: &Selection) -> String {
+    let numbers: Vec<usize> = selection.modes.iter().map(|j| j + 1).collect();
+    let frequency = |j: Option<&usize>| significant(j.map_or(0.0, |&j| selection.frequencies_hz[j]), 3);
+    let which = match numbers.len() == selection.n_modes {
+        true => "all".to_owned(),
+        false => format!("of {}: {}", selection.n_modes, ranges(&numbers)),
+    };
+    let (first, last) = (frequency(selection.modes.first()), frequency(selection.modes.last()));
+    let held: Vec<&str> = held_groups(selection).map(Group::name).collect();
+    let groups = match held.is_empty() {
+        true => "the inertia of the undeformed body alone".to_owned(),
+        false => format!("the inertia terms {}", held.join(", ")),
+    };
+    format!("{} ({which}; {first} to {last} Hz) and {groups}", counted(numbers.len(), "mode"))
+}
+
+fn held_groups(selection: &Selection) -> impl Iterator<Item = Group> {
+    Group::ALL.into_iter().filter(|group| selection.groups.has(*group))
+}
+
+/// Groups that rest on the same error stand together.
+fn why(selection: &Selection) -> String {
+    let mut reasons: Vec<(bool, Option<Ground>, Vec<Group>)> = Vec::new();
+    for (term, ground) in selection.terms.iter().zip(&selection.grounds) {
+        match reasons.iter_mut().find(|one| one.0 == term.kept && one.1 == *ground) {
+            Some(known) => known.2.push(term.group),
+            None => reasons.push((term.kept, *ground, vec![term.group])),
+        }
+    }
+    reasons.sort_by_key(|reason| !reason.0);
+    let parts = reasons.iter().map(|(kept, ground, groups)| {
+        let case = in_case(ground.and_then(|ground| ground.case), selection);
+        reason(*kept, *ground, groups) + &case
+    });
+    parts.collect::<Vec<_>>().join("; ")
+}
+
+fn reason(kept: bool, ground: Option<Ground>, groups: &[Group]) -> String {
+    let names: Vec<String> =
+        groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
+    let names = names.join(" and ");
+    let Some(Ground { output, error, tier, .. }) = ground else {
+        let known = if kept { "stays: nothing shows that it may go" } else { "is not in the body" };
+        return format!("{names} {known}");
+    };
+    let error = size(output, error);
+    match (kept, tier) {
+        (true, 2) => format!("without {names} the {output} is off by {error}"),
+        (true, _) => format!("without {names} the {output} may be off by {error}"),
+        (false, 2) => format!("without {names} it is off by {error} in {output}"),
+        (false, _) => {
+            format!(
+                "without {names} it is off by no more than {error} in {output}, which needs no simulation"
+            )
+        }
+    }
+}
+
+fn error(selection: &Selection) -> String {
+    let own = selection.lacks.last();
+    let lacks = match own {
+        Some(own) => {
+            let much =
+                if ReferenceError::is_reference(own) { "" } else { ", too much to be measured against" };
+            format!(
+                "; the body with all its modes lacks {} of the FE model (estimated){much}",
+                LackFacts::new(own).parts()
+            )
+        }
+        None => String::new(),
+    };
+    match selection.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
+        Some(errors) => {
+            let case = in_case(selection.chosen.as_ref().and_then(|chosen| chosen.case), selection);
+            let worst = if case.is_empty() { "" } else { ", where it is worst" };
+            format!("{}, measured over the run{case}{worst}{lacks}", errors_in_words(errors))
+        }
+        None => format!("nothing was simulated{lacks}"),
+    }
+}
+
+fn saves(selection: &Selection) -> String {
+    let Some(chosen) = &selection.chosen else { return "not measured".to_owned() };
+    let ratio = selection.multiplications as f64 / chosen.multiplications as f64;
+    let (own, all) = (chosen.multiplications, selection.multiplications);
+    if own == all {
+        return "nothing: the scene needs the whole body".to_owned();
+    }
+    format!("{own} multiplications per evaluation instead of {all}: {} times fewer", significant(ratio, 2))
+}

@@ -1,0 +1,502 @@
+//! What a user reads of a simulation: facts, the summary, the table and the page with plots.
+
+use super::Format;
+use super::facts::UnitFacts;
+use super::line_chart::{Line, STYLES, line_chart};
+use super::markup::{diagnostics_table, escape, page, printed, section, terms};
+use super::numbers::{counted, significant};
+use super::render::json;
+use super::run_data::RunData;
+use super::text::{Page, diagnostics_lines};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::provenance::generator;
+use flexbody_base::units::UnitSystem;
+use flexbody_linalg::larger;
+use flexbody_motion::dynamics::Balance;
+use flexbody_motion::integration::Work;
+use flexbody_motion::scene::{Drift, Path, Recording, Scheme};
+use nalgebra::Vector3;
+use serde::Serialize;
+use std::f64::consts::TAU;
+use std::fmt::Write;
+
+/// Facts of a simulation, and its recording.
+#[derive(Debug, Clone, Serialize)]
+pub struct SimulationFacts<'a> {
+    generator: String,
+    scene: &'a str,
+    body: &'a str,
+    units: UnitFacts,
+    method: MethodFacts,
+    duration: f64,
+    instants: usize,
+    steps: u64,
+    rejected_steps: u64,
+    evaluations: u64,
+    energy_drift: f64,
+    linear_momentum_drift: f64,
+    angular_momentum_drift: f64,
+    first: EnergyFacts,
+    last: EnergyFacts,
+    largest_spin: f64,
+    /// Axes of the model, turning with the body.
+    largest_spin_components: [f64; 3],
+    /// Axes of the model at the start.
+    gravity: Option<[f64; 3]>,
+    /// What carries the body, and its natural frequencies so.
+    carried: Option<CarriedFacts<'a>>,
+    /// Description of the origin of the frame.
+    frame_origin: String,
+    largest_deflection: f64,
+    /// Force and torque that prescribed motion takes at most; none without such.
+    reaction: Option<ReactionFacts>,
+    /// The torque that the reference conditions carry at most at the instants written; none where the frame
+    /// is not a mean one.
+    largest_conditions_torque: Option<f64>,
+    points: Vec<PointFacts<'a>>,
+    diagnostics: &'a [Diagnostic],
+    wall_seconds: f64,
+    cpu_seconds: f64,
+    #[serde(skip)]
+    recording: &'a Recording,
+}
+
+#[derive(Debug, Clone, Serialize)]
+#[serde(tag = "name", rename_all = "lowercase")]
+enum MethodFacts {
+    Adaptive { order: usize, tolerance: f64 },
+    Conserving { order: usize, step: f64 },
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct CarriedFacts<'a> {
+    by: &'a str,
+    frequency_hz: Vec<f64>,
+    largest_force: f64,
+    largest_torque: f64,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct ReactionFacts {
+    largest_force: f64,
+    largest_torque: f64,
+}
+
+#[derive(Debug, Clone, Copy, Serialize)]
+struct EnergyFacts {
+    kinetic: f64,
+    elastic: f64,
+    work: f64,
+}
+
+#[derive(Debug, Clone, Serialize)]
+struct PointFacts<'a> {
+    name: &'a str,
+    largest_deflection: f64,
+    /// World axes; so are the velocity and the acceleration.
+    last_place: [f64; 3],
+    last_velocity: [f64; 3],
+    last_acceleration: [f64; 3],
+    /// At the instants written.
+    largest_speed: f64,
+    largest_acceleration: f64,
+}
+
+impl<'a> PointFacts<'a> {
+    fn new(path: &'a Path, largest_deflection: f64) -> Self {
+        let last = |vectors: &[Vector3<f64>]| vectors.last().copied().unwrap_or_default().into();
+        Self {
+            name: &path.name,
+            largest_deflection,
+            last_place: last(&path.place),
+            last_velocity: last(&path.velocity),
+            last_acceleration: last(&path.acceleration),
+            largest_speed: longest(&path.velocity),
+            largest_acceleration: longest(&path.acceleration),
+        }
+    }
+}
+
+/// The length of the longest vector.
+fn longest(vectors: &[Vector3<f64>]) -> f64 {
+    vectors.iter().fold(0.0, |most, vector| larger(most, vector.norm()))
+}
+
+impl<'a> SimulationFacts<'a> {
+    /// Facts of a recording whose numbers are in `units`, and of the run that made it.
+    pub fn new(recording: &'a Recording, units: &UnitSystem, run: &'a RunData) -> Self {
+        let Drift { energy, linear, angular } = recording.drift();
+        let Work { steps, rejected, rates } = recording.work;
+        let energies = |balance: Option<&Balance>| {
+            let part = |value: fn(&Balance) -> f64| balance.map_or(0.0, value);
+            EnergyFacts { kinetic: part(|b| b.kinetic), elastic: part(|b| b.elastic), work: part(|b| b.work) }
+        };
+        let extremes = &recording.extremes;
+        let setting = &recording.setting;
+        let hertz = |lambda: &f64| lambda.max(0.0).sqrt() / TAU * units.hertz();
+        let carried = setting.carrier.as_deref().map(|by| CarriedFacts {
+            by,
+            frequency_hz: setting.eigenvalues.iter().map(hertz).collect(),
+            largest_force: extremes.reaction.0,
+            largest_torque: extremes.reaction.1,
+        });
+        let points = recording.paths.iter().zip(&extremes.watched);
+        let reaction = recording.reactions.as_ref().map(|_| ReactionFacts {
+            largest_force: extremes.reaction.0,
+            largest_torque: extremes.reaction.1,
+        });
+        Self {
+            generator: generator(),
+            scene: &recording.scene,
+            body: &recording.body,
+            units: UnitFacts::new(units),
+            method: match recording.scheme {
+                Scheme::Adaptive { tolerance } => MethodFacts::Adaptive { order: 8, tolerance },
+                Scheme::Conserving { order, step } => {
+                    MethodFacts::Conserving { order, step: step.unwrap_or(f64::NAN) }
+                }
+            },
+            duration: recording.time.last().copied().unwrap_or(0.0),
+            instants: recording.time.len(),
+            steps,
+            rejected_steps: rejected,
+            evaluations: rates,
+            energy_drift: energy,
+            linear_momentum_drift: linear,
+            angular_momentum_drift: angular,
+            first: energies(recording.balances.first()),
+            last: energies(recording.balances.last()),
+            largest_spin: extremes.spin,
+            largest_deflection: extremes.deflection.value,
+            largest_spin_components: extremes.spin_about.into(),
+            gravity: setting.gravity.map(Into::into),
+            carried,
+            frame_origin: setting.origin_in_words(),
+            reaction,
+            largest_conditions_torque: recording.conditions.as_deref().map(longest),
+            points: points.map(|(path, peak)| PointFacts::new(path, peak.value)).collect(),
+            diagnostics: &run.diagnostics,
+            wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
+            cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
+            recording,
+        }
+    }
+
+    /// The facts in a format, ending with a line break.
+    pub fn render(&self, format: Format) -> String {
+        match format {
+            Format::Json => json(self),
+            Format::Text => self.text(),
+            Format::Html => self.html(),
+        }
+    }
+
+    fn method_in_words(&self) -> String {
+        match self.method {
+            MethodFacts::Adaptive { order, tolerance } => {
+                format!("adaptive, order {order}, tolerance {tolerance:e}")
+            }
+            MethodFacts::Conserving { order, step } => {
+                format!("conserving, order {order}, step {} {}", significant(step, 4), self.units.time())
+            }
+        }
+    }
+
+    fn work_in_words(&self) -> String {
+        let rejected = if self.rejected_steps > 0 {
+            format!(", {} rejected", self.rejected_steps)
+        } else {
+            String::new()
+        };
+        format!("{}{rejected}, {} evaluations", counted(self.steps as usize, "step"), self.evaluations)
+    }
+
+    fn energy_in_words(&self, energy: &EnergyFacts) -> String {
+        let unit = self.units.energy();
+        format!(
+            "kinetic {} + elastic {} {unit}",
+            significant(energy.kinetic, 6),
+            significant(energy.elastic, 6)
+        )
+    }
+
+    fn gravity_in_words(&self) -> Option<String> {
+        let [x, y, z] = self.gravity?.map(|g| significant(g, 6));
+        let turned = if self.largest_spin > 0.0 { " at the start" } else { "" };
+        Some(format!("{x}, {y}, {z} {} along the axes of the model{turned}", self.units.acceleration()))
+    }
+
+    fn spin_in_words(&self) -> String {
+        let most = format!("{} rad/{}", significant(self.largest_spin, 5), self.units.time());
+        if self.largest_spin == 0.0 {
+            return most;
+        }
+        let [x, y, z] = self.largest_spin_components.map(|w| significant(w, 5));
+        format!("{most}; at most {x}, {y}, {z} about the axes of the model")
+    }
+
+    /// What carries the body, and what that and the reference conditions have to bear.
+    fn support_in_words(&self) -> Vec<(&'static str, String)> {
+        let torque = |value: f64| format!("{} {}", significant(value, 5), self.units.torque());
+        let mut words = Vec::from_iter(self.carried_in_words().map(|carried| ("Carried", carried)));
+        if let Some(ReactionFacts { largest_force, largest_torque }) = self.reaction {
+            let force = format!("{} {}", significant(largest_force, 5), self.units.force());
+            let torque = torque(largest_torque);
+            words.push(("Reaction", format!("force at most {force}, torque at most {torque}")));
+        }
+        if let Some(largest) = self.largest_conditions_torque {
+            words.push((
+                "Mean axes",
+                format!("are held by no force and a torque of at most {}", torque(largest)),
+            ));
+        }
+        words
+    }
+
+    fn carried_in_words(&self) -> Option<String> {
+        const FIRST: usize = 6;
+        let carried = self.carried.as_ref()?;
+        let first: Vec<String> =
+            carried.frequency_hz.iter().take(FIRST).map(|hertz| significant(*hertz, 5)).collect();
+        let more = if carried.frequency_hz.len() > FIRST { " ..." } else { "" };
+        Some(format!("by {}; natural frequencies so {}{more} Hz", carried.by, first.join(" ")))
+    }
+
+    fn text(&self) -> String {
+        let mut page = Page(String::new());
+        let duration = significant(self.duration, 6);
+        let instants = counted(self.instants, "instant");
+        page.entry(
+            "Simulation",
+            &format!("{}: {}, {duration} {}, {instants}", self.scene, self.body, self.units.time()),
+        );
+        page.entry("Method", &format!("{}: {}", self.method_in_words(), self.work_in_words()));
+        page.entry("Energy", &format!("{} at the start", self.energy_in_words(&self.first)));
+        page.entry("", &format!("{} at the end", self.energy_in_words(&self.last)));
+        if self.last.work != 0.0 {
+            let work = significant(self.last.work, 6);
+            page.entry("", &format!("work of loads and damping {work} {}", self.units.energy()));
+        }
+        page.entry(
+            "Drift",
+            &format!(
+                "energy {:.1e}, linear momentum {:.1e}, angular momentum {:.1e}",
+                self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift
+            ),
+        );
+        if let Some(gravity) = self.gravity_in_words() {
+            page.entry("Gravity", &gravity);
+        }
+        page.entry("Spin", &format!("at most {}", self.spin_in_words()));
+        for (what, words) in self.support_in_words() {
+            page.entry(what, &words);
+        }
+        let part = significant(100.0 * self.largest_deflection, 3);
+        page.entry("Deflection", &format!("{part} % of the largest extent of the body"));
+        for point in &self.points {
+            let [x, y, z] = point.last_place.map(|v| significant(v, 6));
+            let deflection = significant(point.largest_deflection, 4);
+            let length = &self.units.length();
+            page.entry(
+                "Point",
+                &format!(
+                    "{}: ends at {x}, {y}, {z} {length}, deflected by at most {deflection} {length}",
+                    point.name
+                ),
+            );
+        }
+        let (wall, cpu) = (self.wall_seconds, self.cpu_seconds);
+        page.entry(
+            "Time",
+            &format!("{} wall, {} CPU", super::numbers::duration(wall), super::numbers::duration(cpu)),
+        );
+        diagnostics_lines(&mut page, self.diagnostics);
+        page.0
+    }
+
+    fn html(&self) -> String {
+        let mut html = String::new();
+        let small = |drift: f64| format!("{drift:.1e}");
+        let _ = writeln!(
+            html,
+            "<p class=\"verdict\"><strong>Energy drift {}, momentum drift {} (linear), {} (angular).</strong> {}: {}.</p>",
+            small(self.energy_drift),
+            small(self.linear_momentum_drift),
+            small(self.angular_momentum_drift),
+            escape(&self.method_in_words()),
+            self.work_in_words()
+        );
+        section(&mut html, "Motion");
+        let mut items = vec![
+            ("Body", escape(self.body)),
+            (
+                "Duration",
+                format!(
+                    "{} {}, {}",
+                    significant(self.duration, 6),
+                    escape(&self.units.time()),
+                    counted(self.instants, "instant")
+                ),
+            ),
+            ("Energy at the start", printed(&self.energy_in_words(&self.first))),
+            ("Energy at the end", printed(&self.energy_in_words(&self.last))),
+            (
+                "Work of loads and damping",
+                format!("{} {}", significant(self.last.work, 6), printed(&self.units.energy())),
+            ),
+            ("Largest spin", escape(&self.spin_in_words())),
+            (
+                "Largest deflection",
+                format!(
+                    "{} % of the largest extent of the body",
+                    significant(100.0 * self.largest_deflection, 3)
+                ),
+            ),
+        ];
+        items.extend(self.gravity_in_words().map(|gravity| ("Gravity", printed(&gravity))));
+        items.extend(self.support_in_words().into_iter().map(|(what, words)| (what, printed(&words))));
+        for point in &self.points {
+            let [x, y, z] = point.last_place.map(|v| significant(v, 6));
+            items.push((
+                "Point",
+                format!(
+                    "{}, deflected by at most {} {length}; ends at {x}, {y}, {z} {length}",
+                    escape(point.name),
+                    significant(point.largest_deflection, 4),
+                    length = escape(&self.units.length())
+                ),
+            ));
+        }
+        terms(&mut html, items);
+        section(&mut html, "Plots");
+        self.plots(&mut html);
+        diagnostics_table(&mut html, self.diagnostics);
+        page(self.scene, "Simulation of a flexible body", &self.generator, &html)
+    }
+
+    fn plots(&self, html: &mut String) {
+        let Recording { time, states, balances, paths, reactions, .. } = self.recording;
+        let mut chart = |title: &str, lines: Vec<Line>, unit: String| {
+            html.push_str(&line_chart(title, time, &lines, &self.units.time(), &unit));
+        };
+        let line = |name: &str, values: Vec<f64>| Line { name: name.to_owned(), values };
+        let components = |vectors: &[Vector3<f64>]| -> Vec<Line> {
+            (0..3).map(|k| line(["x", "y", "z"][k], vectors.iter().map(|v| v[k]).collect())).collect()
+        };
+        let energy = self.units.energy();
+        let along = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
+        let internal = vec![
+            line("kinetic, no flight", along(|b| b.kinetic - b.flight)),
+            line("elastic", along(|b| b.elastic)),
+            line("work", along(|b| b.work)),
+        ];
+        chart("Energy", internal, energy.clone());
+        let first = balances.first().map_or(0.0, |b| b.kinetic + b.elastic);
+        let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
+        chart("Drift of the energy", vec![line("less work", lost)], energy);
+        let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
+        chart(
+            "Angular velocity, axes of the model",
+            components(&omega),
+            format!("rad/{}", self.units.time()),
+        );
+        chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
+        for path in paths {
+            let title = format!("Deflection of {}, axes of the model", path.name);
+            chart(&title, components(&path.deflection), self.units.length().clone());
+            let title = format!("Acceleration of {}, world axes", path.name);
+            chart(&title, components(&path.acceleration), self.units.acceleration());
+        }
+        if let Some(reactions) = reactions {
+            let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
+            chart(
+                "Torque of the prescribed motion, axes of the model",
+                components(&torques),
+                self.units.torque(),
+            );
+        }
+    }
+
+    fn modal_unit(&self) -> String {
+        format!("{}^(1/2) {}", self.units.mass(), self.units.length())
+    }
+
+    /// The modal coordinates with the largest amplitudes.
+    fn liveliest(&self) -> Vec<Line> {
+        let states = &self.recording.states;
+        let nf = states.first().map_or(0, |state| state.q.len());
+        let peak = |j: usize| states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
+        let mut modes: Vec<(usize, f64)> = (0..nf).map(|j| (j, peak(j))).collect();
+        modes.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let line = |&(j, _): &(usize, f64)| Line {
+            name: format!("mode {}", j + 1),
+            values: states.iter().map(|state| state.q[j]).collect(),
+        };
+        modes.iter().take(STYLES).map(line).collect()
+    }
+}
+
+/// A recording as a table of comma-separated values, a row for every instant; numbers round-trip.
+pub fn simulation_csv(recording: &Recording) -> String {
+    let Recording { time, states, balances, paths, reactions, conditions, .. } = recording;
+    let nf = states.first().map_or(0, |state| state.q.len());
+    let mut head = vec!["time".to_owned()];
+    let xyz = |name: &str| ["x", "y", "z"].map(|k| format!("{name}_{k}"));
+    head.extend(xyz("origin"));
+    head.extend((0..4).map(|k| format!("attitude_{k}")));
+    head.extend(xyz("velocity"));
+    head.extend(xyz("angular_velocity"));
+    head.extend((1..=nf).map(|j| format!("q_{j}")));
+    head.extend((1..=nf).map(|j| format!("qd_{j}")));
+    head.extend(["kinetic", "elastic", "work"].map(str::to_owned));
+    head.extend(["linear_momentum", "angular_momentum"].iter().flat_map(|name| xyz(name)));
+    if reactions.is_some() {
+        head.extend(["reaction_force", "reaction_torque"].iter().flat_map(|name| xyz(name)));
+    }
+    if conditions.is_some() {
+        head.extend(xyz("conditions_torque"));
+    }
+    for path in paths {
+        for what in ["place", "deflection", "velocity", "acceleration"] {
+            head.extend(xyz(&format!("{} {what}", path.name)));
+        }
+    }
+    let mut out = head.iter().map(|cell| csv_cell(cell)).collect::<Vec<_>>().join(",");
+    for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
+        let mut row = vec![*time];
+        row.extend(&state.origin);
+        row.extend(state.attitude.0);
+        row.extend(&state.velocity);
+        row.extend(&state.omega);
+        row.extend(&state.q);
+        row.extend(&state.qd);
+        row.extend([balance.kinetic, balance.elastic, balance.work]);
+        row.extend(&balance.linear);
+        row.extend(&balance.angular);
+        if let Some(reactions) = reactions {
+            row.extend(&reactions[i].0);
+            row.extend(&reactions[i].1);
+        }
+        if let Some(torques) = conditions {
+            row.extend(&torques[i]);
+        }
+        for path in paths {
+            for vectors in [&path.place, &path.deflection, &path.velocity, &path.acceleration] {
+                row.extend(&vectors[i]);
+            }
+        }
+        out.push('\n');
+        out.push_str(&row.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(","));
+    }
+    out.push('\n');
+    out
+}
+
+/// Names are data: quoted where they hold what separates.
+pub(super) fn csv_cell(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}

@@ -1,0 +1,109 @@
+//! What the load cases of a trade study are to its candidates.
+
+use super::errors_in_words::errors_in_words;
+use super::lacks::LackFacts;
+use super::markup::{escape, table};
+use super::numbers::{counted, plain, significant};
+use super::trade_nodes::NodalFacts;
+use flexbody_motion::scene::{OutputErrors, Tolerance};
+use flexbody_study::reference::ReferenceError;
+use flexbody_study::trade::{InCase, Trade};
+use serde::Serialize;
+
+/// Facts of a load case.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct TradeCaseFacts<'a> {
+    name: &'a str,
+    tolerance: Tolerance,
+    /// Errors of the recommended candidate.
+    errors: Option<OutputErrors>,
+    /// Its largest error over the tolerance.
+    worst: Option<f64>,
+    /// The output that this is of.
+    output: Option<&'static str>,
+    /// Part of the tolerances that the reference leaves to candidates.
+    budget: f64,
+    /// Number of the row to take if there were no other case.
+    alone: Option<usize>,
+    /// Cheaper candidates than the recommended one that are beyond the tolerances here, and those of them
+    /// that no other case rules out.
+    ruled_out: usize,
+    ruled_out_alone: usize,
+    /// How the equations of all nodes were integrated, where they are the reference.
+    nodal: Option<NodalFacts>,
+    /// What the body of row 1, and those before it that were enriched, lack of the model in this case.
+    reference_lacks: Vec<LackFacts>,
+}
+
+/// The load cases of a study; none of a scene alone.
+pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) -> Vec<TradeCaseFacts<'a>> {
+    let taken = trade.recommended.row().and_then(|row| trade.rows[row].outcome.as_ref().ok());
+    let of = |(at, case): (usize, &'a flexbody_study::trade::TradeCase)| {
+        let own: Option<&InCase> = taken.map(|measured| &measured.by_case[at]);
+        let rounds = lacks.get(at).map_or(&[][..], Vec::as_slice);
+        Some(TradeCaseFacts {
+            name: case.name.as_deref()?,
+            tolerance: case.tolerance,
+            errors: own.map(|own| own.errors),
+            worst: own.map(|own| own.worst),
+            output: own.map(|own| own.errors.decisive(&case.tolerance).0),
+            budget: (1.0 - case.reserved).max(0.0),
+            alone: case.alone.row().map(|row| row + 1),
+            ruled_out: case.ruled_out,
+            ruled_out_alone: case.ruled_out_alone,
+            nodal: case.nodal.as_ref().map(NodalFacts::new),
+            reference_lacks: rounds.iter().map(LackFacts::new).collect(),
+        })
+    };
+    trade.cases.iter().enumerate().filter_map(of).collect()
+}
+
+impl TradeCaseFacts<'_> {
+    fn part(&self) -> String {
+        self.worst
+            .map_or_else(|| "not known".to_owned(), |worst| format!("{} %", significant(100.0 * worst, 2)))
+    }
+
+    /// `rules out 12 cheaper candidates, 3 of them alone`.
+    fn decides(&self) -> String {
+        match self.ruled_out {
+            0 => "rules out nothing cheaper".to_owned(),
+            count => {
+                let count = counted(count, "cheaper candidate");
+                format!("rules out {count}, {} of them alone", self.ruled_out_alone)
+            }
+        }
+    }
+
+    fn alone(&self, names: &[String]) -> String {
+        self.alone.map_or_else(|| "nothing".to_owned(), |row| names[row - 1].clone())
+    }
+
+    /// `braking: stress 1.2 %: 60 % of what is allowed; rules out ...; alone it takes 6 modes, W1`.
+    pub(crate) fn in_words(&self, names: &[String]) -> String {
+        let errors = self.errors.as_ref().map_or_else(String::new, |errors| {
+            format!("{}: {} of what is allowed; ", errors_in_words(errors), self.part())
+        });
+        format!("{}: {errors}{}; alone it takes {}", plain(self.name), self.decides(), self.alone(names))
+    }
+}
+
+/// The errors of the recommended candidate in every load case, and what each decides.
+pub(super) fn cases_table(html: &mut String, cases: &[TradeCaseFacts<'_>], names: &[String]) {
+    let head = [
+        "Load case",
+        "Errors",
+        "Of what is allowed",
+        "Decides",
+        "Takes alone",
+        "The reference lacks (estimated)",
+    ];
+    let row = |case: &TradeCaseFacts<'_>| {
+        let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
+        let lacks = case.reference_lacks.last().map_or_else(|| "not known".to_owned(), LackFacts::parts);
+        vec![escape(case.name), errors, case.part(), case.decides(), case.alone(names), lacks]
+    };
+    let rows: Vec<Vec<String>> = cases.iter().map(row).collect();
+    let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors are beyond its tolerances; what it takes alone is the cheapest candidate that is within them.";
+    table(html, caption, &head.map(str::to_owned), &[1, 3, 4, 5], &rows);
+}

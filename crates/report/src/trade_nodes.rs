@@ -1,0 +1,47 @@
+//! How the equations of all nodes were integrated for a trade study.
+
+use super::numbers::significant;
+use flexbody_motion::scene::Scheme;
+use flexbody_study::trade::NodalIntegration;
+use serde::Serialize;
+
+/// How the equations of all nodes were integrated.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub(super) struct NodalFacts {
+    rows: usize,
+    /// None: of order 8 with error control.
+    order: Option<usize>,
+    tolerance: Option<f64>,
+    step: Option<f64>,
+    steps: u64,
+    error: Option<f64>,
+}
+
+impl NodalFacts {
+    pub(crate) fn new(nodal: &NodalIntegration) -> Self {
+        let (order, tolerance, step) = match nodal.scheme {
+            Scheme::Adaptive { tolerance } => (None, Some(tolerance), None),
+            Scheme::Conserving { order, step } => (Some(order), None, step),
+        };
+        Self { rows: nodal.rows, order, tolerance, step, steps: nodal.steps, error: nodal.error }
+    }
+
+    pub(crate) fn in_words(&self) -> String {
+        let how = match (self.order, self.step, self.tolerance) {
+            (Some(order), Some(step), _) => {
+                format!("implicit steps of order {order}, of {} at most", significant(step, 3))
+            }
+            (_, _, tolerance) => {
+                format!("explicit steps, tolerance {}", significant(tolerance.unwrap_or(0.0), 2))
+            }
+        };
+        let worth = match self.error {
+            Some(error) => {
+                let part = significant(100.0 * error, 2);
+                format!("; steps twice as long change it by {part} % of the tolerances")
+            }
+            None => String::new(),
+        };
+        format!("{} rows, {} {how}{worth}", self.rows, self.steps)
+    }
+}

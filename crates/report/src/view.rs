@@ -1,0 +1,168 @@
+//! The page that shows a body in motion: one file with everything in it, drawn by WebGL. What is drawn is
+//! decided and computed here; the script of the page turns it.
+
+mod motion;
+
+use super::Format;
+use super::facts::UnitFacts;
+use super::numbers::{bytes, counted, plain, significant};
+use super::picture::{Drawing, HALF_STEP, Packed, SCRIPT, ShownBody, script};
+use super::render::json;
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_file::RecordedMotion;
+use motion::ShownMotion;
+use serde::Serialize;
+
+const PAGE: &str = include_str!("view/page.html");
+const STYLE: &str = include_str!("view/view.css");
+
+/// Room for positions, shapes and mesh in a page, in bytes: with the motion of a simulation and the script a
+/// page stays below 10 MB.
+const ROOM: usize = 7_000_000;
+
+/// What a page shows, computed.
+#[derive(Debug, Clone)]
+pub struct View {
+    facts: ViewFacts,
+    page: String,
+}
+
+/// What was put into a page, for the terminal and for programs.
+#[derive(Debug, Clone, Serialize)]
+struct ViewFacts {
+    model: String,
+    modes: usize,
+    /// `surface`, `lines` or `points`.
+    drawn: &'static str,
+    nodes: usize,
+    drawn_nodes: usize,
+    triangles: usize,
+    edges: usize,
+    /// Half a step of the 16-bit positions. Unit: length.
+    position_error: f64,
+    /// Half a step of the 16-bit shapes, relative to the largest component of each mode.
+    shape_error: f64,
+    /// Instants of the simulation that the page has; none without one.
+    instants: Option<usize>,
+    bytes: usize,
+}
+
+impl View {
+    /// The page about `body`, with at most so many `triangles`, or as many as keep it below 10 MB; with the
+    /// motion of a simulation instead of its modes, where there is one.
+    ///
+    /// # Errors
+    /// FB735 for the motion of another body; those of [`FlexBody::carried`].
+    pub fn new(body: &FlexBody, triangles: Option<usize>, motion: Option<&RecordedMotion>) -> Result<Self> {
+        let staged = motion.map(|motion| motion.staged(body)).transpose()?;
+        let body = staged.as_ref().unwrap_or(body);
+        let drawing = Drawing::new(body, triangles, ROOM, usize::MAX);
+        let shown = motion.map(|motion| ShownMotion::new(motion, body));
+        let mut arrays = drawing.arrays();
+        arrays.extend(shown.iter().flat_map(ShownMotion::arrays));
+        let told = terms(body, &drawing, shown.as_ref());
+        let data = ShownBody::new(body, &drawing, told, shown.as_ref());
+        let mut facts = ViewFacts {
+            model: body.source().name.clone(),
+            modes: body.n_modes(),
+            drawn: drawing.kind(),
+            nodes: body.n_nodes(),
+            drawn_nodes: drawing.vertices(),
+            triangles: drawing.triangles(),
+            edges: drawing.edges(),
+            position_error: drawing.position_error(),
+            shape_error: HALF_STEP,
+            instants: shown.as_ref().map(ShownMotion::instants),
+            bytes: 0,
+        };
+        let page = page(&facts.model, &data, &arrays);
+        facts.bytes = page.len();
+        Ok(Self { facts, page })
+    }
+
+    /// The page.
+    pub fn html(&self) -> &str {
+        &self.page
+    }
+
+    /// What was drawn.
+    pub fn render(&self, format: Format) -> String {
+        match format {
+            Format::Json => json(&self.facts),
+            Format::Html => self.page.clone(),
+            Format::Text => self.facts.text(),
+        }
+    }
+}
+
+impl ViewFacts {
+    fn text(&self) -> String {
+        let what = match self.drawn {
+            "surface" => format!("{} of the surface", counted(self.triangles, "triangle")),
+            "lines" => counted(self.edges, "line"),
+            _ => "points".to_owned(),
+        };
+        let moving = match self.instants {
+            Some(instants) => format!("a simulation of {}", counted(instants, "instant")),
+            None => counted(self.modes, "mode"),
+        };
+        format!(
+            "{}: {what} on {} of {}, {moving}, {}\n",
+            plain(&self.model),
+            self.drawn_nodes,
+            counted(self.nodes, "node"),
+            bytes(self.bytes as u64)
+        )
+    }
+}
+
+/// What the page says of the body.
+fn terms(
+    body: &FlexBody,
+    drawing: &Drawing<'_>,
+    motion: Option<&ShownMotion>,
+) -> Vec<(&'static str, String)> {
+    let units = UnitFacts::new(body.units());
+    let drawn = match drawing.vertices() {
+        all if all == body.n_nodes() => format!("all {}", counted(all, "node")),
+        some => format!("{some} of {}", counted(body.n_nodes(), "node")),
+    };
+    let mut terms = vec![
+        ("Mass", format!("{} {}", significant(body.invariants().mass(), 6), units.mass())),
+        ("Drawn", drawn),
+        ("Surface", drawing.in_words()),
+        (
+            "Rounded",
+            format!(
+                "places to {} {}, shapes to 1/65534 of the largest of each mode",
+                significant(drawing.position_error(), 2),
+                units.length()
+            ),
+        ),
+    ];
+    if let Some(motion) = motion {
+        terms.push(("Scene", plain(motion.scene())));
+        terms.push(("Instants", motion.in_words()));
+    }
+    terms
+}
+
+/// The whole page.
+fn page(title: &str, data: &ShownBody<'_, ShownMotion>, arrays: &[Packed]) -> String {
+    let facts = data.json();
+    let title = super::markup::escape(title);
+    let arrays: String = arrays.iter().map(script).collect();
+    let parts =
+        [("STYLE", STYLE), ("SCRIPT", SCRIPT), ("TITLE", &title), ("FACTS", &facts), ("ARRAYS", &arrays)];
+    let mut page =
+        String::with_capacity(PAGE.len() + STYLE.len() + SCRIPT.len() + facts.len() + arrays.len());
+    let mut rest = PAGE;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, behind) = after.split_once("}}").unwrap_or((after, ""));
+        page.push_str(before);
+        page.push_str(parts.iter().find(|(own, _)| *own == name).map_or("", |(_, text)| text));
+        rest = behind;
+    }
+    page + rest
+}

@@ -1,0 +1,118 @@
+//! What reports and files say of a Craig-Bampton body.
+
+use flexbody_body::basis::{Basis, BasisChoice, CraigBampton, CraigChang, ModalBasis, ModeSettings, Task};
+use flexbody_body::convert::{Conversion, ConvertSettings, convert};
+use flexbody_body::flex_body::{FixedInterface, FlexBody};
+use flexbody_body::invariants::BodyFrame;
+use flexbody_eigen::{Resume, Wanted};
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{Coupling, FeModel, RawModel};
+use flexbody_report::{Facts, Format, RunData, render};
+use oracle::brackets::bracket;
+
+fn model(raw: RawModel) -> FeModel {
+    FeModel::from_raw(raw).expect("a sound model").model
+}
+
+fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
+    let modes = lowest(count);
+    let settings = ConvertSettings { modes, basis, frame, ..ConvertSettings::default() };
+    convert(model, &settings, SILENT).expect("a body")
+}
+
+fn body(model: &FeModel, count: usize) -> FlexBody {
+    converted(model, BasisChoice::CraigBampton(CraigBampton), count, BodyFrame::Principal).body
+}
+
+fn record(body: &FlexBody) -> &FixedInterface {
+    body.certificate().fixed_interface.as_ref().expect("a Craig-Bampton body")
+}
+
+fn lowest(count: usize) -> ModeSettings {
+    ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() }
+}
+
+/// Eigenvalues of the fixed-interface modes.
+fn fixed(basis: &ModalBasis) -> Vec<f64> {
+    let coordinates = basis.coordinates.as_ref().expect("a Craig-Bampton basis");
+    let all = coordinates.names.iter().enumerate();
+    all.filter(|(_, name)| name.starts_with("fixed-interface mode "))
+        .map(|(i, _)| coordinates.stiffness[(i, i)])
+        .collect()
+}
+
+fn craig_bampton(model: &FeModel, count: usize) -> ModalBasis {
+    let settings = &lowest(count);
+    CraigBampton.modes(&Task { model, settings, resume: Resume::default(), watch: SILENT }).expect("a basis")
+}
+
+fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
+    assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found}, expected {expected}");
+}
+
+#[test]
+fn reports_call_a_healthy_body_healthy() {
+    let raw = bracket([Coupling::Rigid, Coupling::Averaging]);
+    let model = model(raw);
+    for (count, head) in [(10, "No fixed-interface mode is missing."), (0, "Static condensation.")] {
+        let body = body(&model, count);
+        let facts = Facts::new(&body, &RunData::default());
+        let html = render(&facts, Format::Html);
+        assert!(
+            html.contains(head) && !html.contains("verdict open") && !html.contains("ot proved"),
+            "{html}"
+        );
+        let text = render(&facts, Format::Text);
+        let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        let made_of = format!(
+            "craig-bampton: {count} fixed-interface modes ({count} asked for) + 12 interface motions - 6"
+        );
+        assert!(text.contains(&made_of) && text.contains("of the free body"), "{text}");
+        assert!(text.contains("proved:") && !text.contains("NOT PROVED"), "{text}");
+        let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).expect("JSON");
+        assert!(json["modes"]["worst_residual"].as_f64().expect("a number") < 1e-9);
+        assert_eq!(json["completeness"]["verdict"], "proved");
+        let own = &json["modes"]["craig_bampton"];
+        assert_eq!(own["fixed_interface_modes"], count);
+        assert_eq!(own["fixed_interface_asked"], count);
+        let held: Vec<f64> = own["fixed_interface_hz"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|hz| hz.as_f64().expect("a number"))
+            .collect();
+        let expected = fixed(&craig_bampton(&model, count));
+        assert_eq!(held.len(), expected.len());
+        for (hz, lambda) in held.iter().zip(&expected) {
+            close(*hz, lambda.sqrt() / std::f64::consts::TAU, 1e-12, "held");
+        }
+        assert_eq!(text.contains(" Hz (fixed-interface modes)"), count > 0, "{text}");
+        assert!(!text.contains("x fixed-interface"), "{text}");
+        assert_eq!(own["free_hz"].as_array().expect("a list").len(), body.n_modes());
+    }
+    let attached =
+        converted(&model, BasisChoice::CraigChang(CraigChang::default()), 10, BodyFrame::Principal).body;
+    let facts = Facts::new(&attached, &RunData::default());
+    let (html, text) = (render(&facts, Format::Html), render(&facts, Format::Text));
+    assert!(html.contains("No free mode is missing.") && html.contains("<td>static shape</td>"), "{html}");
+    assert!(text.contains("static shapes beside them are no modes"), "{text}");
+    let json: serde_json::Value = serde_json::from_str(&render(&facts, Format::Json)).expect("JSON");
+    assert!(json["modes"]["worst_residual"].as_f64().expect("a number") < 1e-8);
+}
+
+/// What is recorded stands in the file, in other units as in its own, and stays with the modes that are kept.
+#[test]
+fn the_record_goes_with_the_body() {
+    let body = body(&model(bracket([Coupling::Rigid, Coupling::Rigid])), 5);
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("body.flex.h5");
+    flexbody_file::write(&body, &path).expect("written");
+    assert_eq!(record(&flexbody_file::read(&path).expect("read")), record(&body));
+    let milliseconds = flexbody_base::units::UnitSystem::parse("mm", "t", "ms").expect("units");
+    let other = body.in_units(&milliseconds).expect("in other units");
+    for (a, b) in record(&other).free_estimate.iter().zip(&record(&body).free_estimate) {
+        close(*a, 1e-6 * b, 1e-14, "lambda");
+    }
+    let some = body.reduced(&[0, 2, 3], body.groups(), Vec::new()).expect("some modes");
+    assert_eq!(record(&some).free_estimate, [0, 2, 3].map(|j: usize| record(&body).free_estimate[j]));
+}

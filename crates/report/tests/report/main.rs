@@ -1,0 +1,14 @@
+//! Reports and comparisons of bodies.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod comparison_coverage;
+mod craig_bampton;
+mod damping;
+mod geometric_stiffness;
+mod histories;
+mod import_body;
+mod imported_shapes;
+mod partial_files;
+mod report;
+mod report_comparison;

@@ -1,0 +1,344 @@
+//! How what a body lacks answers to the forces that its motion leaves unbalanced: with inertia of its own,
+//! and together with the modes that the body has.
+
+use super::compressed::principal;
+use super::grid::Grid;
+use faer::Mat;
+use flexbody_body::invariants::symmetric_part;
+use flexbody_linalg::{
+    add_combination, combine, dense_cholesky, gram, solve_lower, solve_upper, symmetric_eigen,
+};
+use flexbody_motion::integration::free_oscillation;
+use flexbody_motion::scene::{Interpolation, Sample, Samples};
+use nalgebra::Vector1;
+use std::ops::Range;
+
+/// Part of the trace of E'K E below which a direction is rounding.
+pub(super) const ROUNDING: f64 = 1e-12;
+
+/// The equations of the displacements Psi y + E z that the modes Psi of a body and static responses E, which
+/// are K-orthogonal to these, have under the forces whose static responses are E c(t), and under forces M Psi
+/// m_ff^-1 g(t), which do g to the modes.
+pub(super) struct Lacking {
+    /// K_ff and m_ff of the modes that follow (nf x nf); none of them: 0 x 0.
+    pub modal_stiffness: Mat<f64>,
+    pub modal_mass: Mat<f64>,
+    pub damping: LackingDamping,
+    /// Psi'M E (nf x k).
+    pub shared_mass: Mat<f64>,
+    /// E'K E and E'M E (k x k).
+    pub stiffness: Mat<f64>,
+    pub mass: Mat<f64>,
+}
+
+/// Damping of the equations of all nodes.
+pub(super) enum LackingDamping {
+    /// Damping of the modes of the body, D_ff (nf x nf): D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M.
+    OfModes(Mat<f64>),
+    /// Damping of the model: [Psi, E]'D [Psi, E] (nf + k square).
+    OfModel(Mat<f64>),
+}
+
+/// Amplitudes (nf + k) x m: y of the modes, then z of the responses, at the instants.
+pub(super) struct Answer {
+    pub value: Mat<f64>,
+    pub rate: Mat<f64>,
+    pub acceleration: Mat<f64>,
+}
+
+/// A motion of the modes and responses together with one frequency.
+#[derive(Debug, Clone, Copy)]
+struct Oscillator {
+    /// One over the square of its circular frequency.
+    inertia: f64,
+    /// Twice its damping ratio over this frequency.
+    damping: f64,
+}
+
+impl Lacking {
+    /// The motion
+    ///
+    /// ```text
+    /// [m_ff, Psi'M E; E'M Psi, E'M E] (y'', z'') + D (y', z') + (K_ff y, E'K E z)
+    ///     = (g, E'K E c + E'M Psi m_ff^-1 g)
+    /// ```
+    ///
+    /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the
+    /// equations of all nodes, of which the diagonal counts in the own motions of the system. Each of these is
+    /// solved exactly. Where c changes slowly beside its frequency that is the static response; where it
+    /// changes as fast, or begins with a shock, the static response would be too small. What is missed drags
+    /// along modes that are no eigenvectors, by its inertia.
+    ///
+    /// * `amplitudes`: c (k x m); `in_modes`: g (nf x m); `settled`: whether it starts in equilibrium, z = c,
+    ///   and else from zero.
+    pub(super) fn answered(
+        &self,
+        amplitudes: &Mat<f64>,
+        in_modes: &Mat<f64>,
+        grid: &Grid,
+        settled: bool,
+    ) -> Option<Answer> {
+        let (shapes, inertias) = self.own_motions()?;
+        let seen = self.seen_by_modes(&shapes)?;
+        let dampings = self.dampings(&shapes, &seen);
+        let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
+        let of_responses = shapes.as_ref().subrows(nf, k).to_owned();
+        let forces = combine(self.stiffness.as_ref(), amplitudes.as_ref());
+        let mut static_part = gram(of_responses.as_ref(), forces.as_ref());
+        static_part += gram(seen.as_ref(), in_modes.as_ref());
+        let zeros = || Mat::<f64>::zeros(shapes.ncols(), grid.times.len());
+        let (mut value, mut rate, mut acceleration) = (zeros(), zeros(), zeros());
+        for j in 0..shapes.ncols() {
+            let own = Oscillator { inertia: inertias[j], damping: dampings[j] };
+            let force: Vec<f64> = (0..grid.times.len()).map(|i| static_part[(j, i)]).collect();
+            for (i, motion) in own.follow(&force, grid, settled).into_iter().enumerate() {
+                [value[(j, i)], rate[(j, i)], acceleration[(j, i)]] = motion;
+            }
+        }
+        let back = |own: Mat<f64>| combine(shapes.as_ref(), own.as_ref());
+        Some(Answer { value: back(value), rate: back(rate), acceleration: back(acceleration) })
+    }
+
+    /// Motions with one frequency each, of unit stiffness, in columns, and their inertias.
+    fn own_motions(&self) -> Option<(Mat<f64>, Vec<f64>)> {
+        let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
+        let (turned, roots) = principal(self.stiffness.clone(), ROUNDING, usize::MAX)?;
+        let lower = dense_cholesky(self.modal_stiffness.clone())?;
+        let of_modes = solve_upper(&lower, &Mat::identity(nf, nf));
+        let unit = Mat::from_fn(nf + k, nf + roots.len(), |i, j| match (i < nf, j < nf) {
+            (true, true) => of_modes[(i, j)],
+            (false, false) => turned[(i - nf, j - nf)] / roots[j - nf],
+            _ => 0.0,
+        });
+        let mass = Mat::from_fn(nf + k, nf + k, |i, j| match (i < nf, j < nf) {
+            (true, true) => self.modal_mass[(i, j)],
+            (true, false) => self.shared_mass[(i, j - nf)],
+            (false, true) => self.shared_mass[(j, i - nf)],
+            (false, false) => self.mass[(i - nf, j - nf)],
+        });
+        let seen = gram(unit.as_ref(), combine(mass.as_ref(), unit.as_ref()).as_ref());
+        let own = symmetric_eigen(symmetric_part(&seen).as_ref())?;
+        Some((combine(unit.as_ref(), own.vectors.as_ref()), own.values))
+    }
+
+    /// m_ff^-1 Psi'M x of the own motions x: their part in the modes.
+    fn seen_by_modes(&self, shapes: &Mat<f64>) -> Option<Mat<f64>> {
+        let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
+        let lower = dense_cholesky(self.modal_mass.clone())?;
+        let carried_over = solve_upper(&lower, &solve_lower(&lower, &self.shared_mass));
+        let mut seen = shapes.as_ref().subrows(0, nf).to_owned();
+        let of_responses = shapes.as_ref().subrows(nf, k).to_owned();
+        add_combination(seen.as_mut(), carried_over.as_ref(), of_responses.as_ref());
+        Some(seen)
+    }
+
+    /// x'D x of the own motions x; those of the modes act on the parts `seen` by these.
+    fn dampings(&self, shapes: &Mat<f64>, seen: &Mat<f64>) -> Vec<f64> {
+        let (damping, parts) = match &self.damping {
+            LackingDamping::OfModes(damping) => (damping, seen),
+            LackingDamping::OfModel(damping) => (damping, shapes),
+        };
+        let product = combine(damping.as_ref(), parts.as_ref());
+        let of = |j: usize| (0..parts.nrows()).map(|i| parts[(i, j)] * product[(i, j)]).sum();
+        (0..parts.ncols()).map(of).collect()
+    }
+}
+
+impl Oscillator {
+    /// Value, rate and acceleration at every instant of x with inertia x'' + damping x' + x = s(t).
+    fn follow(self, force: &[f64], grid: &Grid, settled: bool) -> Vec<[f64; 3]> {
+        let mut seen = Vec::with_capacity(force.len());
+        let mut state = [if settled { force[0] } else { 0.0 }, 0.0];
+        for piece in &grid.pieces {
+            self.follow_piece(force, &grid.times, piece.clone(), &mut state, &mut seen);
+        }
+        seen
+    }
+
+    fn follow_piece(
+        self,
+        force: &[f64],
+        times: &[f64],
+        piece: Range<usize>,
+        state: &mut [f64; 2],
+        seen: &mut Vec<[f64; 3]>,
+    ) {
+        let values: Vec<Vector1<f64>> = piece.clone().map(|i| Vector1::new(force[i])).collect();
+        let spline = Samples::<1>::new(times[piece.clone()].to_vec(), &values, Interpolation::Cubic, false);
+        let at = |i: usize| {
+            let Sample { rate, second, .. } = spline.at(times[i]);
+            [force[i], rate[0], second[0]]
+        };
+        let mut now = at(piece.start);
+        let mut third = 0.0;
+        for i in piece.start..piece.end - 1 {
+            let (next, step) = (at(i + 1), times[i + 1] - times[i]);
+            third = (next[2] - now[2]) / step;
+            seen.push(self.motion(now, third, state));
+            *state = self.after(now, next, third, step, *state);
+            now = next;
+        }
+        seen.push(self.motion(now, third, state));
+    }
+
+    /// Whether it has an inertia at all.
+    fn moves(self) -> bool {
+        self.inertia > 0.0
+    }
+
+    /// The motion without oscillation under a force of these derivatives and the third: a polynomial.
+    fn steady(self, force: [f64; 3], third: f64) -> [f64; 3] {
+        let Self { inertia: b, damping: a } = self;
+        let [s, s1, s2] = force;
+        let square = a * a - b;
+        [
+            s - a * s1 + square * s2 + (2.0 * a * b - a * a * a) * third,
+            s1 - a * s2 + square * third,
+            s2 - a * third,
+        ]
+    }
+
+    /// Half the damping over the inertia: the rate at which an oscillation fades.
+    fn decay(self) -> f64 {
+        0.5 * self.damping / self.inertia
+    }
+
+    /// Value, rate and acceleration.
+    fn motion(self, force: [f64; 3], third: f64, state: &[f64; 2]) -> [f64; 3] {
+        if !self.moves() {
+            return force;
+        }
+        let steady = self.steady(force, third);
+        let decay = self.decay();
+        let [away, speed] = [state[0] - steady[0], state[1] - steady[1]];
+        [state[0], state[1], steady[2] - 2.0 * decay * speed - away / self.inertia]
+    }
+
+    /// Value and rate after a step in which the third derivative of the force is constant.
+    fn after(self, now: [f64; 3], next: [f64; 3], third: f64, step: f64, state: [f64; 2]) -> [f64; 2] {
+        if !self.moves() {
+            return [next[0], next[1]];
+        }
+        let (first, last) = (self.steady(now, third), self.steady(next, third));
+        let [away, speed] = [state[0] - first[0], state[1] - first[1]];
+        let (decay, square) = (self.decay(), self.inertia.recip());
+        let [c, s] = free_oscillation(square, decay, step);
+        [
+            last[0] + c * away + s * (speed + decay * away),
+            last[1] + c * speed - s * (decay * speed + square * away),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(times: Vec<f64>) -> Grid {
+        let whole = 0..times.len();
+        Grid { times, pieces: Vec::from([whole]) }
+    }
+
+    /// No forces on the modes.
+    fn none(system: &Lacking, grid: &Grid) -> Mat<f64> {
+        Mat::zeros(system.modal_mass.nrows(), grid.times.len())
+    }
+
+    fn alone(stiffness: [f64; 2]) -> Lacking {
+        let none = || Mat::zeros(0, 0);
+        Lacking {
+            modal_stiffness: none(),
+            modal_mass: none(),
+            damping: LackingDamping::OfModes(none()),
+            shared_mass: Mat::zeros(0, 2),
+            stiffness: Mat::from_fn(2, 2, |i, j| if i == j { stiffness[i] } else { 0.0 }),
+            mass: Mat::identity(2, 2),
+        }
+    }
+
+    /// Two oscillators that share no coordinate, of circular frequencies 2 and 50, pushed along a ramp and by
+    /// a step.
+    #[test]
+    fn oscillators_follow_ramps_and_steps() {
+        let system = alone([4.0, 2500.0]);
+        let grid = grid((0..=60).map(|i| 0.05 * f64::from(i)).collect());
+        let c = Mat::from_fn(2, grid.times.len(), |j, i| if j == 0 { grid.times[i] } else { 1.0 });
+        let Answer { value, rate, acceleration } =
+            system.answered(&c, &none(&system, &grid), &grid, false).expect("a motion");
+        for (i, t) in grid.times.iter().enumerate() {
+            let (sin, cos) = (2.0 * t).sin_cos();
+            assert!((value[(0, i)] - (t - sin / 2.0)).abs() < 1e-12, "{t}");
+            assert!((rate[(0, i)] - (1.0 - cos)).abs() < 1e-12, "{t}");
+            assert!((acceleration[(0, i)] - 2.0 * sin).abs() < 1e-11, "{t}");
+            assert!((value[(1, i)] - (1.0 - (50.0 * t).cos())).abs() < 1e-10, "{t}");
+            assert!((acceleration[(1, i)] - 2500.0 * (50.0 * t).cos()).abs() < 1e-6, "{t}");
+        }
+        let settled = system.answered(&c, &none(&system, &grid), &grid, true).expect("a motion").value;
+        assert!(
+            (0..grid.times.len()).all(|i| (settled[(1, i)] - 1.0).abs() < 1e-12),
+            "a constant force on what is settled"
+        );
+    }
+
+    /// A force that swings slowly beside the frequency of what answers: the second derivative of the spline
+    /// through it counts, and nothing rings.
+    #[test]
+    fn a_slow_swing_has_the_acceleration_of_a_swing() {
+        let system = alone([1e4, 1e6]);
+        let grid = grid((0..=240).map(|i| 0.05 * f64::from(i)).collect());
+        let c = Mat::from_fn(2, grid.times.len(), |_, i| grid.times[i] - grid.times[i].sin());
+        let Answer { acceleration, .. } =
+            system.answered(&c, &none(&system, &grid), &grid, true).expect("a motion");
+        for (i, t) in grid.times.iter().enumerate() {
+            for j in 0..2 {
+                assert!(
+                    (acceleration[(j, i)] - t.sin()).abs() < 0.02,
+                    "{j} at {t}: {}",
+                    acceleration[(j, i)]
+                );
+            }
+        }
+    }
+
+    /// A damped mode, of mass 1, that a response drags along by the mass that they share: the equations hold,
+    /// as differences of the motion tell.
+    #[test]
+    fn what_is_missed_moves_the_modes_by_its_inertia() {
+        let one = |value: f64| Mat::full(1, 1, value);
+        let system = Lacking {
+            modal_stiffness: one(9.0),
+            modal_mass: one(1.0),
+            damping: LackingDamping::OfModes(one(0.0)),
+            shared_mass: one(0.3),
+            stiffness: one(100.0),
+            mass: one(0.5),
+        };
+        let step = 1e-3;
+        let grid = grid((0..=5000).map(|i| step * f64::from(i)).collect());
+        let force = |t: f64| (1.7 * t).sin();
+        let c = Mat::from_fn(1, grid.times.len(), |_, i| force(grid.times[i]));
+        let on_modes = |t: f64| 2.0 * t.cos();
+        let g = Mat::from_fn(1, grid.times.len(), |_, i| on_modes(grid.times[i]));
+        let Answer { value, acceleration, .. } = system.answered(&c, &g, &grid, false).expect("a motion");
+        for i in 1..grid.times.len() - 1 {
+            let second =
+                |j: usize| (value[(j, i + 1)] - 2.0 * value[(j, i)] + value[(j, i - 1)]) / step.powi(2);
+            let (y, z) = (second(0), second(1));
+            assert!((y - acceleration[(0, i)]).abs() < 1e-2 && (z - acceleration[(1, i)]).abs() < 5e-2);
+            let (y, z) = (acceleration[(0, i)], acceleration[(1, i)]);
+            let balance = [
+                y + 0.3 * z + 9.0 * value[(0, i)] - on_modes(grid.times[i]),
+                0.3 * y + 0.5 * z + 100.0 * (value[(1, i)] - force(grid.times[i]))
+                    - 0.3 * on_modes(grid.times[i]),
+            ];
+            assert!(balance.iter().all(|left| left.abs() < 1e-5), "{i}: {balance:?}");
+        }
+        assert!((0..grid.times.len()).any(|i| value[(0, i)].abs() > 0.01), "the mode moves");
+        // With damping, of which the diagonal counts: what a Runge-Kutta method of order 4 makes of it.
+        let damped = Lacking { damping: LackingDamping::OfModes(one(0.4)), ..system };
+        let steady = Mat::full(1, grid.times.len(), 1.0);
+        let pushed = damped.answered(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;
+        let largest = |from: usize| (from..from + 1000).map(|i| pushed[(0, i)].abs()).fold(0.0, f64::max);
+        assert!((largest(0) - 0.5659).abs() < 2e-3 && (largest(4000) - 0.4415).abs() < 2e-3);
+    }
+}

@@ -1,0 +1,242 @@
+//! What a body lacks of the model that it was made of, estimated along its motion in a scene.
+
+use super::grid::Grid;
+use super::lack::{Found, Lack, energy_scale};
+use super::missed::Missed;
+use super::residual::NodalView;
+use super::resonance::Question;
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::CoupledModel;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::not_negative;
+use flexbody_model::FeModel;
+use flexbody_motion::scene::{
+    Instant, OutputErrors, Point, Scene, Stage, Trace, damped_once, instants, nodal_point, trace,
+};
+
+/// Part of the tolerances that the reference of a study may lack of the model without a word.
+pub const PART_OF_REFERENCE: f64 = 0.1;
+
+/// The same of a reference that stands for the motion of all nodes.
+pub const PART_OF_FINE: f64 = 0.01;
+
+/// Part of the tolerances that a body may lack of the model and still be a reference: others get the rest.
+pub const MOST_LACKING: f64 = 0.5;
+
+/// The elastic energy of what the body lacks, after so many responses of the motion joined it, is below this
+/// part of what is allowed.
+const PART_OF_RESPONSES: f64 = 0.1;
+
+/// The reason why nothing is known of a motion that would have to be looked at too often.
+const TOO_MUCH: &str = "its motion has too many periods or breaks to follow them all";
+
+/// A mode that is lacking and would have less than this part of what the tolerances allow of the root of the elastic
+/// energy is not looked for.
+const PART_OF_RESONANCE: f64 = 0.05;
+
+/// What a body lacks of the model that it was made of, in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceError {
+    /// Number of modes of the body.
+    pub modes: usize,
+    /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the
+    /// equations of all nodes leave unbalanced along its motion, how these move the modes that it has, how
+    /// they turn a free body, and what a prescribed motion takes of them. Infinite where they are unknown.
+    pub errors: OutputErrors,
+    /// The largest of them over its tolerance.
+    pub worst: f64,
+    /// When the estimate of the elastic energy is largest.
+    pub time: f64,
+    /// The reason why nothing is known of the errors; `None` where they are known.
+    pub unknown: Option<&'static str>,
+    /// Effect of the rigid interfaces of the body, which the model has as well where the errors are estimated; `None`
+    /// for a body without.
+    pub coupling: Option<CouplingEffect>,
+}
+
+/// The difference that rigid interfaces make in a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CouplingEffect {
+    /// Names of the interfaces that no mode of the body deforms.
+    pub interfaces: Vec<String>,
+    /// Estimated errors of the body against the model whose interfaces deform: of its coupling and of the modes that it
+    /// lacks together.
+    pub errors: OutputErrors,
+    /// The largest of them over its tolerance.
+    pub worst: f64,
+}
+
+impl CouplingEffect {
+    /// The remark about the effect of the coupling in `scene`.
+    fn remark(&self) -> Diagnostic {
+        let names: Vec<String> = self.interfaces.iter().map(|name| format!("`{name}`")).collect();
+        let percent = |error: f64| format!("{:.2} %", 100.0 * error);
+        let parts = [
+            ("deflection", self.errors.deflection),
+            ("stress", self.errors.stress),
+            ("reaction", self.errors.reaction),
+        ];
+        let parts: Vec<String> = parts
+            .into_iter()
+            .filter_map(|(name, error)| Some(format!("{name} {}", percent(error?))))
+            .collect();
+        let message = format!(
+            "the body is compared with the model under the same coupling: {} rigid. Against the model whose interfaces deform its errors are {}",
+            match names.as_slice() {
+                [one] => format!("interface {one} is"),
+                all => format!("interfaces {} are", all.join(", ")),
+            },
+            parts.join(", ")
+        );
+        Diagnostic::new(Code::CouplingEffect, message)
+    }
+}
+
+impl ReferenceError {
+    /// The errors of a body of so many modes of which nothing is known.
+    fn unknown(modes: usize, reason: &'static str) -> Self {
+        let all = f64::INFINITY;
+        let errors = OutputErrors { attitude: all, deflection: Some(all), stress: Some(all), reaction: None };
+        Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason), coupling: None }
+    }
+
+    /// Whether others may be measured against the body: against what is left of the tolerances.
+    pub fn is_reference(&self) -> bool {
+        self.worst <= MOST_LACKING
+    }
+
+    /// The remark about rigid interfaces that the body and the model it is compared with have in common.
+    pub fn coupling_remark(&self) -> Option<Diagnostic> {
+        self.coupling.as_ref().map(CouplingEffect::remark)
+    }
+
+    /// The warning about a body that lacks more than `enough` of the tolerances.
+    pub fn warning(&self, scene: &Scene, enough: f64) -> Option<Diagnostic> {
+        if self.worst <= enough {
+            return None;
+        }
+        if let Some(reason) = self.unknown {
+            let message = format!(
+                "what the body of {} modes that everything is measured against lacks of the model is not known: {reason}",
+                self.modes
+            );
+            return Some(
+                Diagnostic::new(Code::ReferenceLacks, message).with_help("simulate a shorter `duration`"),
+            );
+        }
+        let message = format!(
+            "the body of {} modes that everything is measured against lacks {:.0} % of the tolerances itself, most at t = {:.2e}",
+            self.modes,
+            100.0 * self.worst,
+            self.time
+        );
+        let warning = Diagnostic::new(Code::ReferenceLacks, message);
+        let begins_with_shock = scene.acting().any(|history| history.at(0.0).0.norm() != 0.0);
+        Some(match begins_with_shock && !scene.initial.settled {
+            true => warning.with_help(
+                "loads that act at time 0 begin with a shock: start with [initial] deformation = \"static\", or with loads that begin at zero",
+            ),
+            false => warning,
+        })
+    }
+}
+
+/// An estimate, and what would improve the body.
+pub(super) struct Estimate {
+    pub error: ReferenceError,
+    /// Nodal forces (N x k) whose static responses the body lacks most, so many as it takes to come within
+    /// what is allowed.
+    pub missing: Mat<f64>,
+}
+
+impl Estimate {
+    /// Estimates what `body`, made of `model`, lacks in `scene`. `allowed` is the part of the tolerances that
+    /// it may lack. `None` where nothing can be said: for a scene without a duration, and a body that is
+    /// carried through a motion of very many periods.
+    ///
+    /// # Errors
+    /// Those of [`trace`] and of static responses.
+    pub(super) fn new(
+        model: &FeModel,
+        body: &FlexBody,
+        scene: &Scene,
+        allowed: f64,
+        memory: Option<u64>,
+    ) -> Result<Option<Self>> {
+        let Some(duration) = scene.run.duration else { return Ok(None) };
+        let stage = Stage::new(body, scene)?;
+        let given = scene.requirements.damping.is_some();
+        let (body, scene) = damped_once(stage.body, stage.scene)?;
+        let (body, scene) = (&*body, &*scene);
+        let Some(vectors) = body.vectors_of(model) else { return Ok(None) };
+        let coupled = body.coupled_model(model, vectors.as_ref());
+        let interfaces = coupled.rigid_interfaces();
+        let at = |point: &Point| Ok(nodal_point(model, point)?.unit_loads(model));
+        let loads = scene.loads.iter().map(|load| at(&load.at)).collect::<Result<Vec<_>>>()?;
+        let watched = scene.watched.iter().map(at).collect::<Result<Vec<_>>>()?;
+        let carrier = scene.carried.as_ref().map(|carried| nodal_point(model, &carried.by)).transpose()?;
+        let of_model = model.damping().filter(|_| !given);
+        let view = |coupled| NodalView::new(coupled, body, loads.clone(), carrier.as_ref(), of_model);
+        let Some(own) = view(coupled) else { return Ok(None) };
+        let (motion, _) = trace(body, scene, memory, |_| ())?;
+        let Some(grid) = Grid::new(body, scene, &motion, duration) else {
+            let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);
+            return Ok(Some(Self { error, missing: Mat::zeros(model.rows().len(), 0) }));
+        };
+        let mut same_steps = scene.clone();
+        same_steps.run.scheme = motion.scheme;
+        let looked_at = instants(body, &same_steps, &grid.times)?;
+        let beside =
+            Beside { body, scene, motion: &motion, grid: &grid, looked_at: &looked_at, watched: &watched };
+        let mut estimate = beside.estimate(&own, allowed)?;
+        let deforms = || view(CoupledModel::uncoupled(model));
+        if let Some(view) = (!interfaces.is_empty()).then(deforms).flatten() {
+            let ReferenceError { errors, worst, .. } = beside.estimate(&view, allowed)?.error;
+            estimate.error.coupling = Some(CouplingEffect { interfaces, errors, worst });
+        }
+        Ok(Some(estimate))
+    }
+}
+
+/// A motion of a body that is compared with that of a model.
+struct Beside<'a> {
+    body: &'a FlexBody,
+    scene: &'a Scene,
+    motion: &'a Trace,
+    grid: &'a Grid,
+    /// The motion at the instants of the grid.
+    looked_at: &'a [Instant],
+    /// Weights of the points whose deflections count.
+    watched: &'a [Mat<f64>],
+}
+
+impl Beside<'_> {
+    /// Estimates what the body lacks of the model of `view`.
+    fn estimate(&self, view: &NodalView<'_>, allowed: f64) -> Result<Estimate> {
+        let &Self { body, scene, motion, grid, looked_at, watched } = self;
+        let tolerance = &scene.requirements.tolerance;
+        let least = tolerance.stress.min(tolerance.deflection);
+        let question = Question {
+            settled: scene.initial.settled,
+            negligible: PART_OF_RESONANCE * least * energy_scale(motion),
+            complete_below: if view.held.is_some() { 0.0 } else { complete_below(body) },
+        };
+        let missed = Missed::new(view, body, looked_at, grid, &question)?;
+        let lack = Lack::new(view, body, &missed, looked_at, grid, scene.initial.settled);
+        let Found { errors, time } = lack.errors(scene, motion, watched);
+        let worst = errors.worst(tolerance);
+        let modes = body.n_modes();
+        let error = ReferenceError { modes, worst, time, errors, unknown: None, coupling: None };
+        let enough = PART_OF_RESPONSES * allowed * least;
+        let missing = missed.dominant(&lack.of_responses(), enough * energy_scale(motion));
+        Ok(Estimate { error, missing })
+    }
+}
+
+/// Circular frequency below which all modes were proved to be in the body; zero where nothing was.
+fn complete_below(body: &FlexBody) -> f64 {
+    let certificate = body.certificate();
+    if certificate.proved_modes.is_some() { not_negative(certificate.shift).sqrt() } else { 0.0 }
+}

@@ -1,0 +1,245 @@
+//! The static responses that a body lacks along its motion, and which of them would improve it most.
+
+use super::answered::ROUNDING;
+use super::compressed::{Compressed, principal};
+use super::grid::Grid;
+use super::held::Held;
+use super::projected::{Projected, UnbalancedAmplitudes};
+use super::residual::NodalView;
+use super::resonance::{Question, resonances};
+use faer::Mat;
+use flexbody_base::error::Result;
+use flexbody_body::basis::{free_static_responses_twice, oscillating_responses};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::symmetric_part;
+use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side, subtract_combination};
+use flexbody_motion::scene::Instant;
+use nalgebra::Vector3;
+
+/// Responses that may join the body at once.
+const MOST_RESPONSES: usize = 12;
+
+/// Largest part of the elastic energy of the responses, over the motion, whose inertia is answered too, and of how
+/// many of them at the most.
+const INERTIA_LEFT_OUT: f64 = 1e-9;
+const MOST_OF_INERTIA: usize = 8;
+
+/// Factors of a frequency at which a response is looked for: it may be a natural frequency.
+const NUDGES: [f64; 3] = [1.0, 1.0003, 0.9996];
+
+/// Root of the elastic energy that a response must have beside those that are known, relative to its own, to be a new
+/// one.
+const NEW: f64 = 1e-4;
+
+/// Displacements E that a body lacks: static responses to the forces that its motion leaves unbalanced, those to
+/// the inertia of these responses, without which all that is lacking would move with one frequency for each force, and
+/// responses at the frequencies of resonances.
+pub(super) struct Missed {
+    /// B (N x k) with E = K^+ B.
+    pub forces: Mat<f64>,
+    /// c (k x m): the unbalanced forces are B c(t). Those of inertia and of resonances have none.
+    pub amplitudes: Mat<f64>,
+    /// g (nf x m): what the unbalanced forces do to the modes.
+    pub in_modes: Mat<f64>,
+    /// E (N x k), beside the modes; where something carries the body, with the point at rest that does.
+    pub responses: Mat<f64>,
+    /// E'K E.
+    pub energy: Mat<f64>,
+}
+
+impl Missed {
+    /// Of a body in the `motion` that it makes at the instants of `grid`.
+    ///
+    /// # Errors
+    /// Those of [`free_static_responses_twice`] and [`oscillating_responses`].
+    pub(super) fn new(
+        view: &NodalView<'_>,
+        body: &FlexBody,
+        motion: &[Instant],
+        grid: &Grid,
+        question: &Question,
+    ) -> Result<Self> {
+        let model = view.model;
+        let few: Vec<Instant> = grid.few(histories(motion)).into_iter().map(|i| motion[i].clone()).collect();
+        let compressed = Compressed::new(model, &view.residual(&few));
+        let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
+            Projected::new(view, compressed.as_ref()).amplitudes(motion);
+        let Some(compressed) = compressed else {
+            let nothing = || Mat::zeros(view.vectors.nrows(), 0);
+            let (forces, responses) = (nothing(), nothing());
+            return Ok(Self { forces, amplitudes, in_modes, responses, energy: Mat::zeros(0, 0) });
+        };
+        let forces = compressed.basis;
+        let beside = Beside::new(view, &body.modes().eigenvalue);
+        let (mut responses, mut energy) = (Mat::new(), Mat::new());
+        let inertia = |static_responses: &Mat<f64>| {
+            responses = beside.of(static_responses.clone());
+            energy = beside.energy(&responses);
+            beside.inertia(&responses, &energy, &amplitudes)
+        };
+        let first = body.modes().eigenvalue[0];
+        let [_, of_inertia] = free_static_responses_twice(&view.coupled, forces.clone(), inertia, first)?;
+        let resonances = resonances(grid, &amplitudes, &energy, question);
+        let mut missed = Self { forces, amplitudes, in_modes, responses, energy };
+        missed.add(&beside, of_inertia);
+        for resonance in resonances {
+            let forces = combine(
+                missed.forces.as_ref().subcols(0, resonance.amplitudes.nrows()),
+                resonance.amplitudes.as_ref(),
+            );
+            missed.add_resonance(&beside, forces, resonance.rate)?;
+        }
+        Ok(missed)
+    }
+
+    /// Adds what the `forces` make the model do that oscillate at a circular frequency.
+    fn add_resonance(&mut self, beside: &Beside<'_>, forces: Mat<f64>, rate: f64) -> Result<()> {
+        let conditions = beside.view.held.as_ref().map(Held::conditions);
+        for nudge in NUDGES {
+            let square = (rate * nudge).powi(2);
+            let coupled = &beside.view.coupled;
+            if let Some(more) = oscillating_responses(coupled, forces.clone(), conditions, square)? {
+                self.add(beside, more);
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds responses to forces that have no amplitude of their own.
+    fn add(&mut self, beside: &Beside<'_>, responses: Mat<f64>) {
+        let more = beside.more(&self.responses, &self.energy, responses);
+        let forces = beside.view.model.pencil().apply_stiffness(more.as_ref());
+        let mut amplitudes = Mat::zeros(self.amplitudes.nrows() + more.ncols(), self.amplitudes.ncols());
+        amplitudes.as_mut().subrows_mut(0, self.amplitudes.nrows()).copy_from(&self.amplitudes);
+        self.amplitudes = amplitudes;
+        self.forces = side_by_side(&[self.forces.as_ref(), forces.as_ref()]);
+        self.responses = side_by_side(&[self.responses.as_ref(), more.as_ref()]);
+        self.energy = beside.energy(&self.responses);
+    }
+
+    /// The fewest forces B y (N x p) whose responses leave of E z(t), at every instant, no more than `enough`
+    /// of the root of the elastic energy. `moving`: z (k x m).
+    pub(super) fn dominant(&self, moving: &Mat<f64>, enough: f64) -> Mat<f64> {
+        let none = || Mat::zeros(self.forces.nrows(), 0);
+        let Some((turned, roots)) = principal(self.energy.clone(), ROUNDING, usize::MAX) else {
+            return none();
+        };
+        // w = T'z with E'K E = T T': the elastic energy is |w|^2 / 2.
+        let w = |k: usize, i: usize| -> f64 {
+            roots[k] * (0..turned.nrows()).map(|row| turned[(row, k)] * moving[(row, i)]).sum::<f64>()
+        };
+        let w = Mat::from_fn(roots.len(), moving.ncols(), w);
+        let covariance = combine(w.as_ref(), w.transpose().to_owned().as_ref());
+        let Some((directions, _)) = principal(covariance, 0.0, MOST_RESPONSES) else { return none() };
+        let along = gram(directions.as_ref(), w.as_ref());
+        let left = |count: usize, i: usize| -> f64 {
+            let whole: f64 = (0..w.nrows()).map(|k| w[(k, i)].powi(2)).sum();
+            let taken: f64 = (0..count).map(|k| along[(k, i)].powi(2)).sum();
+            not_negative(0.5 * (whole - taken)).sqrt()
+        };
+        let worst = |count: &usize| (0..w.ncols()).map(|i| left(*count, i)).fold(0.0, larger);
+        let count =
+            (0..directions.ncols()).find(|count| worst(count) <= enough).unwrap_or(directions.ncols());
+        let y = Mat::from_fn(turned.nrows(), count, |row, p| {
+            (0..roots.len()).map(|k| turned[(row, k)] / roots[k] * directions[(k, p)]).sum()
+        });
+        combine(self.forces.as_ref(), y.as_ref())
+    }
+}
+
+/// Histories along a motion whose largest values must not be overlooked: loads, accelerations of the frame, spins and
+/// accelerations of modes.
+fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
+    let history = |value: &dyn Fn(&Instant) -> f64| motion.iter().map(value).collect::<Vec<f64>>();
+    let (loads, modes) = motion.first().map_or((0, 0), |first| (first.loads.len(), first.qdd.len()));
+    let of_loads = (0..6 * loads).map(move |at| {
+        let component = |now: &Instant| {
+            let (force, torque) = &now.loads[at / 6];
+            if at % 6 < 3 { force[at % 6] } else { torque[at % 6 - 3] }
+        };
+        history(&component)
+    });
+    let frame: [fn(&Instant) -> &Vector3<f64>; 3] =
+        [|now| &now.velocity_rate, |now| &now.omega_rate, |now| &now.omega];
+    let of_frame = (0..9).map(move |at| history(&|now: &Instant| frame[at / 3](now)[at % 3]));
+    let of_modes = (0..modes).map(move |mode| history(&|now: &Instant| now.qdd[mode]));
+    of_loads.chain(of_frame).chain(of_modes)
+}
+
+/// Displacements beside the modes of a body.
+struct Beside<'v> {
+    view: &'v NodalView<'v>,
+    eigenvalues: &'v [f64],
+    /// K Psi.
+    stiff: Mat<f64>,
+}
+
+impl<'v> Beside<'v> {
+    fn new(view: &'v NodalView<'v>, eigenvalues: &'v [f64]) -> Self {
+        Self { view, eigenvalues, stiff: view.model.pencil().apply_stiffness(view.vectors.as_ref()) }
+    }
+
+    /// `responses` with what carries the body at rest, and without their part in the modes.
+    fn of(&self, mut responses: Mat<f64>) -> Mat<f64> {
+        if let Some(held) = &self.view.held {
+            held.hold(&mut responses);
+        }
+        // The part in the modes is that of rounding.
+        let shared = gram(self.stiff.as_ref(), responses.as_ref());
+        let part = Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / self.eigenvalues[p]);
+        subtract_combination(responses.as_mut(), self.view.vectors.as_ref(), part.as_ref());
+        responses
+    }
+
+    /// E'K E.
+    fn energy(&self, responses: &Mat<f64>) -> Mat<f64> {
+        let weighted = self.view.model.pencil().apply_stiffness(responses.as_ref());
+        symmetric_part(&gram(responses.as_ref(), weighted.as_ref()))
+    }
+
+    /// The forces M E y of the few E y that have nearly all of the elastic energy of E c(t).
+    ///
+    /// * `responses`: E; `energy`: E'K E; `amplitudes`: c.
+    fn inertia(&self, responses: &Mat<f64>, energy: &Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
+        let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else {
+            return Mat::zeros(responses.nrows(), 0);
+        };
+        let moving = gram(turned.as_ref(), amplitudes.as_ref());
+        let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
+        let covariance = combine(moving.as_ref(), moving.transpose().to_owned().as_ref());
+        let Some((directions, _)) = principal(covariance, INERTIA_LEFT_OUT, MOST_OF_INERTIA) else {
+            return Mat::zeros(responses.nrows(), 0);
+        };
+        let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
+        let few = combine(responses.as_ref(), combine(unit.as_ref(), directions.as_ref()).as_ref());
+        self.view.part(self.view.model.pencil().apply_mass(few.as_ref())).forces
+    }
+
+    /// What `further` responses add to `known` ones: K-orthogonal to these and to each other, of an energy as large
+    /// as the largest of these.
+    ///
+    /// * `energy`: that of the known ones, E'K E.
+    fn more(&self, known: &Mat<f64>, energy: &Mat<f64>, further: Mat<f64>) -> Mat<f64> {
+        let mut further = self.of(further);
+        let own = self.energy(&further);
+        let sizes: Vec<f64> = (0..own.nrows()).map(|j| own[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
+        further = Mat::from_fn(further.nrows(), further.ncols(), |i, j| further[(i, j)] / sizes[j]);
+        let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else { return further };
+        let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
+        let orthonormal = combine(known.as_ref(), unit.as_ref());
+        let weighted = self.view.model.pencil().apply_stiffness(orthonormal.as_ref());
+        // Twice: what they add may be small beside what they share.
+        for _ in 0..2 {
+            let shared = gram(weighted.as_ref(), further.as_ref());
+            subtract_combination(further.as_mut(), orthonormal.as_ref(), shared.as_ref());
+        }
+        let Some((turned, own)) = principal(self.energy(&further), 0.0, usize::MAX) else {
+            return Mat::zeros(further.nrows(), 0);
+        };
+        // What is left of all that was shared is rounding.
+        let kept = own.iter().take_while(|root| **root > NEW).count();
+        let scaled = Mat::from_fn(turned.nrows(), kept, |row, k| turned[(row, k)] * roots[0] / own[k]);
+        combine(further.as_ref(), scaled.as_ref())
+    }
+}

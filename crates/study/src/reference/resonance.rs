@@ -1,0 +1,205 @@
+//! The frequencies at which forces drive what a body lacks beyond their static responses.
+
+use super::compressed::principal;
+use super::grid::Grid;
+use faer::Mat;
+use flexbody_linalg::{combine, gram, larger};
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
+use std::f64::consts::TAU;
+
+/// Frequencies at the most.
+const MOST: usize = 4;
+
+/// Combinations of forces that are looked at, and the part of the sum of their squares that is not.
+const MOST_COMBINATIONS: usize = 8;
+const LEFT_OUT: f64 = 1e-12;
+
+/// A spectrum rises over what is around it by this factor where it has a resonance: that of a step is level, and noise
+/// rises so far now and then.
+const PEAK: f64 = 3.0;
+
+/// What is around a frequency: from this part of it to one over this part.
+const AROUND: f64 = 0.7;
+
+/// Lines of the spectrum beside a resonance that belong to it.
+const WIDTH: usize = 6;
+
+/// Instants of the uniform series at the most.
+const MOST_INSTANTS: usize = 1 << 20;
+
+/// The motion whose forces are looked at for resonances, and the size of one that counts.
+pub(super) struct Question {
+    /// True if the motion starts in equilibrium.
+    pub settled: bool,
+    /// Root of the elastic energy that does not count.
+    pub negligible: f64,
+    /// Circular frequency below which the body lacks no mode.
+    pub complete_below: f64,
+}
+
+/// A frequency with much of the forces.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Resonance {
+    /// Circular frequency.
+    pub rate: f64,
+    /// Amplitudes of the forces that are in phase with each other, and of those a quarter of a period later (k x 2).
+    pub amplitudes: Mat<f64>,
+}
+
+/// Frequencies at which forces with the amplitudes c(t) drive an oscillator of unit static response so far that its
+/// elastic energy is not negligible, strongest first.
+///
+/// An oscillator x'' + w^2 x = w^2 c without damping swings about its static response by the integral of c' cos w (t -
+/// s) ds: at most by |C'(w)|, the Fourier transform of c' over the run, a step at its beginning with it.
+///
+/// * `amplitudes`: c (k x m) at the instants of `grid`; `energy`: E'K E of their static responses (k x k).
+pub(super) fn resonances(
+    grid: &Grid,
+    amplitudes: &Mat<f64>,
+    energy: &Mat<f64>,
+    question: &Question,
+) -> Vec<Resonance> {
+    let &Question { settled, negligible, complete_below } = question;
+    let Some(duration) = grid.times.last().copied().filter(|last| *last > 0.0) else { return Vec::new() };
+    let count = (2 * grid.times.len()).next_power_of_two().min(MOST_INSTANTS);
+    let step = duration / count as f64;
+    let combinations = combinations(amplitudes, energy);
+    let mut level = vec![0.0f64; count + 1];
+    for j in 0..combinations.nrows() {
+        let values: Vec<f64> = (0..combinations.ncols()).map(|i| combinations[(j, i)]).collect();
+        let lines = spectrum(&increments(grid, &values, step, count, settled));
+        level.iter_mut().zip(&lines).for_each(|(level, line)| *level += line.norm_sqr());
+    }
+    level.iter_mut().for_each(|level| *level = (0.5 * *level).sqrt());
+    let rate = |line: usize| TAU * line as f64 / (2.0 * duration);
+    let first = (complete_below / rate(1)).ceil().max(1.0) as usize;
+    let mut peaks: Vec<usize> = (first.max(1)..count / 2)
+        .filter(|&line| level[line] > negligible && level[line] >= level[line - 1].max(level[line + 1]))
+        .collect();
+    peaks.sort_by(|&a, &b| level[b].total_cmp(&level[a]));
+    let mut chosen: Vec<usize> = Vec::new();
+    for line in peaks {
+        let is_apart = chosen.iter().all(|other| other.abs_diff(line) > WIDTH);
+        if is_apart && level[line] > PEAK * around(&level, line) {
+            chosen.push(line);
+        }
+        if chosen.len() == MOST {
+            break;
+        }
+    }
+    let resonance = |line: usize| {
+        let rate = rate(line);
+        Resonance { rate, amplitudes: transform(grid, amplitudes, rate, settled) }
+    };
+    chosen.into_iter().map(resonance).collect()
+}
+
+/// Combinations of the amplitudes in the root of the elastic energy of their static responses, those that have most.
+fn combinations(amplitudes: &Mat<f64>, energy: &Mat<f64>) -> Mat<f64> {
+    let none = || Mat::zeros(0, amplitudes.ncols());
+    let Some((turned, roots)) = principal(energy.clone(), 0.0, usize::MAX) else { return none() };
+    let along = gram(turned.as_ref(), amplitudes.as_ref());
+    let along = Mat::from_fn(roots.len(), along.ncols(), |k, i| roots[k] * along[(k, i)]);
+    let covariance = combine(along.as_ref(), along.transpose().to_owned().as_ref());
+    match principal(covariance, LEFT_OUT, MOST_COMBINATIONS) {
+        Some((directions, _)) => gram(directions.as_ref(), along.as_ref()),
+        None => none(),
+    }
+}
+
+/// Increments of `values`, linear between the instants, over `count` equal steps; the value at the start is one where
+/// the motion does not start in equilibrium.
+fn increments(grid: &Grid, values: &[f64], step: f64, count: usize, settled: bool) -> Vec<f64> {
+    let mut at = 0;
+    let mut value = |time: f64| {
+        while at + 2 < grid.times.len() && grid.times[at + 1] < time {
+            at += 1;
+        }
+        let (from, to) = (grid.times[at], grid.times[at + 1]);
+        values[at] + (values[at + 1] - values[at]) * ((time - from) / (to - from)).clamp(0.0, 1.0)
+    };
+    let mut before = if settled { values[0] } else { 0.0 };
+    let mut increments = Vec::with_capacity(count);
+    for i in 0..count {
+        let now = value(step * (i + 1) as f64);
+        increments.push(now - before);
+        before = now;
+    }
+    increments
+}
+
+/// Fourier transform of a series, with as many zeros after it: lines at half the frequency of one period in all.
+fn spectrum(series: &[f64]) -> Vec<Complex<f64>> {
+    let mut lines: Vec<Complex<f64>> = series.iter().map(|value| Complex::new(*value, 0.0)).collect();
+    lines.resize(2 * series.len(), Complex::default());
+    FftPlanner::new().plan_fft_forward(lines.len()).process(&mut lines);
+    lines.truncate(series.len() + 1);
+    lines
+}
+
+/// The median of a spectrum around a line.
+fn around(level: &[f64], line: usize) -> f64 {
+    let from = (AROUND * line as f64) as usize;
+    let to = ((line as f64 / AROUND) as usize).max(line + 2 * WIDTH).min(level.len() - 1);
+    let beside = |other: &usize| other.abs_diff(line) > WIDTH;
+    let mut values: Vec<f64> = (from..=to).filter(beside).map(|other| level[other]).collect();
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
+}
+
+/// Fourier transform of the increments of every amplitude at the circular frequency `rate`, real and imaginary part,
+/// the larger of which is of size one.
+fn transform(grid: &Grid, amplitudes: &Mat<f64>, rate: f64, settled: bool) -> Mat<f64> {
+    let mut parts = Mat::<f64>::zeros(amplitudes.nrows(), 2);
+    let mut add = |row: usize, increment: f64, time: f64| {
+        let (sin, cos) = (rate * time).sin_cos();
+        parts[(row, 0)] += increment * cos;
+        parts[(row, 1)] -= increment * sin;
+    };
+    for row in 0..amplitudes.nrows() {
+        if !settled {
+            add(row, amplitudes[(row, 0)], 0.0);
+        }
+        for i in 1..grid.times.len() {
+            let increment = amplitudes[(row, i)] - amplitudes[(row, i - 1)];
+            add(row, increment, 0.5 * (grid.times[i] + grid.times[i - 1]));
+        }
+    }
+    let largest = (0..parts.nrows()).flat_map(|row| [parts[(row, 0)].abs(), parts[(row, 1)].abs()]);
+    let largest = largest.fold(f64::MIN_POSITIVE, larger);
+    Mat::from_fn(parts.nrows(), 2, |i, j| parts[(i, j)] / largest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grid(count: usize, duration: f64) -> Grid {
+        let times: Vec<f64> = (0..=count).map(|i| duration * i as f64 / count as f64).collect();
+        let whole = 0..times.len();
+        Grid { times, pieces: Vec::from([whole]) }
+    }
+
+    fn found(force: impl Fn(f64) -> f64, negligible: f64) -> Vec<f64> {
+        let grid = grid(4000, 10.0);
+        let amplitudes = Mat::from_fn(1, grid.times.len(), |_, i| force(grid.times[i]));
+        let energy = Mat::full(1, 1, 2.0);
+        let question = Question { settled: false, negligible, complete_below: 0.0 };
+        let all = resonances(&grid, &amplitudes, &energy, &question);
+        all.into_iter().map(|resonance| resonance.rate / TAU).collect()
+    }
+
+    /// A sine of a thousandth beside a ramp drives an oscillator of its frequency by a thousandth of pi times the
+    /// number of its periods; a step and a ramp have no resonance, and neither has what is too small to count.
+    #[test]
+    fn a_small_sine_beside_a_ramp_is_a_resonance() {
+        let both = |t: f64| 0.1 * t + 1e-3 * (TAU * 20.0 * t).sin();
+        let all = found(both, 0.3);
+        assert_eq!(all.len(), 1, "{all:?}");
+        assert!((all[0] - 20.0).abs() < 0.06, "{all:?}");
+        assert!(found(both, 0.7).is_empty());
+        assert!(found(|_| 1.0, 1e-3).is_empty());
+        assert!(found(|t| (0.3 * t).min(1.0), 1e-3).is_empty());
+    }
+}

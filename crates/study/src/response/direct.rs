@@ -1,0 +1,265 @@
+//! The equations of all nodes at one frequency, solved with a factor of the dynamic stiffness there.
+
+use faer::{Mat, Scale};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::CoupledModel;
+use flexbody_linalg::{
+    Analysis, Indefinite, Pencil, add_combination, gram, largest_entry, side_by_side, subtract_combination,
+};
+use nalgebra::{Complex, DMatrix};
+
+/// A factor with a larger backward error is no preconditioner.
+const GROWTH_LIMIT: f64 = 1e-4;
+
+/// Refinements of a solution at the most, and its last change, relative, at which it is good, and at which it
+/// still is one.
+const REFINEMENTS: usize = 4;
+const GOOD: f64 = 1e-11;
+const ACCEPTED: f64 = 1e-6;
+
+/// Operations per second that estimates of time assume.
+const PACE: f64 = 4e9;
+
+/// A free body that is loaded at places and watched at others: H(w) = L'(K + i w D - w^2 M)^-1 B; matrices, loads and
+/// N rows are those of the model under the couplings of the body.
+pub(super) struct DirectSolver<'m> {
+    pencil: Pencil<'m>,
+    analysis: Analysis,
+    /// Phi (N x 6), orthonormal in M, and M Phi.
+    rigid: Mat<f64>,
+    rigid_products: Mat<f64>,
+    /// B without what accelerates the body as a whole (N x inputs), and L (N x outputs).
+    loads: Mat<f64>,
+    measured: Mat<f64>,
+    /// L'Phi Phi'B: rigid accelerations.
+    rigid_gain: Mat<f64>,
+    /// U (N x m) and C (m x m) of D = U C U', in columns that have damping; `None` without.
+    damping: Option<(Mat<f64>, Mat<f64>)>,
+}
+
+/// The response at one frequency.
+pub(super) struct DirectSolution {
+    /// outputs x inputs.
+    pub response: DMatrix<Complex<f64>>,
+    /// Flexible natural frequencies of the model below this one: negative pivots less rigid motions.
+    pub modes_below: usize,
+}
+
+/// Columns with their real parts first and, with damping, their imaginary parts behind them.
+type Parts = Mat<f64>;
+
+impl<'m> DirectSolver<'m> {
+    /// Prepares `solves` solutions.
+    ///
+    /// * `loads`, `measured`: B and L in all rows of the model.
+    /// * `damping`: the products M Psi and the matrix of the modes, D = M Psi C (M Psi)'.
+    ///
+    /// # Errors
+    /// [`MemoryShort`](Code::MemoryShort) and [`WorkLong`](Code::WorkLong), before the work.
+    pub(super) fn new(
+        model: &'m CoupledModel<'_>,
+        [loads, measured]: [&Mat<f64>; 2],
+        damping: Option<(&Mat<f64>, &Mat<f64>)>,
+        solves: usize,
+        (memory, longest): (Option<u64>, Option<f64>),
+    ) -> Result<Self> {
+        let pencil = model.pencil();
+        let ordering =
+            || Diagnostic::new(Code::MemoryShort, "the ordering of the equations runs out of memory");
+        let analysis = Analysis::new(&pencil).ok_or_else(ordering)?;
+        let rigid = model.rigid_modes()?;
+        let [mut loads, measured] = [loads, measured].map(|columns| model.restrict(columns.clone()));
+        let rigid_products = pencil.apply_mass(rigid.as_ref());
+        let rigid_loads = gram(rigid.as_ref(), loads.as_ref());
+        let rigid_gain = gram(gram(rigid.as_ref(), measured.as_ref()).as_ref(), rigid_loads.as_ref());
+        subtract_combination(loads.as_mut(), rigid_products.as_ref(), rigid_loads.as_ref());
+        let damping = damping.and_then(|(u, c)| damped_columns(&model.restrict(u.clone()), c));
+        let solver = Self { pencil, analysis, rigid, rigid_products, loads, measured, rigid_gain, damping };
+        solver.refuse_too_much(solves, memory, longest)?;
+        Ok(solver)
+    }
+
+    fn refuse_too_much(&self, solves: usize, memory: Option<u64>, longest: Option<f64>) -> Result<()> {
+        let (n, columns) = (self.pencil.n(), self.columns());
+        let numbers = self.analysis.peaks(rayon::current_num_threads()).inertia;
+        let bytes = 8 * (numbers + self.analysis.factor_len() as u64 + (4 * n * columns) as u64);
+        if let Some(available) = memory.filter(|available| bytes > *available) {
+            let message = format!(
+                "solving the equations of all {n} rows at a frequency needs {:.3} GB on top of the matrices, {:.3} GB are left",
+                bytes as f64 * 1e-9,
+                available as f64 * 1e-9
+            );
+            return Err(Diagnostic::new(Code::MemoryShort, message).into());
+        }
+        let each = 2.0 * self.analysis.flops() + 12.0 * (self.analysis.factor_len() * columns) as f64;
+        let seconds = solves as f64 * each / PACE;
+        if longest.is_some_and(|longest| seconds > longest) {
+            let message = format!(
+                "solving the equations of all {n} rows at {solves} frequencies takes about {:.1} hours on one processor",
+                seconds / 3600.0
+            );
+            let help = "ask for fewer --solves, or say --allow-long";
+            return Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into());
+        }
+        Ok(())
+    }
+
+    /// Columns that are solved for with one factor.
+    fn columns(&self) -> usize {
+        let inputs = self.loads.ncols();
+        self.damping.as_ref().map_or(inputs, |(u, _)| 2 * inputs + u.ncols())
+    }
+
+    /// Multiplications and additions of one factorisation.
+    pub(super) fn flops(&self) -> f64 {
+        self.analysis.flops()
+    }
+
+    /// The response at w > 0, radians per time.
+    ///
+    /// # Errors
+    /// [`FactorizationFailed`](Code::FactorizationFailed) where the solution has too few digits.
+    pub(super) fn at(&self, omega: f64) -> Result<DirectSolution> {
+        let factor = Indefinite::new(&self.analysis, &self.pencil, omega * omega);
+        let inertia = factor.inertia();
+        if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
+            return Err(inaccurate(omega, inertia.backward_error));
+        }
+        let point = Point { solver: self, damped: self.damped_at(&factor, omega), factor, omega };
+        let x = point.solution()?;
+        let product = gram(self.measured.as_ref(), x.as_ref());
+        let inputs = self.loads.ncols();
+        let response = DMatrix::from_fn(product.nrows(), inputs, |o, i| {
+            let imaginary = if product.ncols() > inputs { product[(o, inputs + i)] } else { 0.0 };
+            Complex::new(product[(o, i)] - self.rigid_gain[(o, i)] / (omega * omega), imaginary)
+        });
+        Ok(DirectSolution { response, modes_below: inertia.negative.saturating_sub(self.rigid.ncols()) })
+    }
+
+    /// Z = A^-1 U and (1 + i w C U'Z)^-1 i w C, with A = K - w^2 M.
+    fn damped_at(&self, factor: &Indefinite<'_>, omega: f64) -> Option<Damped> {
+        let (u, c) = self.damping.as_ref()?;
+        let mut z = u.clone();
+        factor.solve_in_place(z.as_mut());
+        self.deflate(&mut z);
+        let m = c.nrows();
+        let c = DMatrix::from_fn(m, m, |i, j| Complex::new(0.0, omega * c[(i, j)]));
+        let g = gram(u.as_ref(), z.as_ref());
+        let g = DMatrix::from_fn(m, m, |i, j| Complex::new(g[(i, j)], 0.0));
+        let gain = (DMatrix::identity(m, m) + &c * g).lu().solve(&c)?;
+        Some(Damped { z, gain })
+    }
+
+    /// X <- (1 - Phi Phi'M) X.
+    fn deflate(&self, x: &mut Mat<f64>) {
+        let along = gram(self.rigid_products.as_ref(), x.as_ref());
+        subtract_combination(x.as_mut(), self.rigid.as_ref(), along.as_ref());
+    }
+
+    /// F <- (1 - M Phi Phi') F.
+    fn equilibrate(&self, f: &mut Mat<f64>) {
+        let along = gram(self.rigid.as_ref(), f.as_ref());
+        subtract_combination(f.as_mut(), self.rigid_products.as_ref(), along.as_ref());
+    }
+}
+
+/// U and C of the columns that have damping.
+fn damped_columns(u: &Mat<f64>, c: &Mat<f64>) -> Option<(Mat<f64>, Mat<f64>)> {
+    let damped: Vec<usize> =
+        (0..c.ncols()).filter(|&j| (0..c.nrows()).any(|i| c[(i, j)] != 0.0 || c[(j, i)] != 0.0)).collect();
+    let m = damped.len();
+    (m > 0).then(|| {
+        (
+            Mat::from_fn(u.nrows(), m, |i, j| u[(i, damped[j])]),
+            Mat::from_fn(m, m, |i, j| c[(damped[i], damped[j])]),
+        )
+    })
+}
+
+fn inaccurate(omega: f64, residual: f64) -> flexbody_base::error::Error {
+    let message = format!(
+        "the equations of all nodes at {omega:.6e} rad per time are solved with a relative error of {residual:.1e} only"
+    );
+    Diagnostic::new(Code::FactorizationFailed, message).into()
+}
+
+/// What damping adds to solutions without: (A + i w U C U')^-1 = A^-1 - Z gain U'A^-1 (Woodbury).
+struct Damped {
+    z: Mat<f64>,
+    gain: DMatrix<Complex<f64>>,
+}
+
+/// One frequency.
+struct Point<'s, 'm> {
+    solver: &'s DirectSolver<'m>,
+    factor: Indefinite<'s>,
+    damped: Option<Damped>,
+    omega: f64,
+}
+
+impl Point<'_, '_> {
+    /// X = (K + i w D - w^2 M)^-1 B, refined until it stands.
+    fn solution(&self) -> Result<Parts> {
+        let loads = &self.solver.loads;
+        let nothing = Mat::zeros(loads.nrows(), loads.ncols());
+        let loads = match self.damped {
+            Some(_) => side_by_side(&[loads.as_ref(), nothing.as_ref()]),
+            None => loads.clone(),
+        };
+        let mut x = self.solved(loads.clone());
+        let mut change = f64::INFINITY;
+        for _ in 0..REFINEMENTS {
+            let mut residual = &loads - self.product(&x);
+            self.solver.equilibrate(&mut residual);
+            let correction = self.solved(residual);
+            change = largest_entry(correction.as_ref()) / largest_entry(x.as_ref()).max(f64::MIN_POSITIVE);
+            x += correction;
+            if change <= GOOD {
+                break;
+            }
+        }
+        // Not a number fails too.
+        if change <= ACCEPTED { Ok(x) } else { Err(inaccurate(self.omega, change)) }
+    }
+
+    /// (A + i w U C U')^-1 of self-equilibrated columns, by the factor alone.
+    fn solved(&self, columns: Parts) -> Parts {
+        let mut x = columns;
+        self.factor.solve_in_place(x.as_mut());
+        self.solver.deflate(&mut x);
+        if let (Some(damped), Some((u, _))) = (&self.damped, &self.solver.damping) {
+            let amplitudes = &damped.gain * complex(&gram(u.as_ref(), x.as_ref()));
+            subtract_combination(x.as_mut(), damped.z.as_ref(), real(&amplitudes).as_ref());
+        }
+        x
+    }
+
+    /// (K + i w D - w^2 M) X.
+    fn product(&self, x: &Parts) -> Parts {
+        let DirectSolver { pencil, damping, .. } = self.solver;
+        let mut product = pencil.apply_stiffness(x.as_ref())
+            - pencil.apply_mass(x.as_ref()) * Scale(self.omega * self.omega);
+        if let Some((u, c)) = damping {
+            let c = DMatrix::from_fn(c.nrows(), c.ncols(), |i, j| Complex::new(0.0, self.omega * c[(i, j)]));
+            let forces = c * complex(&gram(u.as_ref(), x.as_ref()));
+            add_combination(product.as_mut(), u.as_ref(), real(&forces).as_ref());
+        }
+        product
+    }
+}
+
+/// From columns of real parts with those of imaginary parts behind them.
+fn complex(parts: &Mat<f64>) -> DMatrix<Complex<f64>> {
+    let columns = parts.ncols() / 2;
+    DMatrix::from_fn(parts.nrows(), columns, |i, j| Complex::new(parts[(i, j)], parts[(i, columns + j)]))
+}
+
+/// And back.
+fn real(matrix: &DMatrix<Complex<f64>>) -> Mat<f64> {
+    let columns = matrix.ncols();
+    Mat::from_fn(matrix.nrows(), 2 * columns, |i, j| match j.checked_sub(columns) {
+        None => matrix[(i, j)].re,
+        Some(j) => matrix[(i, j)].im,
+    })
+}

@@ -1,0 +1,245 @@
+//! Where a force acts and where a displacement is read, and along which axes of the model.
+
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_model::FeModel;
+use flexbody_motion::scene::{Point, find_nodal_point};
+use nalgebra::Vector3;
+
+/// A force and a displacement along an axis of the model, or a torque and a rotation about it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Direction {
+    /// Along x.
+    X,
+    /// Along y.
+    Y,
+    /// Along z.
+    Z,
+    /// About x.
+    Rx,
+    /// About y.
+    Ry,
+    /// About z.
+    Rz,
+}
+
+impl Direction {
+    /// All six.
+    pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
+
+    /// `x`, `y`, `z`, `rx`, `ry`, `rz`.
+    pub fn name(self) -> &'static str {
+        ["x", "y", "z", "rx", "ry", "rz"][self as usize]
+    }
+
+    /// Whether it is a torque and a rotation.
+    pub fn turns(self) -> bool {
+        self as usize >= 3
+    }
+
+    /// The axis: 0, 1 or 2.
+    fn axis(self) -> usize {
+        self as usize % 3
+    }
+
+    /// Its place among the directions of a body of that dimension; `None` where the body does not have it.
+    fn column(self, dimension: usize) -> Option<usize> {
+        match (dimension, self) {
+            (3, _) | (_, Self::X | Self::Y) => Some(self as usize),
+            (_, Self::Rz) => Some(2),
+            _ => None,
+        }
+    }
+}
+
+/// A point of the body with the directions that count there.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Place {
+    /// A node, or the reference point of an interface.
+    pub point: Point,
+    /// Directions; empty: all displacements.
+    pub directions: Vec<Direction>,
+}
+
+/// A point of a body: where it is, and its displacements and rotations in the modes (3 x nf), the latter
+/// where something determines them.
+struct PointMotion {
+    position: Vector3<f64>,
+    translation: Mat<f64>,
+    rotation: Option<Mat<f64>>,
+}
+
+/// What a place is to the modes of a body.
+pub(super) struct PlaceRows {
+    /// Displacements and rotations of the modes along the directions (nf x k).
+    pub modal: Mat<f64>,
+    /// Force and torque about the centre of mass of a unit force or torque along each direction (6 x k).
+    pub rigid: Mat<f64>,
+}
+
+impl Place {
+    /// All displacements of a point.
+    pub fn of(point: Point) -> Self {
+        Self { point, directions: Vec::new() }
+    }
+
+    /// `17`, `big_end`, `big_end:z`, `17:x,rz`: a node by its number or an interface by its name, and which
+    /// directions count there.
+    pub fn parse(text: &str) -> Self {
+        let named = |name: &str| Direction::ALL.into_iter().find(|direction| direction.name() == name);
+        let point = |text: &str| text.parse().map_or_else(|_| Point::Interface(text.to_owned()), Point::Node);
+        // Whatever is no list of directions belongs to the name.
+        let split = text.rsplit_once(':').and_then(|(before, after)| {
+            let directions: Option<Vec<Direction>> =
+                after.split(',').map(|name| named(name.trim())).collect();
+            Some((before, directions?))
+        });
+        match split {
+            Some((before, mut directions)) => {
+                directions.sort_unstable();
+                directions.dedup();
+                Self { point: point(before), directions }
+            }
+            None => Self::of(point(text)),
+        }
+    }
+
+    /// The directions in a body of that dimension.
+    pub(super) fn directions_of(&self, dimension: usize) -> Vec<Direction> {
+        match self.directions.as_slice() {
+            [] => Direction::ALL[..dimension].to_vec(),
+            directions => directions.to_vec(),
+        }
+    }
+
+    /// Refuses what `body`, whose axes are those of the model and whose origin is the centre of mass, does
+    /// not have.
+    ///
+    /// # Errors
+    /// [`PlaceUnknown`](Code::PlaceUnknown).
+    pub(super) fn rows(&self, body: &FlexBody) -> Result<PlaceRows> {
+        let (nf, d) = (body.n_modes(), body.dimension());
+        let PointMotion { position, translation, rotation } = self.motion(body)?;
+        let directions = self.directions_of(d);
+        for direction in &directions {
+            if direction.column(d).is_none() {
+                return Err(self.lacks(*direction, "the body lies in a plane"));
+            }
+            if direction.turns() && rotation.is_none() {
+                return Err(self.lacks(*direction, "nothing there determines a rotation"));
+            }
+        }
+        let modal = Mat::from_fn(nf, directions.len(), |j, at| {
+            let (direction, rows) = (directions[at], rotation.as_ref().filter(|_| directions[at].turns()));
+            rows.unwrap_or(&translation)[(direction.axis(), j)]
+        });
+        let rigid = Mat::from_fn(6, directions.len(), |i, at| {
+            let axis = Vector3::ith(directions[at].axis(), 1.0);
+            let turns = directions[at].turns();
+            let force = if turns { Vector3::zeros() } else { axis };
+            let torque = if turns { axis } else { position.cross(&axis) };
+            if i < 3 { force[i] } else { torque[i - 3] }
+        });
+        Ok(PlaceRows { modal, rigid })
+    }
+
+    fn motion(&self, body: &FlexBody) -> Result<PointMotion> {
+        let (modes, nf) = (body.modes(), body.n_modes());
+        match &self.point {
+            Point::Node(number) => {
+                let found = body.nodes().ids.iter().position(|id| id == number);
+                let node = found.ok_or_else(|| self.unknown(body))?;
+                let rows_of_node = |shape: &Mat<f64>| Mat::from_fn(3, nf, |k, j| shape[(3 * node + k, j)]);
+                // Nodes without rotations have zeros in their place.
+                let turns = |rows: &Mat<f64>| (0..nf).any(|j| (0..3).any(|k| rows[(k, j)] != 0.0));
+                let rotation = modes.rotation.as_ref().map(rows_of_node).filter(turns);
+                let position = Vector3::from(body.nodes().positions[node]);
+                Ok(PointMotion { position, translation: rows_of_node(&modes.shape), rotation })
+            }
+            Point::Interface(name) => {
+                let found = body.interfaces().iter().find(|interface| interface.name == *name);
+                let interface = found.ok_or_else(|| self.unknown(body))?;
+                let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
+                let rows = interface.rows(body.nodes(), modes.shape.as_ref(), rotation, body.dimension());
+                match (rows, interface.reference) {
+                    (Some(rows), Some(reference)) => Ok(PointMotion {
+                        position: Vector3::from(reference),
+                        translation: rows.translation,
+                        rotation: rows.rotation,
+                    }),
+                    _ => {
+                        let message =
+                            format!("{} has no reference point: a free one has nodes only", self.point);
+                        let help = "name one of its nodes by its number";
+                        Err(Diagnostic::new(Code::PlaceUnknown, message).with_help(help).into())
+                    }
+                }
+            }
+        }
+    }
+
+    /// Nodal forces of a unit force or torque along each direction (N x k), which also read the
+    /// displacements.
+    ///
+    /// # Errors
+    /// [`PlaceUnknown`](Code::PlaceUnknown), and [`InterfaceNode`](Code::InterfaceNode).
+    pub(super) fn loads(&self, model: &FeModel) -> Result<Mat<f64>> {
+        let d = model.dimension();
+        let missing = || {
+            let message = format!("the model has no {} with a reference point", self.point);
+            Diagnostic::new(Code::PlaceUnknown, message)
+        };
+        let all = find_nodal_point(model, &self.point)?.ok_or_else(missing)?.unit_loads(model);
+        let mut columns = Mat::zeros(all.nrows(), 0);
+        for direction in self.directions_of(d) {
+            let column = direction.column(d).filter(|&column| column < all.ncols());
+            let load = column.map(|column| all.as_ref().col(column)).filter(|load| load.norm_max() > 0.0);
+            let load = load.ok_or_else(|| self.lacks(direction, "nothing there determines a rotation"))?;
+            columns.resize_with(all.nrows(), columns.ncols() + 1, |i, _| load[i]);
+        }
+        Ok(columns)
+    }
+
+    fn lacks(&self, direction: Direction, why: &str) -> flexbody_base::error::Error {
+        let message = format!("{} has no direction {}: {why}", self.point, direction.name());
+        Diagnostic::new(Code::PlaceUnknown, message).with_help("leave the direction out").into()
+    }
+
+    fn unknown(&self, body: &FlexBody) -> flexbody_base::error::Error {
+        let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
+        let help = match names.as_slice() {
+            [] => "the body has no interfaces: name a node by its number".to_owned(),
+            names => format!("interfaces: {}; nodes go by their numbers", names.join(", ")),
+        };
+        Diagnostic::new(Code::PlaceUnknown, format!("the body has no {}", self.point)).with_help(help).into()
+    }
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", self.point)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_are_read_as_they_are_written() {
+        let interface = |name: &str| Point::Interface(name.to_owned());
+        for (text, point, directions) in [
+            ("17", Point::Node(17), vec![]),
+            ("big_end", interface("big_end"), vec![]),
+            ("big_end:z", interface("big_end"), vec![Direction::Z]),
+            ("17:rz,x,x", Point::Node(17), vec![Direction::X, Direction::Rz]),
+            ("hub:left", interface("hub:left"), vec![]),
+            ("hub:left:y", interface("hub:left"), vec![Direction::Y]),
+            ("hub:", interface("hub:"), vec![]),
+        ] {
+            assert_eq!(Place::parse(text), Place { point, directions }, "{text}");
+        }
+    }
+}

@@ -1,0 +1,573 @@
+//! A body's response over a band, beside that of its model.
+
+use super::Complex;
+use super::band::{Band, Frequency, Resonance};
+use super::direct::{DirectSolution, DirectSolver};
+use super::enriched::NodalModes;
+use super::errors::{At, Compared, PairErrors};
+use super::modal_sum::ModalSum;
+use super::place::{Direction, Place, PlaceRows};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::units::UnitSystem;
+use flexbody_body::basis::{CoupledModel, rigid_modes};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::{gram, largest, side_by_side};
+use flexbody_model::{DampingRatios, FeModel};
+use flexbody_motion::scene::Requirements;
+use nalgebra::{DMatrix, Matrix6, Vector3};
+use rayon::prelude::*;
+use std::borrow::Cow;
+
+/// Modal masses of a body differ from one by less than this in the model that it was made of, for arrays of
+/// 32 bits too.
+const MODAL_MASS: f64 = 1e-4;
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Frequencies.
+    pub band: Band,
+    /// About as many frequencies the curves have.
+    pub points: usize,
+    /// At about as many of them the equations of all nodes are solved.
+    pub solves: usize,
+    /// Damping ratios of the modes, where they are not those of the body.
+    pub damping: Option<DampingRatios>,
+    /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
+    pub replaces_damping: bool,
+    /// Largest relative error.
+    pub tolerance: f64,
+    /// Bytes that may be allocated, and seconds that the solves may take by their estimate.
+    pub memory: Option<u64>,
+    /// See `memory`.
+    pub longest: Option<f64>,
+}
+
+impl Settings {
+    /// Frequencies of the curves: more cannot be told apart in a plot.
+    pub const POINTS: usize = 400;
+    /// Solves: enough for two dozen resonances.
+    pub const SOLVES: usize = 80;
+    /// Relative error: less than half a decibel.
+    pub const TOLERANCE: f64 = 0.05;
+}
+
+/// Transfer functions over a band.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Response {
+    /// Name of the body.
+    pub name: String,
+    /// Units of body and model.
+    pub units: UnitSystem,
+    /// Modes of the body.
+    pub modes: usize,
+    /// Whether the modes are damped.
+    pub damped: bool,
+    /// Frequencies in hertz, ascending.
+    pub frequencies: Vec<f64>,
+    /// What is loaded with what is watched.
+    pub pairs: Vec<Pair>,
+    /// Natural frequencies of the body in the band.
+    pub body_modes_in_band: usize,
+    /// What was solved; `None` without a model, and then no error is known.
+    pub solved: Option<Solved>,
+    /// Effect of rigid interfaces of the body, which the model has in the comparison as well; `None` without.
+    pub coupling: Option<CouplingEffect>,
+}
+
+/// The difference that rigid interfaces make in a frequency response.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CouplingEffect {
+    /// Names of the interfaces that no mode of the body deforms.
+    pub interfaces: Vec<String>,
+    /// The largest relative difference of the model under the coupling from the model whose interfaces deform, over all
+    /// pairs; `None` where no frequency could be solved for both.
+    pub largest: Option<At>,
+}
+
+/// The equations of all nodes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Solved {
+    /// Rows of the matrices.
+    pub rows: usize,
+    /// Frequencies at which they were solved.
+    pub solves: usize,
+    /// Multiplications and additions of one factorisation.
+    pub flops: f64,
+    /// Flexible natural frequencies of the model up to the end of the band, by the signs of the pivots there.
+    pub modes_in_band: usize,
+}
+
+/// From one place to another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pair {
+    /// Where forces act.
+    pub from: Place,
+    /// Where displacements are read.
+    pub to: Place,
+    /// Of every direction at the one place to every direction at the other.
+    pub functions: Vec<Function>,
+    /// How far reduced and full are apart; `None` without a model.
+    pub errors: Option<PairErrors>,
+}
+
+/// A transfer function: displacement per force, rotation per force, and so on, in the units of the body and
+/// radians.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Function {
+    /// Direction of the force or torque.
+    pub from: Direction,
+    /// Direction of the displacement or rotation.
+    pub to: Direction,
+    /// Of the reduced body, at every frequency.
+    pub reduced: Vec<Complex<f64>>,
+    /// Of all nodes, where their equations were solved.
+    pub full: Vec<Option<Complex<f64>>>,
+}
+
+impl Function {
+    /// `displacement per force`, `rotation per torque`, and so on.
+    pub fn kind(&self) -> &'static str {
+        match (self.to.turns(), self.from.turns()) {
+            (false, false) => "displacement per force",
+            (false, true) => "displacement per torque",
+            (true, false) => "rotation per force",
+            (true, true) => "rotation per torque",
+        }
+    }
+}
+
+impl Response {
+    /// Whether no error is above the tolerance; true where none is known.
+    pub fn holds(&self, tolerance: f64) -> bool {
+        let errors = self.pairs.iter().filter_map(|pair| pair.errors.as_ref());
+        errors.filter_map(|errors| errors.worst).all(|worst| worst.value <= tolerance)
+    }
+}
+
+/// The receptances of `body` from places to places over a band: displacements and rotations for unit forces
+/// and torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the
+/// body was made of also those of all its nodes, at some of the frequencies, with the damping that the body
+/// has: D = M Psi C Psi'M.
+///
+/// # Errors
+/// [`PlaceUnknown`](Code::PlaceUnknown) for a place that the body does not have;
+/// [`BodyIncomparable`](Code::BodyIncomparable) for a body of another model; failures of the solutions.
+pub fn respond(
+    model: Option<&FeModel>,
+    body: &FlexBody,
+    from: &[Place],
+    to: &[Place],
+    settings: &Settings,
+    watch: Watch<'_>,
+) -> Result<Response> {
+    let mean = body.in_mean_axes()?;
+    let body = &*damped(&mean, settings)?;
+    let at_centre = body.in_model_axes(body.invariants().first_moment() / body.invariants().mass())?;
+    let rows =
+        |places: &[Place]| places.iter().map(|place| place.rows(&at_centre)).collect::<Result<Vec<_>>>();
+    let damping = Some(body.damping()).filter(|c| c.norm_max() > 0.0);
+    let reduced = reduced_sum(&at_centre, &rows(from)?, &rows(to)?, damping.clone());
+    let known = match model {
+        Some(model) => Some(Known::new(model, body, [from, to], damping.as_ref(), settings, watch)?),
+        None => None,
+    };
+    let resonances =
+        known.as_ref().and_then(|known| known.enriched.as_ref()).unwrap_or(&reduced).resonances();
+    let resonances: Vec<Resonance> = resonances.map(|found| in_hertz(body.units(), found)).collect();
+    let solves = if known.is_some() { settings.solves } else { 0 };
+    let frequencies = settings.band.frequencies(settings.points, solves, &resonances);
+    let blocks = blocks(from, to, body.dimension());
+    let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units());
+    if let Some(known) = &known {
+        curves.look_closer(&blocks, settings.tolerance, solves.div_ceil(4));
+        curves.solve(known, body.units(), watch)?;
+    }
+    let [low, high] = settings.band.ends();
+    let in_band = |f: &f64| *f >= low && *f <= high;
+    Ok(Response {
+        name: body.source().name.clone(),
+        units: body.units().clone(),
+        modes: body.n_modes(),
+        damped: damping.is_some(),
+        pairs: blocks.iter().map(|block| curves.pair(block, settings.tolerance)).collect(),
+        body_modes_in_band: body.frequencies_hz().iter().filter(|f| in_band(f)).count(),
+        solved: known.as_ref().map(|known| curves.solved(known, low)),
+        coupling: known.as_ref().and_then(|known| curves.coupling_effect(known, &blocks, settings.tolerance)),
+        frequencies: curves.frequencies.iter().map(|f| f.hertz).collect(),
+    })
+}
+
+/// The body with the damping ratio of the settings for its modes, where they state one.
+fn damped<'b>(body: &'b FlexBody, settings: &Settings) -> Result<Cow<'b, FlexBody>> {
+    let Settings { damping, replaces_damping, .. } = settings;
+    let stated = Requirements {
+        damping: damping.clone(),
+        replaces_damping: *replaces_damping,
+        ..Requirements::default()
+    };
+    stated.damped(body, "--damping or the scene")
+}
+
+fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {
+    Resonance { hertz: units.frequency_of(square), ratio }
+}
+
+/// The response of a body in a frame along the axes of the model about its centre of mass: rigid motion of
+/// the undeformed body and the modes, which no rigid motion couples to at rest.
+fn reduced_sum(body: &FlexBody, from: &[PlaceRows], to: &[PlaceRows], damping: Option<Mat<f64>>) -> ModalSum {
+    let joined = |rows: &[PlaceRows], part: fn(&PlaceRows) -> &Mat<f64>| {
+        side_by_side(&rows.iter().map(|place| part(place).as_ref()).collect::<Vec<_>>())
+    };
+    let (forces, motions) = (joined(from, |place| &place.rigid), joined(to, |place| &place.rigid));
+    let compliance = rigid_compliance(body);
+    let rigid = Mat::from_fn(motions.ncols(), forces.ncols(), |o, i| {
+        let row = |k: usize| (0..6).map(|l| compliance[(k, l)] * forces[(l, i)]).sum::<f64>();
+        (0..6).map(|k| motions[(k, o)] * row(k)).sum()
+    });
+    ModalSum {
+        stiffness: body.modes().eigenvalue.clone(),
+        mass: vec![1.0; body.n_modes()],
+        damping,
+        inputs: joined(from, |place| &place.modal),
+        outputs: joined(to, |place| &place.modal),
+        rigid,
+    }
+}
+
+/// Accelerations of the undeformed body for unit forces and torques about its centre of mass; in the plane,
+/// those in the plane.
+fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
+    let (mass, inertia) = (body.invariants().mass(), body.invariants().inertia());
+    let mut compliance = Matrix6::zeros();
+    if body.dimension() == 2 {
+        compliance.set_diagonal(&nalgebra::Vector6::new(1.0, 1.0, 0.0, 0.0, 0.0, 0.0).unscale(mass));
+        compliance[(5, 5)] = 1.0 / inertia[(2, 2)];
+        return compliance;
+    }
+    compliance.fixed_view_mut::<3, 3>(0, 0).set_diagonal(&Vector3::repeat(1.0 / mass));
+    if let Some(inverse) = inertia.try_inverse() {
+        compliance.fixed_view_mut::<3, 3>(3, 3).copy_from(&inverse);
+    }
+    compliance
+}
+
+/// What the model knows.
+struct Known<'m> {
+    nodal: NodalModes<'m>,
+    /// The estimate: the response with static responses beside the modes; `None` where the modes leave
+    /// nothing to respond to.
+    enriched: Option<ModalSum>,
+    damping: Option<Mat<f64>>,
+    /// Memory and time that solutions may take.
+    limits: (Option<u64>, Option<f64>),
+}
+
+impl<'m> Known<'m> {
+    fn new(
+        model: &'m FeModel,
+        body: &FlexBody,
+        [from, to]: [&[Place]; 2],
+        damping: Option<&Mat<f64>>,
+        settings: &Settings,
+        watch: Watch<'_>,
+    ) -> Result<Self> {
+        watch(Event::Phase("estimate of the error"));
+        let nodal = nodal_modes(model, body, from, to)?;
+        let enriched = nodal.enriched(body, damping)?;
+        Ok(Self { nodal, enriched, damping: damping.cloned(), limits: (settings.memory, settings.longest) })
+    }
+
+    /// The equations of all nodes of `model`, under the couplings of the body or without, for `solves` frequencies.
+    fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
+        let NodalModes { inertial, loads, measured, .. } = &self.nodal;
+        let damping = self.damping.as_ref().map(|c| (inertial, c));
+        DirectSolver::new(model, [loads, measured], damping, solves, self.limits)
+    }
+
+    /// The model whose interfaces deform; `None` where no interface of the body is rigid.
+    fn deforming(&self) -> Option<CoupledModel<'m>> {
+        let coupled = &self.nodal.model;
+        (!coupled.rigid_interfaces().is_empty()).then(|| CoupledModel::uncoupled(coupled.model()))
+    }
+}
+
+/// The body in the rows of the model that it was made of.
+fn nodal_modes<'m>(
+    model: &'m FeModel,
+    body: &FlexBody,
+    from: &[Place],
+    to: &[Place],
+) -> Result<NodalModes<'m>> {
+    let foreign = |why: &str| {
+        let message = format!("the body was not made of this model: {why}");
+        let help = "give the model that the body was converted from";
+        Diagnostic::new(Code::BodyIncomparable, message).with_help(help)
+    };
+    let vectors = body.vectors_of(model).ok_or_else(|| foreign("it has other rows"))?;
+    let pencil = model.pencil();
+    let (inertial, elastic) = (pencil.apply_mass(vectors.as_ref()), pencil.apply_stiffness(vectors.as_ref()));
+    let mass = gram(vectors.as_ref(), inertial.as_ref());
+    let eigenvalue = &body.modes().eigenvalue;
+    let stiffness = gram(vectors.as_ref(), elastic.as_ref());
+    let apart = largest(
+        (0..eigenvalue.len())
+            .flat_map(|j| [(mass[(j, j)] - 1.0).abs(), (stiffness[(j, j)] / eigenvalue[j] - 1.0).abs()]),
+    );
+    if apart.is_nan() || apart > MODAL_MASS {
+        let why = format!("modal masses or stiffnesses of its modes differ by up to {apart:.1e}");
+        return Err(foreign(&why).into());
+    }
+    let unit_loads = |places: &[Place]| -> Result<Mat<f64>> {
+        let loads = places.iter().map(|place| place.loads(model)).collect::<Result<Vec<_>>>()?;
+        Ok(side_by_side(&loads.iter().map(|load| load.as_ref()).collect::<Vec<_>>()))
+    };
+    Ok(NodalModes {
+        model: body.coupled_model(model, vectors.as_ref()),
+        rigid: rigid_modes(model, &pencil)?,
+        vectors,
+        inertial,
+        elastic,
+        loads: unit_loads(from)?,
+        measured: unit_loads(to)?,
+    })
+}
+
+/// The responses of everything to everything, at every frequency.
+struct Curves {
+    frequencies: Vec<Frequency>,
+    reduced: Vec<DMatrix<Complex<f64>>>,
+    /// Empty without a model.
+    enriched: Vec<DMatrix<Complex<f64>>>,
+    full: Vec<Option<DirectSolution>>,
+    /// The same of the model whose interfaces deform, where some of the body are rigid.
+    deforming: Vec<Option<DirectSolution>>,
+    flops: f64,
+}
+
+impl Curves {
+    /// What modes tell; nothing is solved yet.
+    fn new(
+        reduced: &ModalSum,
+        known: Option<&Known<'_>>,
+        frequencies: Vec<Frequency>,
+        units: &UnitSystem,
+    ) -> Self {
+        let omega = |f: &Frequency| units.eigenvalue_of(f.hertz).sqrt();
+        let responses = |sum: &ModalSum| frequencies.par_iter().map(|f| sum.at(omega(f))).collect::<Vec<_>>();
+        let own = responses(reduced);
+        let enriched = match known {
+            Some(known) => known.enriched.as_ref().map_or_else(|| own.clone(), responses),
+            None => Vec::new(),
+        };
+        let [full, deforming] = [0; 2].map(|_| frequencies.iter().map(|_| None).collect());
+        Self { frequencies, reduced: own, enriched, full, deforming, flops: 0.0 }
+    }
+
+    /// Has the equations of all nodes solved also where the estimate of a block is largest and where it first
+    /// is above the tolerance, at up to `most` frequencies: what is said of them shall be measured.
+    fn look_closer(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
+        let mut found = Vec::new();
+        for errors in blocks.iter().filter_map(|(_, _, block)| self.errors(block, tolerance)) {
+            let estimated = &errors.estimated;
+            let first = estimated.iter().position(|error| *error > tolerance);
+            let largest = (0..estimated.len()).filter(|&i| estimated[i].is_finite());
+            found.extend(largest.max_by(|&a, &b| estimated[a].total_cmp(&estimated[b])));
+            found.extend(first);
+        }
+        let mut marked = 0;
+        for i in found {
+            if marked < most && !self.frequencies[i].solved {
+                self.frequencies[i].solved = true;
+                marked += 1;
+            }
+        }
+    }
+
+    /// Solves the equations of all nodes, under the couplings of the body and, where these hold something, without.
+    fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, watch: Watch<'_>) -> Result<()> {
+        watch(Event::Phase("equations of all nodes"));
+        let deforming = known.deforming();
+        let studies = if deforming.is_some() { 2 } else { 1 };
+        let count = studies * self.frequencies.iter().filter(|f| f.solved).count();
+        let solver = known.direct_solver(&known.nodal.model, count)?;
+        self.flops = solver.flops();
+        let part = |from: f64| move |done: f64| watch(Event::Fraction((from + done) / studies as f64));
+        self.full = self.solutions(&solver, units, &part(0.0))?;
+        if let Some(model) = &deforming {
+            watch(Event::Phase("equations of all nodes, interfaces that deform"));
+            self.deforming = self.solutions(&known.direct_solver(model, count)?, units, &part(1.0))?;
+        }
+        Ok(())
+    }
+
+    /// Solutions at the frequencies that are to be solved. Those with too few digits, at a natural frequency, are left
+    /// out.
+    ///
+    /// * `done`: hears the part that is done.
+    fn solutions(
+        &self,
+        solver: &DirectSolver<'_>,
+        units: &UnitSystem,
+        done: &dyn Fn(f64),
+    ) -> Result<Vec<Option<DirectSolution>>> {
+        let mut solutions: Vec<Option<DirectSolution>> = self.frequencies.iter().map(|_| None).collect();
+        let (count, mut failed) = (self.frequencies.len() as f64, None);
+        for (i, frequency) in self.frequencies.iter().enumerate().filter(|(_, f)| f.solved) {
+            match solver.at(units.eigenvalue_of(frequency.hertz).sqrt()) {
+                Ok(solution) => solutions[i] = Some(solution),
+                Err(error) if error.has(Code::FactorizationFailed) => failed = Some(error),
+                Err(error) => return Err(error),
+            }
+            done((i + 1) as f64 / count);
+        }
+        match failed {
+            Some(error) if solutions.iter().all(Option::is_none) => Err(error),
+            _ => Ok(solutions),
+        }
+    }
+
+    /// How far the model under the couplings of the body is from the model whose interfaces deform.
+    fn coupling_effect(
+        &self,
+        known: &Known<'_>,
+        blocks: &[(&Place, &Place, Block)],
+        tolerance: f64,
+    ) -> Option<CouplingEffect> {
+        let interfaces = known.nodal.model.rigid_interfaces();
+        if interfaces.is_empty() {
+            return None;
+        }
+        let of_block = |(_, _, block): &(&Place, &Place, Block)| {
+            let both = self.full.iter().zip(&self.deforming).enumerate();
+            let both: Vec<_> = both
+                .filter_map(|(i, (coupled, deforming))| {
+                    let [coupled, deforming] = [coupled.as_ref()?, deforming.as_ref()?];
+                    Some((
+                        self.frequencies[i].hertz,
+                        block.of(&coupled.response),
+                        block.of(&deforming.response),
+                    ))
+                })
+                .collect();
+            let compared: Vec<Compared<'_>> = both
+                .iter()
+                .map(|(hertz, coupled, deforming)| Compared {
+                    hertz: *hertz,
+                    reduced: coupled,
+                    enriched: coupled,
+                    full: Some(deforming),
+                })
+                .collect();
+            PairErrors::new(&compared, tolerance).largest
+        };
+        let largest = blocks.iter().filter_map(of_block).max_by(|a, b| a.value.total_cmp(&b.value));
+        Some(CouplingEffect { interfaces, largest })
+    }
+
+    fn solved(&self, known: &Known<'_>, low: f64) -> Solved {
+        let mut below = self.full.iter().flatten().map(|solution| solution.modes_below);
+        let first = below.next().unwrap_or(0);
+        let last = below.next_back().unwrap_or(first);
+        Solved {
+            rows: known.nodal.model.pencil().n(),
+            solves: self.full.iter().flatten().count(),
+            flops: self.flops,
+            // A band that begins above some modes does not have them.
+            modes_in_band: if low > 0.0 { last.saturating_sub(first) } else { last },
+        }
+    }
+
+    fn pair(&self, (from, to, block): &(&Place, &Place, Block), tolerance: f64) -> Pair {
+        Pair {
+            from: (*from).clone(),
+            to: (*to).clone(),
+            functions: self.functions(block),
+            errors: self.errors(block, tolerance),
+        }
+    }
+
+    fn functions(&self, block: &Block) -> Vec<Function> {
+        let mut functions = Vec::new();
+        for &(column, from) in &block.columns {
+            for &(row, to) in &block.rows {
+                let entry = |s: &Option<DirectSolution>| s.as_ref().map(|s| s.response[(row, column)]);
+                functions.push(Function {
+                    from,
+                    to,
+                    reduced: self.reduced.iter().map(|h| h[(row, column)]).collect(),
+                    full: self.full.iter().map(entry).collect(),
+                });
+            }
+        }
+        functions
+    }
+
+    fn errors(&self, block: &Block, tolerance: f64) -> Option<PairErrors> {
+        if self.enriched.is_empty() {
+            return None;
+        }
+        let blocks = |all: &[DMatrix<Complex<f64>>]| all.iter().map(|h| block.of(h)).collect::<Vec<_>>();
+        let (reduced, enriched) = (blocks(&self.reduced), blocks(&self.enriched));
+        let full: Vec<_> = self.full.iter().map(|s| s.as_ref().map(|s| block.of(&s.response))).collect();
+        let compared: Vec<Compared<'_>> = (0..reduced.len())
+            .map(|i| Compared {
+                hertz: self.frequencies[i].hertz,
+                reduced: &reduced[i],
+                enriched: &enriched[i],
+                full: full[i].as_ref(),
+            })
+            .collect();
+        Some(PairErrors::new(&compared, tolerance))
+    }
+}
+
+/// Directions at every place, with their numbers among those of all places.
+fn numbered(places: &[Place], dimension: usize) -> impl Iterator<Item = (&Place, Vec<(usize, Direction)>)> {
+    let mut next = 0;
+    places.iter().map(move |place| {
+        let directions = place.directions_of(dimension).into_iter();
+        let numbered = directions.map(|direction| {
+            next += 1;
+            (next - 1, direction)
+        });
+        (place, numbered.collect())
+    })
+}
+
+/// From each place to each other: forces and torques apart, and displacements and rotations.
+fn blocks<'p>(from: &'p [Place], to: &'p [Place], dimension: usize) -> Vec<(&'p Place, &'p Place, Block)> {
+    let mut blocks = Vec::new();
+    for (source, columns) in numbered(from, dimension) {
+        for (target, rows) in numbered(to, dimension) {
+            for turns in [(false, false), (false, true), (true, false), (true, true)] {
+                let kind_alone = |all: &[(usize, Direction)], turns: bool| {
+                    all.iter().copied().filter(|(_, d)| d.turns() == turns).collect::<Vec<_>>()
+                };
+                let block =
+                    Block { columns: kind_alone(&columns, turns.0), rows: kind_alone(&rows, turns.1) };
+                if !block.columns.is_empty() && !block.rows.is_empty() {
+                    blocks.push((source, target, block));
+                }
+            }
+        }
+    }
+    blocks
+}
+
+/// Rows and columns of a pair of places, with their directions.
+struct Block {
+    rows: Vec<(usize, Direction)>,
+    columns: Vec<(usize, Direction)>,
+}
+
+impl Block {
+    fn of(&self, response: &DMatrix<Complex<f64>>) -> DMatrix<Complex<f64>> {
+        DMatrix::from_fn(self.rows.len(), self.columns.len(), |o, i| {
+            response[(self.rows[o].0, self.columns[i].0)]
+        })
+    }
+}

@@ -1,0 +1,171 @@
+//! The scenes that a selection has to hold in, and trials by bounds in all of them.
+
+use super::norms::Norms;
+use super::situation::Situation;
+use super::trial::{Trial, TrialRuns};
+use super::variation::Variation;
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::{FlexBody, Group, Groups};
+use flexbody_motion::dynamics::BodyPoint;
+use flexbody_motion::scene::{OutputErrors, Range, Scene, points_of};
+use nalgebra::Vector3;
+
+/// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
+pub(super) const PART_OF_BOUNDS: f64 = 0.5;
+
+/// How far the run may stay behind the rotation that the scene allows for its measurements to count.
+pub(super) const SLACK_OF_RANGE: f64 = 1.01;
+
+/// Sets of groups that a body may be left with, cheapest first. A body that is carried keeps all: dropped
+/// groups are those of its own modes, and what the interface takes from these needs them.
+pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = Groups> {
+    sets().filter(move |set| !carried || *set == Groups::ALL)
+}
+
+/// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size
+/// of K_ff, W3 two times three.
+pub(super) fn sets() -> impl Iterator<Item = Groups> {
+    (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
+}
+
+/// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays
+/// behind that.
+pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
+    let (loads, _) = points_of(body, scene)?;
+    let allowed = Situation::new(body, scene, &loads);
+    let mut own = scene.clone();
+    own.requirements.motion = Default::default();
+    let (spin, acceleration) = match (scene.rotation(), &scene.carried) {
+        (Some(velocity), _) => {
+            let rate = Variation::of_vector(velocity, allowed.duration.value);
+            (rate.largest, rate.rate)
+        }
+        (None, Some(_)) => (0.0, 0.0),
+        // The accelerations of a free body grow like the square of its angular velocity.
+        (None, None) => (scene.initial.angular_velocity.norm(), f64::INFINITY),
+    };
+    let velocity = allowed.spin.value / spin;
+    let acceleration = match scene.requirements.motion.angular_acceleration {
+        Some(_) => allowed.acceleration.value / acceleration,
+        None => 0.0,
+    };
+    let factor = velocity.max(acceleration);
+    if scene.requirements.motion == own.requirements.motion || scene.run.duration.is_none() {
+        return Ok(vec![scene.clone()]);
+    }
+    if factor.is_nan() || factor <= SLACK_OF_RANGE {
+        return Ok(vec![own]);
+    }
+    let mut scaled = own.turning_faster(factor);
+    match (scene.prescribes(), &scene.requirements.motion.angular_velocity) {
+        (true, _) if factor.is_infinite() => return Ok(vec![scene.clone()]),
+        // A free body that does not turn at first is given the rotation.
+        (false, Some(range)) if factor.is_infinite() => {
+            scaled.initial.angular_velocity = match range {
+                Range::Axes(components) => *components,
+                Range::Any(length) if body.dimension() == 2 => Vector3::z() * *length,
+                Range::Any(length) => Vector3::repeat(length / 3f64.sqrt()),
+            };
+        }
+        _ => scaled.initial.angular_velocity *= factor,
+    }
+    Ok(vec![own, scaled])
+}
+
+/// A scene to try models in.
+pub(super) struct Case<'c> {
+    body: &'c FlexBody,
+    scene: &'c Scene,
+    pub situation: Situation,
+    loads: Vec<BodyPoint>,
+    watched: Vec<BodyPoint>,
+    memory: Option<u64>,
+}
+
+impl<'c> Case<'c> {
+    pub(super) fn new(body: &'c FlexBody, scene: &'c Scene, memory: Option<u64>) -> Result<Self> {
+        let (loads, watched) = points_of(body, scene)?;
+        let situation = Situation::new(body, scene, &loads);
+        Ok(Self { body, scene, situation, loads, watched, memory })
+    }
+
+    /// Sizes of the terms at tier 0 and, where they are wanted and the body holds all groups, at tier 1.
+    /// Nothing without bounds.
+    fn norms(&self, tier_1: bool) -> Vec<Norms> {
+        let Ok(driven) = &self.situation.driven else { return Vec::new() };
+        let (invariants, eigenvalues) = (self.body.invariants(), &self.body.modes().eigenvalue);
+        let axis = driven.rotation.axis.as_ref();
+        let rigid = Norms::of_rigid(&invariants.inertia(), eigenvalues, axis);
+        let own = tier_1.then(|| Norms::of_invariants(invariants, eigenvalues, axis)).flatten();
+        [Some(rigid), own].into_iter().flatten().collect()
+    }
+
+    pub(super) fn runs(&self) -> TrialRuns<'_> {
+        let Self { body, scene, situation, loads, watched, memory } = self;
+        TrialRuns { body, scene, situation, loads, watched, memory: *memory }
+    }
+}
+
+/// Trials by bounds, up to the first set of groups that passes. Where the rotation is that of a run, the
+/// models that cost a multiple of nf only are run; others are as dear as a measurement.
+pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
+    // Norms of the actual terms are eigenproblems of the size of the basis: once for every case.
+    let norms: Vec<Vec<Norms>> = cases.iter().map(|case| case.norms(tier_1)).collect();
+    let mut trials = Vec::new();
+    let only_w1 = Groups::NONE.with(Group::W1);
+    for kept in sets().filter(|set| *set != Groups::ALL) {
+        let by_tier = cases.iter().zip(&norms).map(|(case, norms)| -> Result<Vec<Trial>> {
+            let runs = case.runs();
+            let TrialRuns { body, scene, situation, .. } = runs;
+            let Ok(driven) = &situation.driven else { return Ok(Vec::new()) };
+            let is_of_run = driven.rotation.of_run;
+            let follows_run = scene.spin.is_some() && scene.run.duration.is_some() && is_of_run;
+            let held = body.invariants().groups();
+            let is_cheap = kept == Groups::NONE || kept == only_w1 && held.w1;
+            if follows_run && !is_cheap {
+                return Ok(Vec::new());
+            }
+            let run = if follows_run { runs.fine_motion(kept)? } else { None };
+            let tiers = norms.iter();
+            Ok(tiers.map(|norms| runs.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
+        });
+        let by_case: Vec<Vec<Trial>> = by_tier.collect::<Result<_>>()?;
+        let tiers = by_case.iter().map(Vec::len).min().unwrap_or(0);
+        for tier in 0..tiers {
+            let trial = worst(by_case.iter().map(|trials| trials[tier].clone()));
+            let passed = trial.passed();
+            trials.push(trial);
+            if passed {
+                return Ok(trials);
+            }
+        }
+    }
+    Ok(trials)
+}
+
+/// The trial with the largest error over its tolerance, one at least, with the larger of each error of all trials that
+/// have errors.
+pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
+    let trials: Vec<Trial> = trials.collect();
+    let errors = trials.iter().filter_map(|trial| trial.errors).reduce(OutputErrors::larger_of);
+    let worst = trials.into_iter().max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("a scene to try it in");
+    Trial { errors: worst.errors.and(errors), ..worst }
+}
+
+/// The trial of a model in all load cases: that of the case in which its errors take the largest part of what
+/// is left of the tolerances there. Of a scene alone it is its own.
+pub(super) fn together(trials: Vec<Trial>) -> Trial {
+    let part = |trial: &Trial| (!trial.passed(), trial.worst / trial.budget);
+    let larger = |a: &Trial, b: &Trial| {
+        let (a, b) = (part(a), part(b));
+        a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+    };
+    let by_case: Vec<f64> = trials.iter().map(|trial| trial.worst).collect();
+    let several = trials.len() > 1;
+    let largest = trials.into_iter().enumerate().max_by(|a, b| larger(&a.1, &b.1).then(b.0.cmp(&a.0)));
+    let (at, mut trial) = largest.expect("a load case to try it in");
+    if several {
+        (trial.case, trial.by_case) = (Some(at), by_case);
+    }
+    trial
+}

@@ -1,0 +1,173 @@
+//! A selection on its way: from what bounds leave to what is measured.
+
+use super::basis::BEYOND_BAND;
+use super::cases::{SLACK_OF_RANGE, together, worst};
+use super::demand::Demand;
+use super::search::{Choice, Search, Tried, TriedCase};
+use super::trial::Trial;
+use super::warnings::{phase_drifts, resonances};
+use crate::reference::{PART_OF_REFERENCE, ReferenceError};
+use flexbody_base::diagnostic::Diagnostic;
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::Groups;
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_motion::scene::{Measure, Trace};
+
+/// What was tried and what is chosen so far.
+pub(super) struct Deciding<'s> {
+    demands: &'s [Demand<'s>],
+    pub choice: Choice,
+    pub trials: Vec<Trial>,
+    /// Of each load case the largest rotation of its runs and that which it allows, where the runs stay
+    /// behind that.
+    pub short_of: Vec<Option<(f64, f64)>>,
+    /// The chosen model in each load case, measured.
+    pub chosen_by_case: Vec<Trial>,
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+impl<'s> Deciding<'s> {
+    /// All modes, and what bounds leave of the groups in any load case.
+    pub(super) fn new(demands: &'s [Demand<'s>]) -> Self {
+        let mut diagnostics = Vec::new();
+        let mut trials = Vec::new();
+        for (at, demand) in demands.iter().enumerate() {
+            diagnostics.extend(demand.found.iter().cloned().map(|said| demand.about(said)));
+            let warning = demand.lacks.last().and_then(|own| own.warning(demand.scene, PART_OF_REFERENCE));
+            let remark = demand.lacks.last().and_then(ReferenceError::coupling_remark);
+            diagnostics.extend(remark.into_iter().chain(warning).map(|said| demand.about(said)));
+            let case = (demands.len() > 1).then_some(at);
+            trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
+        }
+        let choice = Choice {
+            groups: demands.iter().fold(Groups::NONE, |groups, demand| groups.or(demand.groups())),
+            modes: (0..demands[0].body.n_modes()).collect(),
+            shares: Vec::new(),
+            chosen: None,
+        };
+        let short_of = vec![None; demands.len()];
+        Self { demands, choice, trials, short_of, chosen_by_case: Vec::new(), diagnostics }
+    }
+
+    /// Whether motion can be measured.
+    pub(super) fn has_run(&self) -> bool {
+        self.demands.iter().all(|demand| demand.scene.run.duration.is_some())
+    }
+
+    /// Chooses the modes of the highest band of the load cases, all where one has none; gives the reason.
+    pub(super) fn choose_by_band(&mut self) -> String {
+        let bands = self.demands.iter().map(|demand| demand.scene.requirements.band);
+        let band = bands.collect::<Option<Vec<f64>>>().map(|bands| bands.into_iter().fold(0.0, f64::max));
+        let modes = self.demands[0].body.modes();
+        let within = |&j: &usize| {
+            let frequency = modes.eigenvalue[j].sqrt() / std::f64::consts::TAU;
+            // Residual vectors are what makes up for the modes beyond the band.
+            let free = modes.provenance.get(j).is_none_or(|from| from == "free mode");
+            band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
+        };
+        let within: Vec<usize> = self.choice.modes.iter().copied().filter(within).collect();
+        if !within.is_empty() {
+            self.choice.modes = within;
+        }
+        match band {
+            Some(band) => {
+                format!("free modes up to {BEYOND_BAND} times the highest frequency of interest, {band}")
+            }
+            None => "the scene has neither a duration nor a band: all".to_owned(),
+        }
+    }
+
+    /// Chooses terms and modes by motion that is integrated; gives the reason for the modes.
+    pub(super) fn choose_by_motion(&mut self, watch: Watch<'_>) -> Result<String> {
+        watch(Event::Phase("reference motion"));
+        let references = self.reference_motions()?;
+        let demands = self.demands;
+        let both = demands.iter().zip(&references);
+        let cases: Vec<TriedCase<'_>> = both.map(|(demand, motions)| Self::tried(demand, motions)).collect();
+        watch(Event::Phase("trials"));
+        let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
+        let search = Search {
+            cases: &cases,
+            fixed: fixed.fold(Groups::NONE, |fixed, (demand, _)| fixed.or(demand.groups())),
+            carried: demands.iter().any(|demand| demand.scene.carried.is_some()),
+        };
+        let reason = self.search(&search)?;
+        self.measure_choice(&search)?;
+        Ok(reason)
+    }
+
+    fn tried<'t>(demand: &'t Demand<'t>, references: &'t [Trace]) -> TriedCase<'t> {
+        let tried = demand.cases.iter().zip(references);
+        TriedCase {
+            tried: tried
+                .map(|(case, trace)| Tried { runs: case.runs(), measure: Measure::new(demand.body, trace) })
+                .collect(),
+            budget: demand.budget(),
+        }
+    }
+
+    /// The motion of the whole body, as far as bounds leave it whole, in every scene of every load case.
+    fn reference_motions(&mut self) -> Result<Vec<Vec<Trace>>> {
+        let mut by_case = Vec::new();
+        for (demand, short_of) in self.demands.iter().zip(&mut self.short_of) {
+            let mut references = Vec::new();
+            for case in &demand.cases {
+                let (reference, said) =
+                    case.runs().motion(demand.groups()).map_err(|error| match demand.name {
+                        Some(name) => error.about(format!("case `{name}`")),
+                        None => error,
+                    })?;
+                self.diagnostics.extend(said.into_iter().map(|said| demand.about(said)));
+                references.push(reference);
+            }
+            let largest = references.iter().map(|one| one.extremes.spin).fold(0.0, f64::max);
+            let allowed = demand.situation.spin.value;
+            let is_given = demand.scene.requirements.motion.angular_velocity.is_some();
+            if allowed > SLACK_OF_RANGE * largest && is_given {
+                *short_of = Some((largest, allowed));
+            }
+            by_case.push(references);
+        }
+        Ok(by_case)
+    }
+
+    /// Drops terms and modes; gives the reason for the modes.
+    fn search(&mut self, search: &Search<'_>) -> Result<String> {
+        let (choice, trials) = (&mut self.choice, &mut self.trials);
+        if let Some(most) = self.demands[0].scene.requirements.multiplications {
+            return Ok(match search.within_cost(most, choice, trials)? {
+                true => format!("the most accurate of at most {most} multiplications"),
+                false => format!("no model takes {most} multiplications or fewer: everything is kept"),
+            });
+        }
+        search.terms(choice, trials)?;
+        search.modes(choice, trials)?;
+        search.fewer_terms(choice, trials)?;
+        let within = match self.demands.len() {
+            1 => "the tolerances",
+            _ => "the tolerances of every load case",
+        };
+        Ok(format!("the fewest whose motion is within {within}"))
+    }
+
+    /// Measures the chosen model in every scene, and says what may go wrong with it.
+    fn measure_choice(&mut self, search: &Search<'_>) -> Result<()> {
+        for (demand, case) in self.demands.iter().zip(search.cases) {
+            let mut chosen = Vec::new();
+            let mut growth = None;
+            for Tried { runs, measure } in &case.tried {
+                let (modes, groups) = (&self.choice.modes, self.choice.groups);
+                let (trial, history) = runs.measured(measure, modes, groups, case.budget)?;
+                let own = history.and_then(|history| history.growth(measure.trace(), demand.tolerance()));
+                growth = [growth, own].into_iter().flatten().reduce(f64::max);
+                let said = resonances(runs, measure, modes).into_iter();
+                self.diagnostics.extend(said.map(|said| demand.about(said)));
+                chosen.push(trial);
+            }
+            self.diagnostics.extend(growth.map(|growth| demand.about(phase_drifts(growth))));
+            self.chosen_by_case.push(worst(chosen.into_iter()));
+        }
+        self.choice.chosen = Some(together(self.chosen_by_case.clone()));
+        Ok(())
+    }
+}

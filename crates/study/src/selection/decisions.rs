@@ -1,0 +1,143 @@
+//! Decisions in words and numbers, and the trials that they rest on.
+
+use super::demand::Demand;
+use super::search::Choice;
+use super::situation::Input;
+use super::trial::Trial;
+use flexbody_body::flex_body::{Group, Groups, TermDecision};
+
+/// The error that a decision about a group rests on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// The output whose error is largest beside its tolerance: attitude, deflection, stress or reaction.
+    pub output: &'static str,
+    /// Its error without the group: of the attitude in radians, else relative. A bound, or measured over a
+    /// run (`tier` 2).
+    pub error: f64,
+    /// The tolerance of the scene.
+    pub tolerance: f64,
+    /// The part of the tolerance that may be spent on dropping groups.
+    pub budget: f64,
+    /// 0: bound from I0 and the frequencies; 1: bound with the norms of the invariants; 2: measured.
+    pub tier: u8,
+    /// The load case (from 0) that it belongs to, where there are several.
+    pub case: Option<usize>,
+}
+
+/// What decisions are made from: what every load case demands, what was chosen, and what was tried on the
+/// way.
+pub(super) struct Deliberation<'d> {
+    pub demands: &'d [Demand<'d>],
+    pub choice: &'d Choice,
+    pub trials: &'d [Trial],
+}
+
+impl Deliberation<'_> {
+    /// The decision about every group, and the error that it rests on where there is one.
+    pub(super) fn decisions(&self) -> Vec<(TermDecision, Option<Ground>)> {
+        Group::ALL.into_iter().map(|group| self.decide(group)).collect()
+    }
+
+    fn decide(&self, group: Group) -> (TermDecision, Option<Ground>) {
+        let body = self.demands[0].body;
+        let kept = self.choice.groups.has(group);
+        if !body.invariants().groups().has(group) {
+            let earlier = body.terms().iter().find(|decision| decision.group == group).cloned();
+            return (earlier.unwrap_or_else(|| undecided(group, false, "the body does not hold it")), None);
+        }
+        let basis = if kept { self.last_without(group) } else { self.first_that_passed(group) };
+        let (mut decided, ground) = match basis {
+            Some(trial) => {
+                let rotation = &demand_of(trial, self.demands).situation.spin;
+                (decision(group, kept, trial, self.demands, rotation), ground(trial, self.demands))
+            }
+            None => (undecided(group, kept, "nothing shows that it may be dropped"), None),
+        };
+        let short = self.demands.iter().find_map(|demand| Some((demand, demand.short_of?)));
+        if let Some((demand, (reached, allowed))) = short.filter(|_| kept) {
+            let of = demand.name.map_or_else(String::new, |name| format!(" of case `{name}`"));
+            decided.reason = format!(
+                "{}; the run{of} turns with {reached:.3e} only where the scene allows {allowed:.3e}, so nothing was measured",
+                decided.reason
+            );
+        }
+        (decided, ground)
+    }
+
+    /// Whether a trial is of all load cases; bounds are of one each.
+    fn is_of_all(&self, trial: &Trial) -> bool {
+        self.demands.len() == 1 || !trial.by_case.is_empty()
+    }
+
+    /// The last trial of what is kept without `group`.
+    fn last_without(&self, group: Group) -> Option<&Trial> {
+        let kept = self.choice.groups.and(Groups::without(group));
+        let without = || self.trials.iter().filter(move |trial| trial.kept == kept);
+        without().rfind(|trial| self.is_of_all(trial)).or(without().rfind(|trial| !trial.passed()))
+    }
+
+    /// The first trial of what is kept that passed; where bounds of each load case decided, the largest of
+    /// those without `group`.
+    fn first_that_passed(&self, group: Group) -> Option<&Trial> {
+        let kept = self.choice.groups;
+        let passed = || self.trials.iter().filter(|trial| trial.passed());
+        let of_all = passed().find(|trial| trial.kept == kept && self.is_of_all(trial));
+        let bounds = passed().filter(|trial| !trial.kept.has(group));
+        of_all.or(self.choice.chosen.as_ref()).or(bounds.max_by(|a, b| a.worst.total_cmp(&b.worst)))
+    }
+}
+
+fn undecided(group: Group, kept: bool, reason: &str) -> TermDecision {
+    TermDecision { group, kept, tier: 0, bound: 0.0, limit: 0.0, reason: reason.to_owned() }
+}
+
+/// What the load case of a trial demands.
+fn demand_of<'d>(trial: &Trial, demands: &'d [Demand<'d>]) -> &'d Demand<'d> {
+    &demands[trial.case.unwrap_or(0)]
+}
+
+/// What is largest beside its tolerance in a trial; `None` where its errors are not known.
+fn ground(trial: &Trial, demands: &[Demand<'_>]) -> Option<Ground> {
+    let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite())?;
+    let (output, error, tolerance) = errors.decisive(demand_of(trial, demands).tolerance());
+    Some(Ground { output, error, tolerance, budget: trial.budget, tier: trial.tier, case: trial.case })
+}
+
+/// The decision that a trial without `group` leads to; `rotation` is the one that it rests on.
+pub(super) fn decision(
+    group: Group,
+    kept: bool,
+    trial: &Trial,
+    demands: &[Demand<'_>],
+    rotation: &Input,
+) -> TermDecision {
+    let ground = ground(trial, demands);
+    let demand = demand_of(trial, demands);
+    let how = match trial.tier {
+        2 => "measured over the run",
+        1 => "bound with the norms of the invariants",
+        _ => "bound from I0 and the frequencies",
+    };
+    let reason = match (&ground, trial.remark.as_str()) {
+        (Some(ground), _) => format!("error of {}, {how}; rotation from {}", ground.output, rotation.source),
+        (None, "") => format!("no finite {how}"),
+        (None, remark) => remark.to_owned(),
+    };
+    let reason = match demand.name {
+        Some(name) => format!("case `{name}`: {reason}"),
+        None => reason,
+    };
+    let (bound, limit) = ground.map_or((0.0, 0.0), |one| (one.error, one.tolerance * one.budget));
+    TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
+}
+
+/// The guideline of \[WP19\] section 8 that a set of groups is nearest to.
+pub(super) fn guideline(groups: Groups) -> &'static str {
+    match (groups.w1, groups.w2, groups.w3) {
+        (false, false, false) => "I: inertia of the undeformed body",
+        (true, false, false) => "II: constant centrifugal load, and W1 in the inertia with it",
+        (_, true, false) | (true, false, true) => "III: inertia of the deformed body",
+        (false, false, true) => "IV: Coriolis forces",
+        (_, true, true) => "III and IV: inertia of the deformed body and Coriolis forces",
+    }
+}

@@ -1,0 +1,360 @@
+//! What the terms that a model drops would add along its own motion.
+
+use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
+use super::first_order::{FirstOrder, ModalState, Oscillators};
+use super::norms::Norms;
+use faer::Mat;
+use flexbody_body::flex_body::{FlexBody, Group, Groups};
+use flexbody_linalg::larger;
+use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
+use flexbody_motion::scene::{Recording, Scene};
+use nalgebra::Vector3;
+
+/// A motion without some terms, and what these would add at its instants: from norms of the terms at tier 0,
+/// at tier 1 from the terms.
+pub(super) struct DroppedTerms {
+    pub amplitude: Amplitude,
+    /// What the balance of modal forces lacks.
+    pub load: LoadSizes,
+    /// What the balance of torques lacks.
+    pub defect: TorqueDefect,
+    /// The error in the first order, where the terms themselves are known.
+    pub first_order: Option<FirstOrder>,
+}
+
+/// The motion at one instant.
+struct Instant<'r> {
+    time: f64,
+    /// Angular velocity and acceleration.
+    omega: Vector3<f64>,
+    alpha: Vector3<f64>,
+    q: &'r [f64],
+    qd: &'r [f64],
+    /// q'', from the motion at the instants beside.
+    acceleration: Vec<f64>,
+}
+
+impl DroppedTerms {
+    /// Of the motion `run` of `body` in `scene` with the groups `kept`.
+    pub(super) fn new(body: &FlexBody, scene: &Scene, run: &Recording, kept: Groups, norms: &Norms) -> Self {
+        let eigenvalues = &body.modes().eigenvalue;
+        let root: Vec<f64> = eigenvalues.iter().map(|l| l.sqrt()).collect();
+        let instants = instants(scene, run);
+        let most = |size: &dyn Fn(&Instant<'_>) -> f64| instants.iter().map(size).fold(0.0, larger);
+        let amplitude = Amplitude {
+            energy: most(&|i| weighted(i.q, &root)),
+            coordinate: most(&|i| norm(i.q)),
+            rate: most(&|i| norm(i.qd)),
+            acceleration: most(&|i| norm(&i.acceleration)),
+            energy_rate: most(&|i| weighted(i.qd, &root)),
+        };
+        if norms.tier == 0 {
+            let (load, defect) = by_norms(&instants, kept.complement(), norms, &root);
+            return Self { amplitude, load, defect, first_order: None };
+        }
+        let (load, defect, forces) = by_terms(body, &instants, kept, &root);
+        let first_order = first_order(body, scene, &instants, &forces, norms);
+        Self { amplitude, load, defect, first_order }
+    }
+}
+
+/// The response of every mode alone to the `forces` that the dropped terms are at the instants; and what the
+/// terms that couple the modes make of that, which is left to bounds.
+fn first_order(
+    body: &FlexBody,
+    scene: &Scene,
+    instants: &[Instant<'_>],
+    forces: &[Vec<f64>],
+    norms: &Norms,
+) -> Option<FirstOrder> {
+    let times: Vec<f64> = instants.iter().map(|instant| instant.time).collect();
+    let oscillators = Oscillators::new(body, &times)?;
+    let (errors, mut first) = oscillators.respond(forces, scene.initial.settled);
+    let along: Vec<Instant<'_>> =
+        instants.iter().zip(&errors).map(|(instant, error)| instant.of_error(error)).collect();
+    let coupling = Groups::NONE.with(Group::W2).with(Group::W3);
+    let (rest, _) = by_norms(&along, coupling, norms, oscillators.root());
+    first.rest.impulse += rest.impulse;
+    first.rest.begun += rest.begun;
+    first.rest.moved += rest.moved;
+    first.rest.largest += rest.largest;
+    Some(first)
+}
+
+impl<'r> Instant<'r> {
+    /// An error of the modes in place of their motion.
+    fn of_error<'e>(&self, error: &'e ModalState) -> Instant<'e> {
+        let Self { time, omega, alpha, .. } = *self;
+        Instant { time, omega, alpha, q: &error.q, qd: &error.qd, acceleration: Vec::new() }
+    }
+}
+
+fn instants<'r>(scene: &Scene, run: &'r Recording) -> Vec<Instant<'r>> {
+    let instant = |i: usize| {
+        let time = run.time[i];
+        Instant {
+            time,
+            omega: run.states[i].omega,
+            q: &run.states[i].q,
+            qd: &run.states[i].qd,
+            alpha: scene
+                .spin
+                .as_ref()
+                .map_or_else(Vector3::zeros, |spin| spin.at(time, &run.states[i].attitude.axes()).1),
+            acceleration: acceleration(run, i),
+        }
+    };
+    (0..run.time.len()).map(instant).collect()
+}
+
+/// q'' at an instant: of the polynomial through q and q' there and beside, of degree five, at the ends of
+/// degree three.
+fn acceleration(run: &Recording, i: usize) -> Vec<f64> {
+    let last = run.time.len() - 1;
+    let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
+    let h = (run.time[after] - run.time[before]) / (after - before) as f64;
+    let (a, now, b) = (&run.states[before], &run.states[i], &run.states[after]);
+    let acceleration = |j: usize| {
+        let rise = b.q[j] - a.q[j];
+        match (i == 0, i == last) {
+            (true, _) => (6.0 * rise / h - 4.0 * a.qd[j] - 2.0 * b.qd[j]) / h,
+            (_, true) => (2.0 * a.qd[j] + 4.0 * b.qd[j] - 6.0 * rise / h) / h,
+            _ => (2.0 * ((b.q[j] - now.q[j]) - (now.q[j] - a.q[j])) / h - 0.5 * (b.qd[j] - a.qd[j])) / h,
+        }
+    };
+    (0..now.q.len()).map(acceleration).collect()
+}
+
+/// What the dropped terms add to the balances, collected from instant to instant.
+#[derive(Default)]
+struct Collected {
+    load: LoadSizes,
+    torque: f64,
+    stiff: f64,
+}
+
+impl Collected {
+    fn finish(self) -> (LoadSizes, TorqueDefect) {
+        (self.load, TorqueDefect { torque: self.torque, stiff: self.stiff })
+    }
+}
+
+/// Sizes of the state at an instant.
+struct Scalars<'i> {
+    instant: &'i Instant<'i>,
+    /// |omega| and |omega'|.
+    w: f64,
+    alpha: f64,
+    /// |q|, |q'| and |Lambda^(1/2) q|.
+    q: f64,
+    v: f64,
+    energy: f64,
+}
+
+/// Bounds of the dropped terms by the norms of theirs.
+struct TermNorms<'n> {
+    /// 1 of a group that is dropped, else 0.
+    w1: f64,
+    w2: f64,
+    /// The norms of W3, likewise zero where it is kept.
+    w3: f64,
+    turning: f64,
+    norms: &'n Norms,
+    /// sqrt(Lambda).
+    root: &'n [f64],
+}
+
+fn by_norms(
+    instants: &[Instant<'_>],
+    dropped: Groups,
+    norms: &Norms,
+    root: &[f64],
+) -> (LoadSizes, TorqueDefect) {
+    let count = |group: bool| f64::from(group);
+    let terms = TermNorms {
+        w1: count(dropped.w1),
+        w2: count(dropped.w2),
+        w3: norms.coupling * count(dropped.w3),
+        turning: norms.turning * count(dropped.w3),
+        norms,
+        root,
+    };
+    let mut found = Collected::default();
+    let mut before: Option<(Scalars<'_>, f64)> = None;
+    for instant in instants {
+        let now = terms.scalars(instant);
+        let (force, in_energy) = terms.load(&now);
+        found.load.largest = larger(found.load.largest, in_energy);
+        found.torque = larger(found.torque, terms.torque(&now));
+        match &before {
+            None => found.load.begun = in_energy,
+            Some((earlier, force_before)) => {
+                // The larger of both ends: what jumps between them is not missed.
+                found.load.impulse += larger(force, *force_before) * (instant.time - earlier.instant.time);
+                found.load.moved += terms.moved(earlier, &now);
+            }
+        }
+        before = Some((now, force));
+    }
+    let largest = instants.iter().map(|i| norm(i.q)).fold(0.0, larger);
+    found.stiff = norms.turning * norms.last * largest;
+    found.finish()
+}
+
+impl TermNorms<'_> {
+    fn scalars<'i>(&self, instant: &'i Instant<'i>) -> Scalars<'i> {
+        let (q, qd) = (instant.q, instant.qd);
+        Scalars {
+            instant,
+            w: instant.omega.norm(),
+            alpha: instant.alpha.norm(),
+            q: norm(q),
+            v: norm(qd),
+            energy: weighted(q, self.root),
+        }
+    }
+
+    /// The load on the modes, and Lambda^(-1/2) times it.
+    fn load(&self, now: &Scalars<'_>) -> (f64, f64) {
+        let (norms, &Scalars { w, alpha, q, v, energy, .. }) = (self.norms, now);
+        let coupled = self.w3 * (2.0 * w * v + alpha * q);
+        let force = self.w1 * norms.centrifugal * w * w + self.w2 * norms.spin * w * w * q + coupled;
+        let in_energy = self.w1 * norms.centrifugal_energy * w * w
+            + self.w2 * norms.softening * w * w * energy
+            + coupled / norms.first;
+        (force, in_energy)
+    }
+
+    fn torque(&self, now: &Scalars<'_>) -> f64 {
+        let &Scalars { w, alpha, q, v, .. } = now;
+        let (turn, a) = (alpha + w * w, norm(&now.instant.acceleration));
+        self.w1 * self.norms.inertia * (v * w + q * turn)
+            + self.w2 * (2.0 * q * v * w + q * q * turn)
+            + self.turning * (q * a + w * q * v)
+    }
+
+    /// How far Lambda^(-1/2) times the load moves between two instants: products change by the change of one
+    /// factor times the other.
+    fn moved(&self, earlier: &Scalars<'_>, now: &Scalars<'_>) -> f64 {
+        let (norms, root) = (self.norms, self.root);
+        let (state, old) = (now.instant, earlier.instant);
+        let dw = (state.omega - old.omega).norm();
+        let da = (now.instant.alpha - earlier.instant.alpha).norm();
+        let difference = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a - b).collect::<Vec<_>>();
+        let (dq, dv) = (difference(state.q, old.q), difference(state.qd, old.qd));
+        let w = larger(now.w, earlier.w);
+        let square = w * w;
+        let turned = (now.w + earlier.w) * dw;
+        self.w1 * norms.centrifugal_energy * turned
+            + self.w2
+                * norms.softening
+                * (square * weighted(&dq, root) + turned * larger(now.energy, earlier.energy))
+            + self.w3 / norms.first
+                * (2.0 * (w * norm(&dv) + dw * larger(now.v, earlier.v))
+                    + larger(now.alpha, earlier.alpha) * norm(&dq)
+                    + da * larger(now.q, earlier.q))
+    }
+}
+
+/// The dropped terms themselves: what the balance of forces of the whole body has beyond that of the kept
+/// groups; its modal forces at every instant.
+fn by_terms(
+    body: &FlexBody,
+    instants: &[Instant<'_>],
+    kept: Groups,
+    root: &[f64],
+) -> (LoadSizes, TorqueDefect, Vec<Vec<f64>>) {
+    let groups = body.invariants().groups();
+    let equations = [groups, kept].map(|groups| EquationsOfMotion::new(body, Terms::ALL.held(groups)));
+    let mut balances = Balances::new(&equations);
+    let w3 = body.invariants().w3();
+    let stiff_at = |q: &[f64]| {
+        let Some(w3) = &w3 else { return 0.0 };
+        let nf = root.len();
+        let product = |a: usize, j: usize| (0..nf).map(|i| w3[(a * nf + i, j)] * q[i]).sum::<f64>();
+        let rows = Mat::from_fn(3, nf, |a, j| root[j] * product(a, j));
+        rows.norm_l2()
+    };
+    let mut found = Collected::default();
+    let mut forces: Vec<Vec<f64>> = Vec::with_capacity(instants.len());
+    for (at, instant) in instants.iter().enumerate() {
+        let (torque, force) = balances.difference(instant);
+        found.torque = larger(found.torque, norm(&torque));
+        let in_energy: Vec<f64> = force.iter().zip(root).map(|(f, root)| f / root).collect();
+        found.load.largest = larger(found.load.largest, norm(&in_energy));
+        // W3'q changes slowly beside how often it is looked at.
+        if at % COARSE == 0 {
+            found.stiff = larger(found.stiff, stiff_at(instant.q));
+        }
+        match forces.last() {
+            None => found.load.begun = norm(&in_energy),
+            Some(earlier) => {
+                found.load.impulse +=
+                    larger(norm(&force), norm(earlier)) * (instant.time - instants[at - 1].time);
+                let steps: Vec<f64> =
+                    force.iter().zip(earlier).zip(root).map(|((a, b), root)| (a - b) / root).collect();
+                found.load.moved += norm(&steps);
+            }
+        }
+        forces.push(force);
+    }
+    let (load, defect) = found.finish();
+    (load, defect, forces)
+}
+
+/// The balances of forces of the whole body and of the kept groups, in the same motion.
+struct Balances<'e> {
+    evaluations: [Evaluation<'e>; 2],
+    /// Number of rigid motions.
+    rigid: usize,
+    /// Axes that the body turns about.
+    axes: &'static [usize],
+    velocity: Vec<f64>,
+    acceleration: Vec<f64>,
+}
+
+impl<'e> Balances<'e> {
+    fn new(equations: &'e [EquationsOfMotion; 2]) -> Self {
+        let rigid = equations[0].n_rigid();
+        let velocity = vec![0.0; equations[0].n_velocities()];
+        Self {
+            evaluations: equations.each_ref().map(Evaluation::new),
+            rigid,
+            axes: if rigid == 3 { &[2] } else { &[0, 1, 2] },
+            acceleration: velocity.clone(),
+            velocity,
+        }
+    }
+
+    /// Torque and modal forces that the whole body has beyond the kept groups.
+    fn difference(&mut self, instant: &Instant<'_>) -> (Vec<f64>, Vec<f64>) {
+        // Free-surface modes about the centre of mass do not feel how the frame moves along.
+        let first = self.rigid - self.axes.len();
+        for (at, &axis) in self.axes.iter().enumerate() {
+            self.velocity[first + at] = instant.omega[axis];
+            self.acceleration[first + at] = instant.alpha[axis];
+        }
+        self.velocity[self.rigid..].copy_from_slice(instant.qd);
+        self.acceleration[self.rigid..].copy_from_slice(&instant.acceleration);
+        let mut forces = [self.velocity.clone(), self.velocity.clone()];
+        for (evaluation, forces) in self.evaluations.iter_mut().zip(&mut forces) {
+            evaluation.set(instant.q, &self.velocity);
+            evaluation.balance(&self.acceleration, forces);
+        }
+        let [whole, own] = forces;
+        let all: Vec<f64> = whole.iter().zip(&own).map(|(a, b)| a - b).collect();
+        (all[first..self.rigid].to_vec(), all[self.rigid..].to_vec())
+    }
+}
+
+/// One of so many instants is looked at where a product with nf^2 entries is not part of the balance.
+const COARSE: usize = 4;
+
+fn norm(x: &[f64]) -> f64 {
+    x.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// |Lambda^(1/2) x|.
+fn weighted(x: &[f64], root: &[f64]) -> f64 {
+    x.iter().zip(root).map(|(x, root)| (x * root).powi(2)).sum::<f64>().sqrt()
+}

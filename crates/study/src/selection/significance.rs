@@ -1,0 +1,152 @@
+//! Significance of every term of the equations of motion for a body and a scene: unit-free (\[WP19\] eq. 28
+//! and 36 to 40, as corrected in the theory, section 11), and with the invariants of the body.
+
+use super::norms::Norms;
+use super::situation::Situation;
+use flexbody_body::flex_body::{FlexBody, Group};
+use nalgebra::Vector3;
+
+/// How large a term is beside what it stands next to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Significance {
+    /// The term.
+    pub term: &'static str,
+    /// Beside what.
+    pub beside: &'static str,
+    /// The unit-free bound as a formula.
+    pub formula: &'static str,
+    /// Group of the kinetic energy that it belongs to.
+    pub group: Group,
+    /// Guideline of \[WP19\] section 8 that asks for it.
+    pub guideline: &'static str,
+    /// Bound from I0 and the frequencies (tier 0).
+    pub bound: f64,
+    /// Bound with the norms of the invariants (tier 1), where the body holds them.
+    pub of_body: Option<f64>,
+}
+
+/// A term in words.
+struct Term {
+    name: &'static str,
+    beside: &'static str,
+    formula: &'static str,
+    group: Group,
+    guideline: &'static str,
+}
+
+const fn term(
+    name: &'static str,
+    beside: &'static str,
+    formula: &'static str,
+    group: Group,
+    guideline: &'static str,
+) -> Term {
+    Term { name, beside, formula, group, guideline }
+}
+
+/// Every term, in the order of [`sizes`].
+const TERMS: [Term; 8] = [
+    term("linear inertia W1 Q", "I0", "2 eta", Group::W1, "III"),
+    term("quadratic inertia Q'W2 Q", "I0", "eta^2", Group::W2, "III, free slender bodies"),
+    term("inertia coupling Q'W3", "I0 (Schur complement)", "eta^2", Group::W3, "III, free slender bodies"),
+    term(
+        "constant centrifugal load W1'w w / 2",
+        "elastic forces at the largest amplitude",
+        "w^2 sqrt(e'I0 e) / (Omega_1^2 |q|)",
+        Group::W1,
+        "II",
+    ),
+    term(
+        "centrifugal load that grows with q, W2 Q w w",
+        "elastic forces",
+        "(w / Omega_1)^2",
+        Group::W2,
+        "III",
+    ),
+    term(
+        "Coriolis force on modes 2 W3' Qd w",
+        "inertia forces of the modes",
+        "2 w / Omega_1",
+        Group::W3,
+        "IV",
+    ),
+    term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "III"),
+    term(
+        "Coriolis torque 2 w (sqrt(tr J) + |q|) |qd|",
+        "I0 w Omega_1",
+        "2 |q| (sqrt(tr J) + |q|) / I0",
+        Group::W1,
+        "IV",
+    ),
+];
+
+/// Terms of [`TERMS`] that the norms of the invariants say nothing of: the Coriolis torque has components
+/// across the axis.
+const WITHOUT_NORM: usize = TERMS.len() - 1;
+
+/// Sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
+fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] {
+    let inertia = &situation.inertia;
+    let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
+    let trace = (0.5 * inertia.trace()).sqrt();
+    let about = axis.dot(&(inertia * axis));
+    [
+        2.0 * norms.centrifugal * q / about,
+        norms.spin * q * q / about,
+        (norms.coupling * q).powi(2) / about,
+        norms.centrifugal_energy * w * w / (norms.first * q),
+        norms.softening * w * w,
+        2.0 * norms.coupling * w / situation.first_rate.value,
+        norms.coupling * alpha / (norms.first * norms.first),
+        2.0 * q * (trace + q) / about,
+    ]
+}
+
+/// The largest of every term in any of several load cases, one at least.
+pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance>>) -> Vec<Significance> {
+    let larger = |mut all: Vec<Significance>, other: Vec<Significance>| {
+        for (one, other) in all.iter_mut().zip(other) {
+            one.bound = one.bound.max(other.bound);
+            one.of_body = one.of_body.zip(other.of_body).map(|(a, b)| a.max(b));
+        }
+        all
+    };
+    cases.reduce(larger).unwrap_or_default()
+}
+
+/// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation
+/// or the principal axis of inertia where they are largest.
+///
+/// With eta = |q| / sqrt(e'I0 e), Omega_1 the first circular frequency of the body (of the assembly for
+/// Coriolis forces), w and alpha the largest angular velocity and acceleration.
+pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
+    let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
+    let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
+    let axes = match driven {
+        Some(axis) => vec![axis],
+        None if body.dimension() == 2 => vec![Vector3::z()],
+        None => {
+            let principal = situation.inertia.symmetric_eigen().eigenvectors;
+            principal.column_iter().map(|axis| axis.into_owned()).collect()
+        }
+    };
+    let largest = |norms: &dyn Fn(&Vector3<f64>) -> Option<Norms>| -> Option<[f64; 8]> {
+        axes.iter().try_fold([0.0; 8], |most: [f64; 8], axis| {
+            let own = sizes(situation, &norms(axis)?, axis);
+            Some(std::array::from_fn(|i| most[i].max(own[i])))
+        })
+    };
+    let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
+    let bound = bound.unwrap_or([f64::INFINITY; 8]);
+    let own = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));
+    let significance = |(i, term): (usize, Term)| Significance {
+        term: term.name,
+        beside: term.beside,
+        formula: term.formula,
+        group: term.group,
+        guideline: term.guideline,
+        bound: bound[i],
+        of_body: own.filter(|_| i < WITHOUT_NORM).map(|own| own[i]),
+    };
+    TERMS.into_iter().enumerate().map(significance).collect()
+}

@@ -1,0 +1,389 @@
+//! What a scene means for a body: how fast it turns, how far its modes go, what loads them, and where each of
+//! these numbers comes from.
+
+use super::bounds::{Driven, ModalLoad, Start, TurnedTorques};
+use super::rows::PointRows;
+use super::variation::{Rotation, Variation};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::Invariants;
+use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
+use flexbody_motion::scene::{AttachmentKind, Axes, Load, Range, Scene, VectorHistory};
+use nalgebra::{DMatrix, Matrix3};
+use std::f64::consts::TAU;
+
+/// Deflection, relative to the largest extent, where linear elasticity ends: the bound of amplitudes unless a
+/// scene has one.
+const LINEAR_RANGE: f64 = 0.1;
+
+/// Periods of the first mode that a scene lasts unless it says how long.
+const PERIODS: f64 = 100.0;
+
+/// How far C1 and C2 may be from zero for modes to be free-surface modes about the centre of mass, relative
+/// to their bounds.
+const ROUNDING: f64 = 1e-8;
+
+/// A number that decisions follow from.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// Name of the number.
+    pub name: &'static str,
+    /// Its value, in the units of the body.
+    pub value: f64,
+    /// Where it comes from.
+    pub source: String,
+}
+
+/// Sizes of the motion that a scene means for a body: rates, amplitudes, duration.
+#[derive(Debug, Clone)]
+pub struct Situation {
+    /// Largest angular velocity of the frame.
+    pub spin: Input,
+    /// Largest angular acceleration.
+    pub acceleration: Input,
+    /// Duration of the motion.
+    pub duration: Input,
+    /// Largest |q|.
+    pub amplitude: Input,
+    /// Largest amplitude of every mode.
+    pub mode_amplitudes: Vec<f64>,
+    /// Inertia about the centre of mass with what joints attach.
+    pub inertia: Matrix3<f64>,
+    /// First circular frequency of the assembly.
+    pub first_rate: Input,
+    /// What bounds need to know; or why there are none.
+    pub driven: Result<Driven, String>,
+}
+
+impl Situation {
+    /// Of `scene`, which fits `body`; `points` are those of its loads.
+    pub fn new(body: &FlexBody, scene: &Scene, points: &[BodyPoint]) -> Self {
+        let (demands, eigenvalues) = (&scene.requirements, &body.modes().eigenvalue);
+        let inertia = body.invariants().inertia() + demands.attachment.inertia;
+        let softest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
+        let duration = match scene.run.duration {
+            Some(value) => Input { name: "duration", value, source: "[run] duration".to_owned() },
+            None => Input {
+                name: "duration",
+                value: PERIODS * TAU / softest,
+                source: format!("default: {PERIODS} periods of the first mode"),
+            },
+        };
+        let first_rate = match demands.attachment.first_frequency {
+            Some(frequency) => (TAU * frequency, "[attachment] first_frequency"),
+            None => (softest, "first mode of the free body"),
+        };
+        let (spin, acceleration) = turning(body, scene, &inertia, duration.value, points);
+        let mode_amplitudes = amplitudes(body, scene);
+        let limits = &demands.limits;
+        let named = [
+            (limits.deflection.is_some(), "deflection"),
+            (limits.stress.is_some(), "stress"),
+            (!limits.modes.is_empty(), "mode"),
+        ];
+        let named: Vec<&str> = named.into_iter().filter(|(given, _)| *given).map(|(_, name)| name).collect();
+        let amplitude = Input {
+            name: "modal amplitude",
+            value: mode_amplitudes.iter().map(|q| q * q).sum::<f64>().sqrt(),
+            source: match named.is_empty() {
+                true => "default: deflections of 10 % of the extent of the body".to_owned(),
+                false => format!("[limits] {}", named.join(", ")),
+            },
+        };
+        let driven = driven(body, scene, points, &spin, &acceleration, duration.value);
+        Self {
+            spin,
+            acceleration,
+            duration,
+            amplitude,
+            mode_amplitudes,
+            inertia,
+            first_rate: Input {
+                name: "first circular frequency",
+                value: first_rate.0,
+                source: first_rate.1.to_owned(),
+            },
+            driven,
+        }
+    }
+
+    /// All inputs, in the order of a report.
+    pub fn inputs(&self) -> [&Input; 5] {
+        [&self.spin, &self.acceleration, &self.duration, &self.amplitude, &self.first_rate]
+    }
+}
+
+/// A size of a motion, and where it comes from.
+type Sourced = (f64, String);
+
+/// Largest angular velocity and acceleration of the frame.
+fn turning(
+    body: &FlexBody,
+    scene: &Scene,
+    inertia: &Matrix3<f64>,
+    duration: f64,
+    points: &[BodyPoint],
+) -> (Input, Input) {
+    let motion = &scene.requirements.motion;
+    let [spin, acceleration] = turning_of_run(body, scene, inertia, duration, points);
+    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what
+    // it is.
+    let larger = |range: &Option<Range>, (value, source): Sourced, key: &str| match range {
+        Some(range) if !scene.prescribes() || range.length() > value => {
+            (range.length(), format!("[motion] {key}"))
+        }
+        _ => (value, source),
+    };
+    let (spin, spin_source) = larger(&motion.angular_velocity, spin, "angular_velocity");
+    // Free rotation has accelerations of the size of the square of its angular velocity.
+    let (acceleration, acceleration_source) = match (&motion.angular_acceleration, &motion.angular_velocity) {
+        (None, Some(_)) if spin * spin > acceleration.0 => {
+            (spin * spin, "default: square of the angular velocity".to_owned())
+        }
+        (range, _) => larger(range, acceleration, "angular_acceleration"),
+    };
+    (
+        Input { name: "angular velocity", value: spin, source: spin_source },
+        Input { name: "angular acceleration", value: acceleration, source: acceleration_source },
+    )
+}
+
+/// Largest angular velocity and acceleration in the run of the scene.
+fn turning_of_run(
+    body: &FlexBody,
+    scene: &Scene,
+    inertia: &Matrix3<f64>,
+    duration: f64,
+    points: &[BodyPoint],
+) -> [Sourced; 2] {
+    match (scene.rotation(), &scene.carried) {
+        (Some(velocity), carried) => {
+            let rate = Variation::of_vector(velocity, duration);
+            let source = if carried.is_some() { "[carried.spin] rate" } else { "[spin] rate" }.to_owned();
+            [(rate.largest, source.clone()), (rate.rate, source)]
+        }
+        (None, Some(_)) => {
+            let source = "[carried], which does not turn".to_owned();
+            [(0.0, source.clone()), (0.0, source)]
+        }
+        (None, None) => {
+            // The angular momentum of a free body is that of the start and what torques add.
+            let start = inertia * scene.initial.angular_velocity;
+            let torque = largest_torque(body, scene, duration, points);
+            let principal = inertia.symmetric_eigenvalues();
+            let (least, most) = (principal.min(), principal.max());
+            let spin = (start.norm() + torque * duration) / least;
+            let source = match scene.loads.is_empty() {
+                true => "[initial] angular_velocity, of a rigid body",
+                false => "[initial] angular_velocity and [[load]], of a rigid body",
+            };
+            // |omega x I omega| is at most (I_max - I_min) |omega|^2.
+            let acceleration = ((most - least) * spin * spin + torque) / least;
+            [(spin, source.to_owned()), (acceleration, source.to_owned())]
+        }
+    }
+}
+
+/// What the loads can turn the undeformed body with.
+fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
+    let torque = |(load, point): (&Load, &BodyPoint)| {
+        let largest = |history: &VectorHistory| Variation::of_vector(history, duration).largest;
+        let lever = point.place(&Evaluation::new(&EquationsOfMotion::new(body, Terms::NONE))).norm();
+        largest(&load.force) * lever + largest(&load.torque)
+    };
+    scene.loads.iter().zip(points).map(torque).sum()
+}
+
+/// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more
+/// than what a load of the size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p
+/// (\[WP19\] 5.2).
+fn amplitudes(body: &FlexBody, scene: &Scene) -> Vec<f64> {
+    let limits = &scene.requirements.limits;
+    let deflection = limits.deflection.unwrap_or(LINEAR_RANGE * body.extent());
+    let alone = |j: usize| {
+        let stress = limits.stress.as_ref().and_then(|(limit, modes)| Some(limit / modes.get(j)?));
+        let own = limits.modes.iter().filter(|(mode, _)| *mode == j).map(|(_, amplitude)| *amplitude);
+        own.chain(stress).fold(deflection / body.largest_displacement(j), f64::min)
+    };
+    let eigenvalues = &body.modes().eigenvalue;
+    let first = alone(0) * eigenvalues[0];
+    eigenvalues.iter().enumerate().map(|(j, lambda)| alone(j).min(first / lambda)).collect()
+}
+
+/// What guaranteed bounds need, where they hold for the body and the scene.
+fn driven(
+    body: &FlexBody,
+    scene: &Scene,
+    points: &[BodyPoint],
+    spin: &Input,
+    acceleration: &Input,
+    duration: f64,
+) -> Result<Driven, String> {
+    let rotation = given_rotation(scene, spin, acceleration, duration)?;
+    refuse_beyond_bounds(body, scene)?;
+    let root: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
+    let damping = damping_norm(body, &root);
+    Ok(Driven {
+        loads: modal_loads(body, scene, points, &rotation, &root),
+        turned: turned_torques(body, scene, points, duration, &root),
+        settled: scene.initial.settled,
+        start: start_of_modes(scene, damping, &root),
+        rotation,
+        damping,
+    })
+}
+
+/// The rotation of the frame, where the scene gives it.
+fn given_rotation(
+    scene: &Scene,
+    spin: &Input,
+    acceleration: &Input,
+    duration: f64,
+) -> Result<Rotation, String> {
+    let spin_of_run = scene.spin.as_ref().filter(|_| spin.source.starts_with("[spin]"));
+    match (spin_of_run, scene.requirements.attachment.kind) {
+        (Some(spin), _) => {
+            let rate = Variation::of_vector(&spin.velocity, duration);
+            // Seen from the body, the acceleration of a rotation about axes of the world turns with omega
+            // besides.
+            let turned = if spin.axes == Axes::World { rate.largest * rate.total } else { 0.0 };
+            Ok(Rotation {
+                axis: spin.velocity.direction().and_then(|direction| direction.try_normalize(0.0)),
+                of_run: true,
+                largest: rate.largest,
+                start: rate.start,
+                variation: rate.total,
+                acceleration: rate.rate,
+                jerk: rate.rate_total + turned,
+                duration,
+            })
+        }
+        (None, AttachmentKind::Stiff) if spin.value > 0.0 => Ok(Rotation {
+            axis: None,
+            of_run: false,
+            largest: spin.value,
+            start: spin.value,
+            variation: acceleration.value * duration,
+            acceleration: acceleration.value,
+            jerk: f64::INFINITY,
+            duration,
+        }),
+        _ => Err("its rotation is not given: neither [spin] nor a stiff attachment".to_owned()),
+    }
+}
+
+/// Says why the bounds do not hold for the body and the scene.
+fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
+    let reason = if scene.carried.is_some() {
+        "the body is carried: its frame moves its modes"
+    } else if body.invariants().general().is_some() {
+        "the mass matrix does not commute with rotations"
+    } else if body.inertia_stiffness().is_some() || !body.geometric_stiffness().is_empty() {
+        "the body has stiffness of inertia or geometric stiffness"
+    } else if !is_about_centre(body.invariants()) {
+        "the frame is not that of free-surface modes about the centre of mass"
+    } else {
+        return Ok(());
+    };
+    Err(reason.to_owned())
+}
+
+/// The loads of the scene on the modes; `root` is sqrt(Lambda).
+fn modal_loads(
+    body: &FlexBody,
+    scene: &Scene,
+    points: &[BodyPoint],
+    rotation: &Rotation,
+    root: &[f64],
+) -> Vec<ModalLoad> {
+    let rows = PointRows::new(body);
+    let modal_load = |psi: DMatrix<f64>, axes: Axes, history: &VectorHistory| {
+        let duration = rotation.duration;
+        let (psi, factor) = match (axes, history) {
+            (Axes::Model | Axes::Body, VectorHistory::Along { direction, factor }) => {
+                let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(direction));
+                (along, Variation::of(factor, duration))
+            }
+            (Axes::Model | Axes::Body, history) => (psi, Variation::of_vector(history, duration)),
+            (Axes::World, history) => {
+                (psi, Variation::of_vector(history, duration).times(&Variation::direction(rotation)))
+            }
+        };
+        ModalLoad { force: PointRows::norm(&psi), energy: energy_norm(&psi, root), factor }
+    };
+    let mut loads = Vec::new();
+    for (load, point) in scene.loads.iter().zip(points) {
+        if !load.force.is_nothing() {
+            loads.push(modal_load(rows.of(point), load.axes, &load.force));
+        }
+        if !load.torque.is_nothing() {
+            loads.push(modal_load(rows.of_rotation(point), load.axes, &load.torque));
+        }
+    }
+    loads
+}
+
+/// |Lambda^(-1/2) Psi'| of a few rows Psi; `root` is sqrt(Lambda).
+fn energy_norm(rows: &DMatrix<f64>, root: &[f64]) -> f64 {
+    PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / root[j]))
+}
+
+/// How the deformation changes the modal forces of torques: a torque t works on the rotation vector theta =
+/// Theta q of its point as G(theta) t, where G = integral_0^1 exp(-s theta~) ds, which changes by no more than
+/// half of what theta changes by.
+fn turned_torques(
+    body: &FlexBody,
+    scene: &Scene,
+    points: &[BodyPoint],
+    duration: f64,
+    root: &[f64],
+) -> TurnedTorques {
+    let rows = PointRows::new(body);
+    let mut turned = TurnedTorques::default();
+    for (load, point) in scene.loads.iter().zip(points).filter(|(load, _)| !load.torque.is_nothing()) {
+        let theta = rows.of_rotation(point);
+        let per_torque = 0.5 * PointRows::norm(&theta) * energy_norm(&theta, root);
+        let torque = Variation::of_vector(&load.torque, duration);
+        turned.force += per_torque * torque.largest;
+        turned.rate += per_torque * torque.rate;
+    }
+    turned
+}
+
+/// |D|, or a bound of it.
+fn damping_norm(body: &FlexBody, root: &[f64]) -> f64 {
+    let nf = body.n_modes();
+    match &body.modes().modal_damping {
+        Some(damping) => {
+            (0..nf).map(|j| (0..nf).map(|i| damping[(i, j)].powi(2)).sum::<f64>()).sum::<f64>().sqrt()
+        }
+        None => (0..nf).map(|j| 2.0 * body.modes().damping_ratio[j] * root[j]).fold(0.0, f64::max),
+    }
+}
+
+/// The modes that the scene does not start at rest, together.
+fn start_of_modes(scene: &Scene, damping: f64, root: &[f64]) -> Start {
+    let starts = scene.initial.modes.iter().map(|start| {
+        let omega = root[start.mode];
+        let energy = start.rate.abs() + omega * start.amplitude.abs();
+        let acceleration = omega * omega * start.amplitude.abs() + damping * start.rate.abs();
+        Start { energy, rate_energy: acceleration + omega * start.rate.abs() }
+    });
+    starts.fold(Start::default(), |sum, one| Start {
+        energy: sum.energy + one.energy,
+        rate_energy: sum.rate_energy + one.rate_energy,
+    })
+}
+
+/// Whether C1, C2 and c vanish and m_ff is the identity, up to rounding.
+fn is_about_centre(invariants: &Invariants) -> bool {
+    let (nf, c2, m) = (invariants.n_modes(), invariants.c2(), invariants.modal_mass());
+    let inertia = invariants.inertia().trace();
+    let size = (inertia / invariants.mass()).sqrt();
+    let small = |value: f64, scale: f64| value.abs() <= ROUNDING * scale;
+    (0..3).all(|k| {
+        small(invariants.first_moment()[k], invariants.mass() * size)
+            && (0..nf).all(|j| {
+                small(invariants.c1()[(k, j)], invariants.mass().sqrt()) && small(c2[(k, j)], inertia.sqrt())
+            })
+    }) && (0..nf).all(|i| (0..nf).all(|j| small(m[(i, j)] - f64::from(i == j), 1.0)))
+}

@@ -1,0 +1,292 @@
+//! A body made for one scene: a conversion that computes no more than the scene may need, and keeps no more
+//! than it needs.
+
+use crate::reference::{
+    Enriched, EnrichedForCases, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError,
+    enrich_for_cases,
+};
+use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
+use faer::Mat;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_body::basis::{BasisChoice, Loads, UserLoads};
+use flexbody_body::convert::{Condensation, Conversion, ConvertSettings, ModalModel};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_eigen::{Accuracy, Resume, Wanted};
+use flexbody_input::{LoadSource, read_shapes};
+use flexbody_linalg::progress::Watch;
+use flexbody_model::FeModel;
+use flexbody_motion::scene::Scene;
+
+/// Settings of a conversion for a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tailoring {
+    /// Settings of the conversion: what there is to select from.
+    pub settings: ConvertSettings,
+    /// Whether a band of the scene replaces the wanted modes: all up to twice the band, if there are any.
+    pub by_band: bool,
+    /// Whether the shapes that the motion is made of replace the modes that it was computed with, where fewer
+    /// of them do.
+    pub of_motion: bool,
+}
+
+impl Tailoring {
+    /// A body with everything that `scene` may need, enriched until what it lacks of the model no longer
+    /// counts there.
+    ///
+    /// # Errors
+    /// As [`convert`](flexbody_body::convert::convert) and [`enrich`](crate::reference::enrich).
+    pub fn convert(
+        &self,
+        model: &FeModel,
+        scene: &Scene,
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<Enriched<Conversion>> {
+        let EnrichedForCases { made, rounds } =
+            self.convert_for_cases(model, std::slice::from_ref(scene), resume, watch)?;
+        Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
+    }
+
+    /// The same with everything that any of the load cases `scenes` may need.
+    ///
+    /// # Errors
+    /// As [`Tailoring::convert`].
+    pub fn convert_for_cases(
+        &self,
+        model: &FeModel,
+        scenes: &[Scene],
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<EnrichedForCases<Conversion>> {
+        self.enriched(model, scenes, resume, watch, |modal| Ok(modal.condense()))
+    }
+
+    /// Conversions by `condense`, each with more static responses than the one before, until the body lacks
+    /// nothing that counts.
+    fn enriched(
+        &self,
+        model: &FeModel,
+        scenes: &[Scene],
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+        condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
+    ) -> Result<EnrichedForCases<Conversion>> {
+        let make = |loads: &Mat<f64>| {
+            let own = self.with_motion(loads);
+            let band_settings = own.settings_of_band(scenes);
+            // A search that was interrupted is that of the free modes, which come first.
+            let resume = if loads.ncols() == 0 { resume } else { Resume::default() };
+            let modal = own.find_modes(band_settings.as_ref(), model, resume, watch)?;
+            let condensed = condense(&modal)?;
+            modal.finish(condensed, watch)
+        };
+        let Self { settings, .. } = self;
+        let grows = settings.modes.accuracy != Accuracy::Certified
+            && settings.basis.with_motion(&Mat::new()).is_some();
+        let enrichment = Enrichment { memory: settings.modes.memory, grows, is_fine: false };
+        enrich_for_cases(model, scenes, enrichment, watch, make, |made| &made.body)
+    }
+
+    /// The body of the fewest shapes of its motions that leave half of the tolerances to others, in place of
+    /// the `whole` one whose motions they are; that one where no number of them does.
+    ///
+    /// # Errors
+    /// Those of [`trace`](flexbody_motion::scene::trace) and of the conversion.
+    fn of_motion(
+        &self,
+        model: &FeModel,
+        scenes: &[Scene],
+        whole: EnrichedForCases<Conversion>,
+        watch: Watch<'_>,
+        condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
+    ) -> Result<EnrichedForCases<Conversion>> {
+        let EnrichedForCases { made: mut reference, rounds } = whole;
+        let own = || rounds.iter().map(|rounds| rounds.last());
+        if own().flatten().any(|own| !own.is_reference()) {
+            let message =
+                "the body whose motion shapes would be made of lacks more than half of the tolerances itself";
+            reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
+            return Ok(EnrichedForCases { made: reference, rounds });
+        }
+        let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
+        let bodies = MotionBodies::new(model, &reference.body, scenes, self.settings.modes.memory)?;
+        let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
+            let settings = self.settings_of_shapes(bodies.basis(count));
+            let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
+            let condensed = condense(&modal)?;
+            modal.finish(condensed, watch)
+        };
+        let most: Vec<f64> = lacks.iter().map(|lacks| MOST_LACKING - lacks).collect();
+        let fewest = bodies
+            .as_ref()
+            .map(|bodies| bodies.fewest(&most, |count| make(bodies, count), |made| &made.body));
+        if let Some(Fewest { made, errors, worst, .. }) = fewest.transpose()?.flatten() {
+            let modes = made.body.n_modes();
+            let own = errors.into_iter().zip(worst).zip(lacks).map(|((errors, worst), lacks)| {
+                vec![ReferenceError {
+                    modes,
+                    errors,
+                    worst: lacks + worst,
+                    time: 0.0,
+                    unknown: None,
+                    coupling: None,
+                }]
+            });
+            return Ok(EnrichedForCases { rounds: own.collect(), made });
+        }
+        let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
+        reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
+        Ok(EnrichedForCases { made: reference, rounds })
+    }
+
+    /// The settings with all modes of given shapes.
+    fn settings_of_shapes(&self, basis: BasisChoice) -> ConvertSettings {
+        let mut settings = ConvertSettings { basis, ..self.settings.clone() };
+        settings.modes.wanted = Wanted::Lowest(usize::MAX);
+        settings
+    }
+
+    /// The same with the static responses to `loads` in the basis.
+    fn with_motion(&self, loads: &Mat<f64>) -> Self {
+        let mut own = self.clone();
+        own.settings.basis = self.settings.basis.with_motion(loads).unwrap_or(own.settings.basis);
+        own
+    }
+
+    /// The settings with the modes that the highest band of `scenes` wants.
+    fn settings_of_band(&self, scenes: &[Scene]) -> Option<ConvertSettings> {
+        let highest = largest_eigenvalue(scenes).filter(|_| self.by_band)?;
+        let mut settings = self.settings.clone();
+        settings.modes.wanted = Wanted::Below(highest);
+        Some(settings)
+    }
+
+    /// The modes that the band of a scene wants; those of the settings without a band, and for a body that is
+    /// stiff in it.
+    fn find_modes<'m>(
+        &'m self,
+        band_settings: Option<&'m ConvertSettings>,
+        model: &'m FeModel,
+        resume: Resume<'_>,
+        watch: Watch<'_>,
+    ) -> Result<ModalModel<'m>> {
+        let Some(band_settings) = band_settings else {
+            return ModalModel::find(model, &self.settings, resume, watch);
+        };
+        match ModalModel::find(model, band_settings, resume, watch) {
+            Err(error) if error.has(Code::NoModes) => {
+                ModalModel::find(model, &self.settings, Resume::default(), watch)
+            }
+            found => found,
+        }
+    }
+}
+
+/// Loads whose static responses join the modes where nobody names others: those `stated` with the model;
+/// without, those of the `scenes`, of which free modes alone know nothing.
+pub fn loads_for(scenes: &[Scene], stated: &[LoadSource]) -> Vec<LoadSource> {
+    if !stated.is_empty() {
+        return stated.to_vec();
+    }
+    let WantedResponses { centrifugal, interfaces } = WantedResponses::of_any(scenes);
+    let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
+    loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
+}
+
+/// Loads of residual vectors, with the files read that they need.
+///
+/// # Errors
+/// Those of [`read_shapes`] and [`UserLoads::new`].
+pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
+    loads.iter().map(|set| read_set(set, model)).collect()
+}
+
+fn read_set(set: &LoadSource, model: &FeModel) -> Result<Loads> {
+    match set {
+        LoadSource::Centrifugal => Ok(Loads::Centrifugal),
+        LoadSource::Interfaces => Ok(Loads::Interfaces),
+        LoadSource::File(location) => {
+            let raw = read_shapes(location, &model.row_counts(), "loads")?;
+            UserLoads::new(model, raw).map(Loads::User)
+        }
+        LoadSource::At { loads, hertz } => {
+            Ok(Loads::At { loads: Box::new(read_set(loads, model)?), hertz: *hertz })
+        }
+    }
+}
+
+/// Converts `model` to a body with the terms and modes that `scene` needs: what bounds of tier 0 rule out is
+/// never computed, the rest is decided about the converted body. The scene becomes one of its sources.
+///
+/// # Errors
+/// As [`convert`](flexbody_body::convert::convert), [`enrich_for_cases`] and [`select_for_cases`].
+pub fn convert_for_scene(
+    model: &FeModel,
+    tailoring: &Tailoring,
+    scene: &Scene,
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<(Conversion, Selection)> {
+    convert_for_cases(model, tailoring, std::slice::from_ref(scene), resume, watch)
+}
+
+/// The same for the load cases `scenes`, which one body has to serve.
+///
+/// # Errors
+/// As [`convert_for_scene`].
+pub fn convert_for_cases(
+    model: &FeModel,
+    tailoring: &Tailoring,
+    scenes: &[Scene],
+    resume: Resume<'_>,
+    watch: Watch<'_>,
+) -> Result<(Conversion, Selection)> {
+    let memory = tailoring.settings.modes.memory;
+    refuse_unfit(tailoring, scenes)?;
+    let condense = |modal: &ModalModel<'_>| {
+        // Rigid motion alone is multiplied by M before the scenes have said which groups they may need.
+        let linear = modal.condense_linear();
+        let terms = rule_out(&modal.body(&linear)?, scenes, memory)?;
+        Ok(modal.condense_kept(linear, terms))
+    };
+    let mut enriched = tailoring.enriched(model, scenes, resume, watch, condense)?;
+    if tailoring.of_motion {
+        enriched = tailoring.of_motion(model, scenes, enriched, watch, condense)?;
+    }
+    let EnrichedForCases { made: mut conversion, rounds } = enriched;
+    let selection = select_for_cases(&conversion.body, &rounds, scenes, memory, watch)?;
+    let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
+    let mut parts = reduced.into_parts();
+    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
+    for source in scenes.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {
+        // Load cases share their scene file, and may share histories.
+        if scenes.len() == 1 || !parts.source.files.contains(source) {
+            parts.source.files.push(source.clone());
+        }
+    }
+    conversion.body = FlexBody::new(parts)?;
+    Ok((conversion, selection))
+}
+
+/// Refuses what a basis that is made of a motion cannot serve.
+fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
+    if tailoring.settings.interface_frame.is_some() {
+        let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
+        let help = "leave --scene out, or use --frame com";
+        return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());
+    }
+    if !tailoring.of_motion {
+        return Ok(());
+    }
+    let message = if scenes.iter().any(|scene| !scene.initial.modes.is_empty()) {
+        "--basis scene: the scene starts modes by their number, which a body made of its motion does not have"
+    } else if scenes.iter().any(|scene| scene.carried.is_some()) {
+        "--basis scene: shapes are made of the motion of a free body, and something carries this one"
+    } else if scenes.iter().any(|scene| scene.run.duration.is_none()) {
+        "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration"
+    } else {
+        return Ok(());
+    };
+    Err(Diagnostic::new(Code::Usage, message).into())
+}

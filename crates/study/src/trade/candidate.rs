@@ -1,0 +1,211 @@
+//! What is tried.
+
+use super::Source;
+use flexbody_base::error::Result;
+use flexbody_body::flex_body::{FlexBody, Group, Groups, Storage, TermDecision};
+
+/// Mode counts of a ladder: about three to a doubling of the work.
+const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
+
+/// What sets a candidate apart: a series of the plot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// Some of the modes, all groups of the kinetic energy.
+    Modes,
+    /// Some groups.
+    Groups,
+    /// A lumped mass, as multibody programs have it.
+    Lumped,
+    /// Single precision.
+    Single,
+}
+
+impl Kind {
+    /// All kinds, in the order of plots.
+    pub const ALL: [Kind; 4] = [Self::Modes, Self::Groups, Self::Lumped, Self::Single];
+
+    /// Name in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Modes => "all groups",
+            Self::Groups => "some groups",
+            Self::Lumped => "lumped mass",
+            Self::Single => "single precision",
+        }
+    }
+}
+
+/// What was lumped of the mass, and by which scheme: the two ways of multibody programs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum LumpedMass {
+    /// Modes and modal mass are those of the consistent mass; the rigid body and all couplings are summed
+    /// over nodal masses. This is made of a modal neutral file, which holds modes, generalised masses and
+    /// nodal masses.
+    Couplings(String),
+    /// The whole mass was lumped before the modes were computed: an FE model with a lumped mass matrix.
+    Whole(String),
+}
+
+impl LumpedMass {
+    /// Name of the scheme.
+    pub fn scheme(&self) -> &str {
+        match self {
+            Self::Couplings(scheme) | Self::Whole(scheme) => scheme,
+        }
+    }
+
+    /// `couplings` or `whole`: what was lumped.
+    pub fn part(&self) -> &'static str {
+        match self {
+            Self::Couplings(_) => "couplings",
+            Self::Whole(_) => "whole",
+        }
+    }
+}
+
+/// A body that could be used for a scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// Number of the [`Source`] that it is made of.
+    pub source: usize,
+    /// Modes of the source that it has (from 0), ascending.
+    pub modes: Vec<usize>,
+    /// Groups of the kinetic energy that it has.
+    pub groups: Groups,
+    /// What was lumped of its mass.
+    pub lumped: Option<LumpedMass>,
+    /// Precision of its numbers.
+    pub storage: Storage,
+}
+
+impl Candidate {
+    fn whole(source: usize, nf: usize) -> Self {
+        Self { source, modes: (0..nf).collect(), groups: Groups::ALL, lumped: None, storage: Storage::F64 }
+    }
+
+    /// The kind: in what it differs from the whole body of its source.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self { lumped: Some(_), .. } => Kind::Lumped,
+            Self { storage: Storage::F32, .. } => Kind::Single,
+            Self { groups, .. } if *groups != Groups::ALL => Kind::Groups,
+            _ => Kind::Modes,
+        }
+    }
+
+    /// Names of its groups.
+    pub fn group_names(&self) -> Vec<&'static str> {
+        Group::ALL.into_iter().filter(|group| self.groups.has(*group)).map(Group::name).collect()
+    }
+
+    /// The body.
+    ///
+    /// # Errors
+    /// Those of [`FlexBody::new`], which only lumped masses have.
+    pub fn body(&self, source: &Source) -> Result<FlexBody> {
+        let mut body = match &self.lumped {
+            Some(LumpedMass::Couplings(scheme)) => source.with_lumped_couplings(scheme)?,
+            Some(LumpedMass::Whole(_)) | None => source.body().clone(),
+        };
+        let all = self.modes.len() == body.n_modes();
+        if !all || self.groups != body.groups() {
+            let decide = |group: Group| TermDecision {
+                group,
+                kept: false,
+                tier: 2,
+                bound: f64::INFINITY,
+                limit: f64::INFINITY,
+                reason: "a candidate of a trade study".to_owned(),
+            };
+            body = body.reduced(&self.modes, self.groups, self.groups.dropped().map(decide).collect())?;
+        }
+        Ok(match self.storage {
+            Storage::F64 => body,
+            Storage::F32 => body.rounded_to_f32()?,
+        })
+    }
+}
+
+/// Groups that a ladder of modes is tried with, the cheapest first.
+const SETS: [Groups; 3] = [Groups::NONE, Groups { w1: true, ..Groups::NONE }, Groups::ALL];
+
+/// Errors over their tolerances of a set of groups with all modes: beyond the first it is hopeless, and below
+/// the second dearer sets cannot be told from it.
+const HOPELESS: f64 = 10.0;
+const PERFECT: f64 = 0.01;
+
+/// The candidates that have all modes of a source, the first of which is the reference. Bodies that are
+/// `carried` keep all groups.
+pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candidate> {
+    let mut all = Vec::new();
+    for (source, of) in sources.iter().enumerate() {
+        let whole = Candidate::whole(source, of.body().n_modes());
+        if let Some(scheme) = of.lumped_by() {
+            all.push(Candidate { lumped: Some(LumpedMass::Whole(scheme.to_owned())), ..whole });
+            continue;
+        }
+        if source > 0 {
+            // Their modes are those of the reference, or others: what counts is how many and which.
+            all.extend(SETS.into_iter().rev().map(|groups| Candidate { groups, ..whole.clone() }));
+            continue;
+        }
+        let subsets =
+            (0..8).rev().map(|bits| Groups { w1: bits & 4 != 0, w2: bits & 2 != 0, w3: bits & 1 != 0 });
+        all.extend(subsets.map(|groups| Candidate { groups, ..whole.clone() }));
+        let couplings = |scheme: &str| Some(LumpedMass::Couplings(scheme.to_owned()));
+        all.extend(of.lumped().map(|scheme| Candidate { lumped: couplings(scheme), ..whole.clone() }));
+        all.push(Candidate { storage: Storage::F32, ..whole });
+    }
+    held(all, sources, carried)
+}
+
+/// The candidates that have some modes of the reference, the lowest and the `liveliest`, with the sets of
+/// groups that are worth it: `worst_of` answers the largest error over its tolerance of a set with all modes.
+pub(super) fn ladder(
+    sources: &[Source],
+    liveliest: &[usize],
+    carried: bool,
+    worst_of: impl Fn(Groups) -> f64,
+) -> Vec<Candidate> {
+    let body = sources[0].body();
+    let mut sets = Vec::new();
+    for groups in SETS {
+        let worst = worst_of(groups.and(body.groups()));
+        sets.extend((worst <= HOPELESS || groups == Groups::ALL).then_some(groups));
+        if worst <= PERFECT {
+            break;
+        }
+    }
+    let whole = Candidate::whole(0, body.n_modes());
+    let mut all = Vec::new();
+    for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
+        for modes in [(0..count).collect(), first_of(liveliest, count)] {
+            let with = |groups: &Groups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
+            all.extend(sets.iter().rev().map(with));
+        }
+    }
+    held(all, sources, carried)
+}
+
+/// So many modes of an order, ascending.
+pub(super) fn first_of(order: &[usize], count: usize) -> Vec<usize> {
+    let mut modes = order[..count].to_vec();
+    modes.sort_unstable();
+    modes
+}
+
+/// Each candidate once, with the groups that its source holds.
+fn held(mut all: Vec<Candidate>, sources: &[Source], carried: bool) -> Vec<Candidate> {
+    for candidate in &mut all {
+        let held = sources[candidate.source].body().groups();
+        candidate.groups = if carried { held } else { candidate.groups.and(held) };
+    }
+    let mut distinct: Vec<Candidate> = Vec::with_capacity(all.len());
+    for candidate in all {
+        if !distinct.contains(&candidate) {
+            distinct.push(candidate);
+        }
+    }
+    distinct
+}

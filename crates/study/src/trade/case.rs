@@ -1,0 +1,160 @@
+//! The motion of a load case that candidates are measured against.
+
+use super::{Allowed, Candidate, InCase, NodalReference, Settings, Source, timing};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_base::memory::refuse_beyond;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::FeModel;
+use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
+use flexbody_motion::integration::Work;
+use flexbody_motion::scene::{Measure, Scene, Stage, Trace, trace, trace_at};
+
+/// A scene, one load case of several or alone, with the motion of the reference in it.
+pub(super) struct StudyCase<'m> {
+    /// Name of the load case; `None` of a scene alone.
+    pub name: Option<String>,
+    /// The bodies in the frame of the scene, that of the reference first.
+    pub sources: Vec<Source>,
+    pub scene: Scene,
+    pub motion: Trace,
+    pub nodal: Option<NodalReference<'m>>,
+    /// Part of the tolerances that the reference lacks of its model itself.
+    pub reserved: f64,
+    /// Warnings and notes about the motion of the reference.
+    pub found: Vec<Diagnostic>,
+}
+
+impl<'m> StudyCase<'m> {
+    /// `scene` with the motion of the first of `sources` in it, and of all nodes of the model `nodal`.
+    ///
+    /// # Errors
+    /// As [`trade`](super::trade).
+    pub(super) fn new(
+        sources: &[Source],
+        scene: &Scene,
+        name: Option<String>,
+        nodal: Option<&'m FeModel>,
+        settings: &Settings<'_>,
+        reserved: f64,
+        watch: Watch<'_>,
+    ) -> Result<Self> {
+        watch(Event::Phase("reference"));
+        let whole = sources[0].body();
+        nodal.map(|model| NodalReference::refuse(model, whole, scene, settings.longest)).transpose()?;
+        let stage = Stage::new(whole, scene)?;
+        let sources = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
+        // Groups are what candidates differ in.
+        let mut scene = stage.scene.into_owned();
+        scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
+        let full = |part| watch(Event::Fraction(part));
+        let (motion, said) = trace(sources[0].body(), &scene, settings.memory, full)?;
+        refuse_too_much(&sources, &motion, settings.memory)?;
+        let nodal = match nodal {
+            Some(model) => {
+                watch(Event::Phase("nodal reference"));
+                let allowed = Allowed { memory: settings.memory, longest: settings.longest };
+                Some(NodalReference::new(model, sources[0].body(), &scene, &motion, allowed, watch)?)
+            }
+            None => None,
+        };
+        let warning = nodal.as_ref().and_then(NodalReference::warning);
+        let found = [stage.found, said, Vec::from_iter(warning)].concat();
+        let mut own = Self { name, sources, scene, motion, nodal, reserved, found };
+        own.found = std::mem::take(&mut own.found).into_iter().map(|said| own.about(said)).collect();
+        Ok(own)
+    }
+
+    /// What is said about this load case, where there are several.
+    pub(super) fn about(&self, said: Diagnostic) -> Diagnostic {
+        match &self.name {
+            Some(name) => said.about(format!("case `{name}`")),
+            None => said,
+        }
+    }
+
+    /// Largest error over its tolerance that a candidate may have.
+    pub(super) fn most(&self) -> f64 {
+        (1.0 - self.reserved).max(0.0)
+    }
+
+    /// The whole body of the reference as candidates are measured against it.
+    pub(super) fn measure(&self) -> Measure<'_> {
+        Measure::new(self.sources[0].body(), &self.motion)
+    }
+
+    /// The body of `candidate` in the frame of the case.
+    ///
+    /// # Errors
+    /// Those of [`Candidate::body`].
+    pub(super) fn body(&self, candidate: &Candidate) -> Result<FlexBody> {
+        candidate.body(&self.sources[candidate.source])
+    }
+
+    /// Errors of `candidate`, whose body is `body`, and the multiplications of an evaluation of its
+    /// equations.
+    pub(super) fn measured(
+        &self,
+        measure: &Measure<'_>,
+        candidate: &Candidate,
+        body: &FlexBody,
+    ) -> Result<(InCase, usize)> {
+        let source = &self.sources[candidate.source];
+        let mut scene = self.own_scene(body, candidate);
+        scene.run.scheme = self.motion.scheme;
+        let instants = self.nodal.as_ref().map_or(&self.motion.time[..], NodalReference::time);
+        let motion = trace_at(body, &scene, instants, None)?;
+        let history = match &self.nodal {
+            Some(nodal) => nodal.errors(body, &motion),
+            None => source.errors(measure, body, &candidate.modes, &motion),
+        };
+        let history = history.ok_or_else(|| {
+            let message =
+                format!("the modes of {} cannot be compared with those of the reference", source.name());
+            Error::from(Diagnostic::new(Code::BodyIncomparable, message))
+        })?;
+        let tolerance = &scene.requirements.tolerance;
+        let errors = history.largest();
+        let worst = errors.worst(tolerance);
+        let growth = history.growth(&self.motion, tolerance);
+        let multiplications = EquationsOfMotion::new(body, scene.run.terms).multiplications();
+        Ok((InCase { errors, worst, growth }, multiplications))
+    }
+
+    /// Seconds of the simulation of `candidate`, whose body is `body`, with its work, and those of an
+    /// evaluation of its equations.
+    pub(super) fn time(
+        &self,
+        candidate: &Candidate,
+        body: &FlexBody,
+        repeat: usize,
+    ) -> Result<(f64, Work, f64)> {
+        let scene = self.own_scene(body, candidate);
+        let (integration, work) = timing::integration(body, &scene, repeat)?;
+        let evaluation = timing::evaluation(body, scene.run.terms)
+            .map_err(|reason| Error::from(Diagnostic::new(Code::SimulationStopped, reason.to_string())))?;
+        Ok((integration, work, evaluation))
+    }
+
+    fn own_scene(&self, body: &FlexBody, candidate: &Candidate) -> Scene {
+        self.sources[candidate.source].scene(&self.scene, body, &candidate.modes, &self.motion.start)
+    }
+}
+
+/// Every thread has a body, its equations and its motion, beside that of the reference, which is there.
+fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -> Result<()> {
+    const DOUBLE: f64 = 8.0;
+    /// W1 to W3, their panels and copies, and S: squares of the modes.
+    const SQUARES: f64 = 40.0;
+    let most = |count: &dyn Fn(&FlexBody) -> usize| {
+        sources.iter().map(|s| count(s.body())).max().unwrap_or(0) as f64
+    };
+    let (nodes, modes) = (most(&FlexBody::n_nodes), most(&FlexBody::n_modes));
+    let body = nodes * (7.0 + 6.0 * modes) + SQUARES * modes * modes;
+    let motion = reference.bytes(most(&FlexBody::n_modes) as usize);
+    let threads = rayon::current_num_threads() as f64;
+    let needed = threads * (DOUBLE * 2.0 * body + motion);
+    let what = format!("a trade study on {threads} threads");
+    refuse_beyond(memory, needed, &what, "use fewer --threads or modes, or a shorter `duration`")
+}

@@ -1,0 +1,202 @@
+//! What the motion of all nodes takes, before it is computed.
+
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::Result;
+use flexbody_base::memory::refuse_beyond;
+use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::Analysis;
+use flexbody_model::FeModel;
+use flexbody_motion::scene::{Scene, Scheme, fastest_history};
+use std::f64::consts::TAU;
+
+/// Seconds of a multiplication with an entry of a sparse matrix or factor, and of one in a factorisation.
+const PER_ENTRY: f64 = 1.5e-9;
+const PER_FLOP: f64 = 1.0e-9;
+
+/// Passes over the rows in an evaluation, besides the products.
+const PASSES: f64 = 60.0;
+
+/// Solves with the factor of M in an evaluation where rotations carry mass: 7 to 14 where nodes turn by 0.03, 8 to 22
+/// where they turn by 0.1 (frames of beams, a folded shell, a rigid region).
+const TURNED_SOLVES: f64 = 15.0;
+
+/// Evaluations per shortest period that an explicit method of order 8 takes at the least.
+const EVALUATIONS: f64 = 15.0;
+
+/// Iterations of an implicit step.
+const ITERATIONS: f64 = 5.0;
+
+/// Real solves that a complex one takes as long as.
+const COMPLEX: f64 = 3.0;
+
+/// Explicit integrations of so many seconds are taken however cheap implicit ones are: nothing is left to be
+/// said of their steps.
+const COMFORTABLE: f64 = 30.0;
+
+/// The fastest motion that counts turns by this angle in the first implicit steps that are tried.
+const FIRST_ANGLE: f64 = 1.5;
+
+/// Order of implicit steps that the scene does not ask for.
+pub(super) const ORDER: usize = 6;
+
+/// Parts at the most that a step is divided into.
+const MOST_PARTS: u32 = 1024;
+
+/// Times that implicit steps are halved at the least, to see what they were worth: relative to the first
+/// ones, 1 + 2.
+const RUNS: f64 = 3.0;
+
+/// Numbers of a model that work depends on.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effort {
+    rows: f64,
+    /// Seconds of an evaluation, of a solve with a real factor of the size of K, and of its factorisation.
+    evaluation: f64,
+    solve: f64,
+    factorisation: f64,
+    /// Entries of that factor.
+    entries: f64,
+    /// The largest circular frequency, estimated.
+    fastest: f64,
+    duration: f64,
+    /// Stretches between breaks.
+    pieces: f64,
+}
+
+/// How the motion is integrated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Way {
+    /// Explicitly, of order 8, with error control.
+    Explicit,
+    /// In implicit steps; `given` by the scene, or halved until they no longer count.
+    Implicit { order: usize, step: f64, given: bool },
+}
+
+impl Effort {
+    /// What `model` takes in `scene`, with `modes` damped modes.
+    pub(super) fn new(model: &FeModel, scene: &Scene, modes: usize) -> Self {
+        let (pencil, rows) = (model.pencil(), model.rows().len() as f64);
+        let analysis = Analysis::new(&pencil);
+        let (entries, flops) = analysis.map_or((f64::INFINITY, f64::INFINITY), |analysis| {
+            (analysis.factor_len() as f64, analysis.flops())
+        });
+        let block = pencil.block() as f64;
+        let stiffness = pencil.stiffness().as_csc().nnz() as f64;
+        // Both triangles of a factor of M, of which one component is stored.
+        let (solves, of_directors) = match model.director_mass() {
+            None => (1.0, 0.0),
+            Some(mass) => (TURNED_SOLVES, PASSES * mass.rows() as f64),
+        };
+        let evaluation = stiffness
+            + (2.0 * entries / block + of_directors) * solves
+            + (PASSES + 2.0 * modes as f64) * rows;
+        Self {
+            rows,
+            evaluation: PER_ENTRY * evaluation,
+            solve: PER_ENTRY * 2.0 * entries,
+            factorisation: PER_FLOP * flops,
+            entries,
+            fastest: fastest(model),
+            duration: scene.run.duration.unwrap_or(0.0),
+            pieces: 1.0 + scene.breaks().len() as f64,
+        }
+    }
+
+    /// Seconds of the explicit method.
+    fn explicit(&self) -> f64 {
+        EVALUATIONS * self.duration * self.fastest / TAU * self.evaluation
+    }
+
+    /// Seconds of `runs` times as many implicit steps.
+    pub(super) fn implicit(&self, order: usize, step: f64, runs: f64) -> f64 {
+        let (stages, solves) = match order {
+            2 => (1.0, 1.0),
+            4 => (2.0, COMPLEX),
+            _ => (3.0, 1.0 + COMPLEX),
+        };
+        let steps = (self.duration / step).max(1.0) * runs;
+        let one = ITERATIONS * (stages * self.evaluation + solves * self.solve);
+        steps * one + self.pieces * (1.0 + COMPLEX) * self.factorisation
+    }
+
+    /// Whether implicit steps may be divided into so many parts.
+    pub(super) fn is_allowed(&self, order: usize, step: f64, parts: u32, longest: Option<f64>) -> bool {
+        let seconds = self.implicit(order, step, f64::from(parts));
+        parts <= MOST_PARTS && longest.is_none_or(|longest| seconds <= longest)
+    }
+
+    /// How to integrate what a scene asks for by `scheme`, with circular frequencies up to `liveliest` that
+    /// count; and the seconds that it takes.
+    pub(super) fn plan(&self, scene: &Scene, scheme: Scheme, liveliest: f64) -> (Way, f64) {
+        match scheme {
+            // Implicit steps solve what is stiff of a body with mean axes.
+            _ if scene.carried.is_some() => (Way::Explicit, self.explicit()),
+            Scheme::Conserving { order, step } => {
+                let step = step.unwrap_or(TAU / (20.0 * liveliest)).min(self.duration);
+                (Way::Implicit { order, step, given: true }, self.implicit(order, step, 1.0))
+            }
+            Scheme::Adaptive { .. } => {
+                let for_loads = 1.0 / (20.0 * fastest_history(scene, self.duration));
+                let step = (FIRST_ANGLE / liveliest).min(for_loads).min(self.duration);
+                let (explicit, implicit) = (self.explicit(), self.implicit(ORDER, step, RUNS));
+                match explicit <= COMFORTABLE.max(implicit) {
+                    true => (Way::Explicit, explicit),
+                    false => (Way::Implicit { order: ORDER, step, given: false }, implicit),
+                }
+            }
+        }
+    }
+
+    /// Refuses what takes longer than `longest` seconds.
+    ///
+    /// # Errors
+    /// FB604.
+    pub(super) fn refuse_long(&self, seconds: f64, longest: Option<f64>) -> Result<()> {
+        let Some(longest) = longest.filter(|longest| seconds.is_nan() || seconds > *longest) else {
+            return Ok(());
+        };
+        let message = format!(
+            "--reference nodal: the motion of {} rows over a time of {:.3e} takes about {seconds:.1e} s at the least ({:.1e} entries in a factor), {longest:.0} s are allowed",
+            self.rows, self.duration, self.entries
+        );
+        let help = "take --reference fine, a shorter `duration`, method = \"conserving\" with a longer `step`, or say --allow-long";
+        Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into())
+    }
+
+    /// Refuses what does not fit the memory: the displacements of all rows at `instants` of `runs` motions,
+    /// and the factors of implicit steps.
+    ///
+    /// # Errors
+    /// FB601.
+    pub(super) fn refuse_large(&self, instants: f64, way: Way, memory: Option<u64>) -> Result<()> {
+        const DOUBLE: f64 = 8.0;
+        /// A real and a complex factor with their indices.
+        const FACTORS: f64 = 12.0 + 20.0;
+        let (runs, factors) = match way {
+            Way::Explicit => (1.0, 0.0),
+            Way::Implicit { given: true, .. } => (1.0, FACTORS * self.entries),
+            Way::Implicit { .. } => (2.0, FACTORS * self.entries),
+        };
+        let needed = DOUBLE * runs * instants * self.rows + factors;
+        let help = "take --reference fine, or simulate a shorter `duration`";
+        refuse_beyond(memory, needed, "the motion of all nodes", help)
+    }
+
+    /// Instants at which implicit steps are looked at.
+    pub(super) fn instants(&self, step: f64) -> f64 {
+        self.duration / step + 2.0 * self.pieces
+    }
+}
+
+/// The largest circular frequency of the modes of `body`.
+pub(super) fn fastest_mode(body: &FlexBody) -> f64 {
+    body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt()
+}
+
+/// An estimate of the largest circular frequency: sqrt(3 max K_ii / M_ii), an element of three dimensions
+/// with consistent mass.
+fn fastest(model: &FeModel) -> f64 {
+    let mass = model.pencil().mass_diagonal();
+    let ratios = model.stiffness().diagonal().into_iter().zip(mass).filter(|(_, m)| *m > 0.0);
+    (3.0 * ratios.map(|(k, m)| k / m).fold(0.0, f64::max)).sqrt()
+}

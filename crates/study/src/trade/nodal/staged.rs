@@ -1,0 +1,177 @@
+//! All nodes of a model in a scene, ready to be integrated.
+
+use super::seen::Seen;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_model::FeModel;
+use flexbody_motion::dynamics::{
+    LoadAxes, NodalEquations, NodalEvaluation, NodalModes, NodalMotion, NodalPoint, ReferenceConditions,
+};
+use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, Sight, integrate_closely};
+use flexbody_motion::scene::{Axes, Driving, Load, Scene, Scheme, Trace, damped, nodal_point};
+
+/// What is left of the stages of implicit steps, in the scales of the motion: far below the errors of bodies
+/// that are told, far above rounding.
+const SOLVED: f64 = 1e-11;
+
+/// The equations of all nodes in a scene, with the damping of the modes of a body.
+pub(super) struct Staged<'a> {
+    pub equations: NodalEquations<'a>,
+    pub scene: &'a Scene,
+    loads: Vec<(NodalPoint, &'a Load)>,
+    pub watched: Vec<NodalPoint>,
+    driving: Driving<'a>,
+    /// State at the start.
+    start: Vec<f64>,
+    /// The motion of the body.
+    motion: &'a Trace,
+}
+
+/// The error for what the nodal equations do not have.
+pub(super) fn refused(what: impl std::fmt::Display) -> Error {
+    let diagnostic = Diagnostic::new(Code::Usage, format!("--reference nodal: {what}"));
+    diagnostic.with_help("take --reference full").into()
+}
+
+/// Why an integration of `scene` ended.
+fn stopped(scene: &Scene, failure: Failure) -> Error {
+    let message = format!("the nodal reference of `{}` stopped: {failure}", scene.name);
+    Diagnostic::new(Code::SimulationStopped, message).into()
+}
+
+impl<'a> Staged<'a> {
+    /// `model` in `scene`, both in the frame of `body`, a body of the model whose motion starts as `motion`
+    /// does.
+    pub(super) fn new(
+        model: &'a FeModel,
+        body: &FlexBody,
+        scene: &'a Scene,
+        motion: &'a Trace,
+    ) -> Result<Self> {
+        let conditions = match &scene.carried {
+            Some(carried) => ReferenceConditions::AtRest(nodal_point(model, &carried.by)?),
+            None => ReferenceConditions::MeanAxes,
+        };
+        let body = &*damped(body, scene)?;
+        let equations = match &scene.requirements.damping {
+            Some(_) => NodalEquations::of_damped_body(model, body, &conditions),
+            None => NodalEquations::of_body(model, body, &conditions),
+        };
+        let equations = equations.map_err(refused)?;
+        let loads = scene.loads.iter().map(|load| Ok((nodal_point(model, &load.at)?, load)));
+        let watched = scene.watched.iter().map(|point| nodal_point(model, point));
+        let mut staged = Self {
+            loads: loads.collect::<Result<Vec<_>>>()?,
+            watched: watched.collect::<Result<Vec<_>>>()?,
+            driving: Driving::new(body.frame(), scene),
+            start: Vec::new(),
+            equations,
+            scene,
+            motion,
+        };
+        let modes =
+            NodalModes::new(&staged.equations, body).ok_or_else(|| refused("the body has other rows"))?;
+        let mut start = modes.lift(&motion.start);
+        if scene.initial.settled {
+            let softest = body.modes().eigenvalue[0];
+            start =
+                staged.system().settled(0.0, &start, softest).map_err(|failure| stopped(scene, failure))?;
+        }
+        staged.start = staged.equations.state(&start).map_err(refused)?;
+        Ok(staged)
+    }
+
+    /// The system that is integrated.
+    pub(super) fn system<'s>(&'s self) -> NodalMotion<'s, impl FnMut(f64, &mut NodalEvaluation<'s>) + 's> {
+        let motion = NodalMotion::new(&self.equations, |time, evaluation: &mut NodalEvaluation<'s>| {
+            self.act(time, evaluation);
+        });
+        match self.scene.prescribes() {
+            true => motion.driven(|time, axes| self.driving.at(time, axes)),
+            false => motion,
+        }
+    }
+
+    fn act(&self, time: f64, evaluation: &mut NodalEvaluation<'_>) {
+        if let Some(gravity) = &self.scene.gravity {
+            evaluation.add_gravity(gravity);
+        }
+        for (point, load) in &self.loads {
+            let (force, torque) = load.at_time(time);
+            let axes = match load.axes {
+                Axes::World => LoadAxes::World,
+                // The frame of the body is that of the scene.
+                Axes::Model | Axes::Body => LoadAxes::Body,
+            };
+            evaluation.add_force_at(point, &force, axes);
+            if !load.torque.is_nothing() {
+                evaluation.add_torque_at(point, &torque, axes);
+            }
+        }
+    }
+
+    /// Integrates with the explicit method and sees the motion at `instants`.
+    pub(super) fn explicit(
+        &self,
+        tolerance: f64,
+        instants: &[f64],
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Seen> {
+        let end = instants.last().copied().unwrap_or(0.0);
+        let method = Method::Explicit(Explicit::new(self.start.len(), tolerance, end));
+        let scheme = Scheme::Adaptive { tolerance };
+        self.integrate(method, scheme, instants, watch, |sight| sight == Sight::Instant)
+    }
+
+    /// Integrates to `end` with the collocation of an `order` in steps of at most `step`, each divided into
+    /// `refinement`, and sees the motion at the ends of the undivided steps and at both sides of every break.
+    pub(super) fn implicit(
+        &self,
+        order: usize,
+        step: f64,
+        refinement: u32,
+        end: f64,
+        watch: &mut dyn FnMut(f64),
+    ) -> Result<Seen> {
+        let method = Gauss::new(self.start.len(), order).solved_to(SOLVED).refined(refinement);
+        let scheme = Scheme::Conserving { order, step: Some(step / f64::from(refinement)) };
+        let mut taken = 0;
+        self.integrate(Method::Gauss { method, step }, scheme, &[0.0, end], watch, |sight| match sight {
+            Sight::Start => {
+                taken = 0;
+                true
+            }
+            Sight::End => {
+                taken += 1;
+                taken % refinement == 0
+            }
+            Sight::Instant | Sight::Within => false,
+        })
+    }
+
+    fn integrate(
+        &self,
+        mut method: Method,
+        scheme: Scheme,
+        instants: &[f64],
+        watch: &mut dyn FnMut(f64),
+        mut counts: impl FnMut(Sight) -> bool,
+    ) -> Result<Seen> {
+        let end = instants.last().copied().unwrap_or(0.0);
+        let (mut motion, mut state, mut seen) =
+            (self.system(), self.start.clone(), Seen::new(self.equations.n_rows(), self.motion));
+        let (mut observer, mut room) = (self.system(), vec![0.0; self.equations.n_rows()]);
+        let look = |sight: Sight, time: f64, state: &[f64]| {
+            if counts(sight) {
+                seen.see(time, state, &mut observer, &self.watched, &mut room)?;
+            }
+            watch(time / end);
+            Ok::<(), Failure>(())
+        };
+        integrate_closely(&mut method, &mut motion, &mut state, instants, &self.scene.breaks(), 1, look)
+            .map_err(|failure| stopped(self.scene, failure))?;
+        seen.finish(scheme, method.work());
+        Ok(seen)
+    }
+}

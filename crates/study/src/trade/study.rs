@@ -1,0 +1,379 @@
+//! The study: every candidate simulated, its errors measured, then its times.
+
+use super::candidate::{first_of, ladder, whole_candidates};
+use super::case::StudyCase;
+use super::{
+    Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Row, Settings,
+    Source, Timed, front,
+};
+use crate::selection::liveliest_modes;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use flexbody_body::flex_body::{FlexBody, Groups, Storage};
+use flexbody_linalg::progress::{Event, Watch};
+use flexbody_model::FeModel;
+use flexbody_motion::integration::Work;
+use flexbody_motion::scene::{Measure, Scene, Tolerance, ends_a_run};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The motion that errors are measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ReferenceKind {
+    /// The motion of the first source, with everything that it has.
+    Full,
+    /// The unreduced equations of all nodes.
+    Nodal,
+}
+
+impl ReferenceKind {
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Nodal => "nodal",
+        }
+    }
+}
+
+/// A finished study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trade {
+    /// Name of the scene.
+    pub scene: String,
+    /// Name of the body's model.
+    pub body: String,
+    /// The motion that errors are measured against.
+    pub reference: ReferenceKind,
+    /// The load cases; of a scene without there is one.
+    pub cases: Vec<TradeCase>,
+    /// Multiplications that the scene allows instead.
+    pub allowed: Option<usize>,
+    /// All candidates; the first is the whole body of the reference.
+    pub rows: Vec<Row>,
+    /// Rows of the Pareto front, ascending in cost.
+    pub front: Vec<usize>,
+    /// The row to take.
+    pub recommended: Recommendation,
+    /// Warnings and notes about the motion of the reference.
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// A load case of a study, or the scene of one without.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TradeCase {
+    /// Name of the load case; `None` of a scene alone.
+    pub name: Option<String>,
+    /// Its tolerances.
+    pub tolerance: Tolerance,
+    /// Part of them that the reference lacks of its model itself: candidates get the rest.
+    pub reserved: f64,
+    /// How the equations of all nodes were integrated, where they are the reference.
+    pub nodal: Option<NodalIntegration>,
+    /// The row to take if there were no other case.
+    pub alone: Recommendation,
+    /// Candidates that are cheaper than the recommended one and beyond the tolerances in this case.
+    pub ruled_out: usize,
+    /// Those of them that no other case rules out.
+    pub ruled_out_alone: usize,
+}
+
+impl Trade {
+    /// Tolerances of a load case (from 0).
+    pub fn tolerance(&self, case: usize) -> &Tolerance {
+        &self.cases[case].tolerance
+    }
+}
+
+/// Measures every candidate of `sources` in `scene`. The first source is the reference; others are
+/// [`Source::beside`] it.
+///
+/// Errors are those of the model: all candidates are integrated with the method and the step of the
+/// reference. They are found on all threads; the times of those that somebody may take afterwards, one after
+/// the other. Everything but the times is the same at any number of threads.
+///
+/// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
+///
+/// # Errors
+/// Those of [`trace`](flexbody_motion::scene::trace) and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the temporary folder.
+pub fn trade(
+    sources: &[Source],
+    scene: &Scene,
+    nodal: Option<&FeModel>,
+    settings: &Settings<'_>,
+    watch: Watch<'_>,
+) -> Result<Trade> {
+    trade_for_cases(sources, std::slice::from_ref(scene), nodal, settings, watch)
+}
+
+/// The same for the load cases `scenes`, which one body has to serve: a candidate is measured in each, and as
+/// good as it is in the worst. The simulations of all cases together are what it takes.
+///
+/// # Errors
+/// As [`trade`].
+pub fn trade_for_cases(
+    sources: &[Source],
+    scenes: &[Scene],
+    nodal: Option<&FeModel>,
+    settings: &Settings<'_>,
+    watch: Watch<'_>,
+) -> Result<Trade> {
+    let (Some(source), Some(first)) = (sources.first(), scenes.first()) else {
+        return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
+    };
+    let several = scenes.len() > 1;
+    let case = |(at, scene): (usize, &Scene)| {
+        let reserved = settings.reserved.get(at).copied().unwrap_or(0.0);
+        let name = several.then(|| scene.case_name().unwrap_or(&scene.name).to_owned());
+        let label = name.clone();
+        StudyCase::new(sources, scene, name, nodal, settings, reserved, watch).map_err(|error| match label {
+            Some(name) => error.about(format!("case `{name}`")),
+            None => error,
+        })
+    };
+    let cases = scenes.iter().enumerate().map(case).collect::<Result<Vec<_>>>()?;
+    let measures = cases.iter().map(StudyCase::measure).collect();
+    let allowed = scenes.iter().filter_map(|scene| scene.requirements.multiplications).min();
+    let job = Job { cases: &cases, measures, allowed };
+    let rows = job.rows(settings.repeat, watch)?;
+    let recommended = Recommendation::new(&rows, allowed);
+    let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
+    Ok(Trade {
+        scene: first.case.as_ref().filter(|_| several).map_or(&first.name, |case| &case.scene).clone(),
+        body: source.body().source().name.clone(),
+        reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
+        allowed,
+        front: front(&rows),
+        recommended,
+        cases: (0..cases.len()).map(seen).collect(),
+        rows,
+        diagnostics: cases.iter().flat_map(|case| case.found.iter().cloned()).collect(),
+    })
+}
+
+impl TradeCase {
+    fn new(at: usize, case: &StudyCase<'_>, rows: &[Row], recommended: Recommendation) -> Self {
+        let is_within = |measured: &Measured, at: usize, most: f64| measured.by_case[at].worst <= most;
+        let most = case.most();
+        let taken = recommended.row().and_then(|row| rows[row].outcome.as_ref().ok());
+        let is_cheaper =
+            |own: &&Measured| taken.is_none_or(|taken| own.multiplications < taken.multiplications);
+        let exact = rows.iter().filter(|row| row.candidate.lumped.is_none());
+        let cheaper = exact.filter_map(|row| row.outcome.as_ref().ok()).filter(is_cheaper);
+        let ruled_out: Vec<&Measured> = cheaper.filter(|own| !is_within(own, at, most)).collect();
+        Self {
+            name: case.name.clone(),
+            tolerance: case.scene.requirements.tolerance,
+            reserved: case.reserved,
+            nodal: case.nodal.as_ref().map(NodalReference::integration),
+            alone: Recommendation::cheapest(rows, |measured| is_within(measured, at, most)),
+            ruled_out_alone: ruled_out.iter().filter(|own| own.beyond == 1).count(),
+            ruled_out: ruled_out.len(),
+        }
+    }
+}
+
+/// Candidates that are done, told as the fraction of all.
+struct Progress<'w> {
+    watch: Watch<'w>,
+    count: f64,
+    done: AtomicUsize,
+}
+
+impl<'w> Progress<'w> {
+    fn new(watch: Watch<'w>, phase: &'static str, count: usize) -> Self {
+        watch(Event::Phase(phase));
+        Self { watch, count: count as f64, done: AtomicUsize::new(0) }
+    }
+
+    fn step(&self) {
+        let finished = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.watch)(Event::Fraction(finished as f64 / self.count));
+    }
+}
+
+/// What all candidates have in common.
+struct Job<'j> {
+    cases: &'j [StudyCase<'j>],
+    /// Of each case.
+    measures: Vec<Measure<'j>>,
+    /// Multiplications that are allowed instead of tolerances.
+    allowed: Option<usize>,
+}
+
+impl Job<'_> {
+    /// The bodies that candidates are made of, as the first case has them.
+    fn sources(&self) -> &[Source] {
+        &self.cases[0].sources
+    }
+
+    /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one
+    /// after the other.
+    fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<Row>> {
+        let carried = self.cases.iter().any(|case| case.scene.carried.is_some());
+        let whole = whole_candidates(self.sources(), carried);
+        let mut rows = self.errors(whole, "errors of whole bodies", watch)?;
+        let worst_of = |groups: Groups| {
+            let has_groups = |row: &&Row| {
+                let own = &row.candidate;
+                own.source == 0 && own.groups == groups && own.lumped.is_none() && own.storage == Storage::F64
+            };
+            let measured = rows.iter().find(has_groups).and_then(|row| row.outcome.as_ref().ok());
+            measured.map_or(f64::INFINITY, Measured::worst)
+        };
+        let motions = self.cases.iter().map(|case| (case.sources[0].body(), &case.scene, &case.motion));
+        let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
+        let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
+        rows.extend(self.errors(some_modes, "errors of fewer modes", watch)?);
+        self.refine(&liveliest, &mut rows)?;
+        self.time_what_is_worth_it(&mut rows, repeat, watch)?;
+        Ok(rows)
+    }
+
+    /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that
+    /// is not, as a selection does.
+    fn refine(&self, liveliest: &[usize], rows: &mut Vec<Row>) -> Result<()> {
+        if self.allowed.is_some() {
+            return Ok(());
+        }
+        let is_exact =
+            |own: &Candidate| own.source == 0 && own.lumped.is_none() && own.storage == Storage::F64;
+        let enough = rows.iter().filter(|row| is_exact(&row.candidate)).filter_map(|row| {
+            let measured = row.outcome.as_ref().ok().filter(|measured| measured.holds())?;
+            Some((measured.multiplications, &row.candidate))
+        });
+        let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
+        let best = best.clone();
+        let count = best.modes.len();
+        let lowest: Vec<usize> = (0..liveliest.len()).collect();
+        let by_frequency = count < lowest.len() && best.modes == lowest[..count];
+        let order = if by_frequency { &lowest[..] } else { liveliest };
+        if first_of(order, count) != best.modes {
+            return Ok(());
+        }
+        let with = |count: usize| Candidate { modes: first_of(order, count), ..best.clone() };
+        let is_rung = |row: &&Row| row.candidate == with(row.candidate.modes.len());
+        let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
+        let (mut too_few, mut enough) =
+            (fewer.map(|row| row.candidate.modes.len()).max().unwrap_or(0), count);
+        while too_few + 1 < enough {
+            let count = too_few.midpoint(enough);
+            let row = self.measure(with(count))?;
+            let passed = row.outcome.as_ref().is_ok_and(|measured| measured.holds());
+            if passed {
+                enough = count
+            } else {
+                too_few = count
+            }
+            rows.push(row);
+        }
+        Ok(())
+    }
+
+    fn time_what_is_worth_it(&self, rows: &mut [Row], repeat: usize, watch: Watch<'_>) -> Result<()> {
+        let recommended = Recommendation::new(rows, self.allowed).row();
+        let mut worth_it: Vec<usize> = front(rows).into_iter().chain(recommended).chain([0]).collect();
+        worth_it.sort_unstable();
+        worth_it.dedup();
+        let progress = Progress::new(watch, "times", worth_it.len());
+        for at in worth_it {
+            self.time(&mut rows[at], repeat)?;
+            progress.step();
+        }
+        Ok(())
+    }
+
+    /// The rows of candidates, without times.
+    fn errors(&self, all: Vec<Candidate>, phase: &'static str, watch: Watch<'_>) -> Result<Vec<Row>> {
+        let progress = Progress::new(watch, phase, all.len());
+        let measured = |candidate| {
+            let row = self.measure(candidate);
+            progress.step();
+            row
+        };
+        all.into_par_iter().map(measured).collect()
+    }
+
+    /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
+    fn measure(&self, candidate: Candidate) -> Result<Row> {
+        let source = &self.sources()[candidate.source];
+        let last = candidate.modes.last().copied().unwrap_or(0);
+        let outcome = match self.measured(&candidate) {
+            Ok(measured) => Ok(measured),
+            // A lumped mass need not be the mass of anything: that is what the row says then.
+            Err(error)
+                if candidate.lumped.is_some() || error.diagnostics().iter().all(|d| ends_a_run(d.code())) =>
+            {
+                Err(Failed(error.first_error().clone()))
+            }
+            Err(error) => return Err(error),
+        };
+        Ok(Row {
+            source: source.name().to_owned(),
+            last_frequency_hz: source.body().frequencies_hz()[last],
+            candidate,
+            outcome,
+        })
+    }
+
+    fn measured(&self, candidate: &Candidate) -> Result<Measured> {
+        let (mut by_case, mut multiplications, mut bytes) = (Vec::new(), 0, 0);
+        for (case, measure) in self.cases.iter().zip(&self.measures) {
+            let body = case.body(candidate)?;
+            if by_case.is_empty() {
+                bytes = file_size(&body)?;
+            }
+            let (own, cost) = case.measured(measure, candidate, &body).map_err(|error| {
+                Error::new(error.diagnostics().iter().cloned().map(|said| case.about(said)).collect())
+            })?;
+            multiplications = multiplications.max(cost);
+            by_case.push(own);
+        }
+        let worst = |at: &usize| by_case[*at].worst;
+        // The first of equals; NaN is the largest of all.
+        let largest = (0..by_case.len()).rev().max_by(|a, b| worst(a).total_cmp(&worst(b)));
+        let within = |(own, case): (&InCase, &StudyCase<'_>)| own.worst <= case.most();
+        let beyond = by_case.iter().zip(self.cases).filter(|pair| !within(*pair)).count();
+        Ok(Measured {
+            case: largest.expect("a load case"),
+            beyond,
+            by_case,
+            multiplications,
+            bytes,
+            preprocessing: self.sources()[candidate.source].preprocessing(),
+            timed: None,
+        })
+    }
+
+    fn time(&self, row: &mut Row, repeat: usize) -> Result<()> {
+        let Ok(measured) = &mut row.outcome else { return Ok(()) };
+        let mut all = Timed { evaluation: 0.0, integration: 0.0, work: Work::default() };
+        for case in self.cases {
+            let body = case.body(&row.candidate)?;
+            match case.time(&row.candidate, &body, repeat) {
+                Ok((integration, work, evaluation)) => {
+                    all.integration += integration;
+                    all.evaluation = all.evaluation.max(evaluation);
+                    all.work.steps += work.steps;
+                    all.work.rejected += work.rejected;
+                    all.work.rates += work.rates;
+                }
+                Err(error) => {
+                    row.outcome = Err(Failed(case.about(error.first_error().clone())));
+                    return Ok(());
+                }
+            }
+        }
+        measured.timed = Some(all);
+        Ok(())
+    }
+}
+
+/// Size of the file of `body`, written to the temporary folder and removed.
+fn file_size(body: &FlexBody) -> Result<u64> {
+    let name = format!("flexbody-trade-{}.flex.h5", std::process::id());
+    let slot = flexbody_file::prepare_output(std::env::temp_dir().join(name))?;
+    flexbody_file::fill_slot(body, &slot)?;
+    Ok(std::fs::metadata(slot.temporary()).map_or(0, |meta| meta.len()))
+}

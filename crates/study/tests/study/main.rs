@@ -1,0 +1,11 @@
+//! What a scene needs of a body, against motions of all nodes.
+
+#![allow(unreachable_pub)] // nothing outside reads a test
+
+mod continuous_motion;
+mod nodal_reference;
+mod random_verdicts;
+mod reference;
+mod scene_frames;
+mod selection_bounds;
+mod selection_verdicts;

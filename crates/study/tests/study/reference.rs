@@ -1,0 +1,506 @@
+//! What a body lacks of its model, as it is estimated, against the motion of all nodes; bodies that are
+//! enriched; starts without a shock.
+
+use flexbody_base::diagnostic::Code;
+use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
+use flexbody_body::convert::{ConvertSettings, convert};
+use flexbody_body::flex_body::FlexBody;
+use flexbody_body::invariants::BodyFrame;
+use flexbody_body::verification::accept;
+use flexbody_eigen::{Resume, Wanted};
+use flexbody_linalg::gram;
+use flexbody_linalg::progress::SILENT;
+use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel};
+use flexbody_motion::scene::{
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, Measure, ModeStart, OtherModes, OutputErrors,
+    Point, Scene, Scheme, Spin, Stage, VectorHistory, simulate, trace, trace_at,
+};
+use flexbody_study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, ReferenceError, enrich};
+use flexbody_study::tailoring::{Tailoring, convert_for_cases, convert_for_scene};
+use flexbody_study::trade::{Allowed, NodalReference};
+use nalgebra::Vector3;
+use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::mesh::{Mesh, grid};
+use oracle::scenes::nothing_happens;
+use proptest::prelude::*;
+
+/// A rubber beam of some bricks, askew, with an interface at one end.
+fn model() -> FeModel {
+    beam([4, 1, 1])
+}
+
+fn beam(cells: [i32; 3]) -> FeModel {
+    beam_of(Element::Hex8, MassRule::Consistent, cells)
+}
+
+fn beam_of(element: Element, rule: MassRule, cells: [i32; 3]) -> FeModel {
+    rooted_beam(element, rule, cells, Coupling::Averaging)
+}
+
+fn raw_beam() -> RawModel {
+    raw_rooted_beam(Element::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Averaging)
+}
+
+fn rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> FeModel {
+    FeModel::from_raw(raw_rooted_beam(element, rule, cells, coupling)).expect("a sound model").model
+}
+
+fn raw_rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> RawModel {
+    let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
+    let mesh = Mesh::from_cells(element, &grid(cells), |[x, y, z]| {
+        [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
+    });
+    let raw = mesh.assemble(&rubber, rule).raw_model();
+    let nodes = raw.nodes.ids.iter().zip(&raw.nodes.positions).filter(|(_, at)| at[0] < 0.1);
+    let root = NodeSet::new("root", nodes.map(|(id, _)| *id).collect());
+    let interfaces = vec![NodeSet { coupling: Some(coupling), ..root }];
+    RawModel { interfaces, ..raw }
+}
+
+/// Loads and spins of the scenes are along the axes of the body, which are principal.
+fn settings(modes: usize) -> ConvertSettings {
+    ConvertSettings {
+        frame: BodyFrame::Principal,
+        modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
+        lumped: Vec::new(),
+        ..ConvertSettings::default()
+    }
+}
+
+fn body(model: &FeModel, modes: usize) -> FlexBody {
+    convert(model, &settings(modes), SILENT).expect("a body").body
+}
+
+/// The first circular frequency of the model.
+fn first_rate(model: &FeModel) -> f64 {
+    body(model, 1).modes().eigenvalue[0].sqrt()
+}
+
+/// A free body that turns and is pulled at a node by a force that swings from zero, for some of its first
+/// periods.
+fn pulled(model: &FeModel, node: usize, force: Vector3<f64>, swing: f64, spin: Vector3<f64>) -> Scene {
+    let rate = first_rate(model);
+    Scene {
+        initial: Initial {
+            angular_velocity: spin * rate,
+            axes: Axes::Body,
+            settled: true,
+            ..Initial::default()
+        },
+        loads: vec![Load {
+            at: Point::Node(model.nodes().ids[node]),
+            force: VectorHistory::Along {
+                direction: force,
+                factor: History::Sine {
+                    amplitude: 1.0,
+                    frequency: swing * rate / std::f64::consts::TAU,
+                    phase: 0.0,
+                },
+            },
+            torque: VectorHistory::nothing(),
+            axes: Axes::Body,
+        }],
+        ..nothing_happens("pulled", 2.0 * std::f64::consts::TAU / rate, 1e-9)
+    }
+}
+
+/// The estimate for a body as it is.
+fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError {
+    let found = enrich(
+        model,
+        scene,
+        Enrichment { memory: None, grows: false, is_fine: false },
+        SILENT,
+        |_| Ok(body.clone()),
+        |body| body,
+    )
+    .expect("an estimate");
+    found.error().expect("an estimate").clone()
+}
+
+/// The error against the motion of all nodes: of deflection and stress.
+fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
+    let errors = all_true_errors(model, body, scene);
+    [errors.deflection, errors.stress].map(|error| error.expect("a deformed body"))
+}
+
+/// All errors against the motion of all nodes.
+fn all_true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> OutputErrors {
+    let stage = Stage::new(body, scene).expect("a stage");
+    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ()).expect("a motion");
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)
+        .expect("a reference");
+    nodal.errors(&stage.body, &motion).expect("of one model").largest()
+}
+
+/// How the frame of a body moves that is not free.
+#[derive(Debug, Clone, Copy)]
+enum Given {
+    /// A spin that grows, with the centre of mass held.
+    Spin,
+    /// Carried by the root, which rests.
+    Rest,
+    /// Carried by the root, which swings along a line.
+    Swing,
+    /// Carried by the root, which turns faster and faster about an axis beside it.
+    Turn,
+}
+
+/// A body that is pulled as in [`pulled`] while its frame moves in a given way.
+fn driven(model: &FeModel, given: Given, node: usize, force: Vector3<f64>, swing: f64) -> Scene {
+    let rate = first_rate(model);
+    let mut scene = pulled(model, node, force, swing, Vector3::zeros());
+    let period = std::f64::consts::TAU / rate;
+    let growing = VectorHistory::Along {
+        direction: Vector3::new(0.3, 0.2, 1.0).normalize(),
+        factor: History::Ramp { from: 0.02 * rate, to: 0.04 * rate, start: 0.0, duration: period },
+    };
+    let root = || Point::Interface("root".to_owned());
+    let velocity = VectorHistory::Along {
+        direction: Vector3::new(0.2, -0.4, 1.0).normalize(),
+        factor: History::Sine { amplitude: 1e-3 * rate, frequency: 0.3 / period, phase: 0.0 },
+    };
+    match given {
+        Given::Spin => {
+            scene.spin = Some(Spin { velocity: growing, axes: Axes::Model, start: None, hold: true });
+        }
+        Given::Rest => scene.carried = Some(Carried { by: root(), spin: None, translation: None }),
+        Given::Swing => {
+            let translation = Some(Drive::Velocity(velocity));
+            scene.carried = Some(Carried { by: root(), spin: None, translation });
+        }
+        Given::Turn => {
+            let through = Some(Vector3::new(-0.4, 0.3, 0.1));
+            let spin = CarriedSpin { velocity: growing, axes: Axes::Model, start: None, through };
+            scene.carried = Some(Carried { by: root(), spin: Some(spin), translation: None });
+        }
+    }
+    scene
+}
+
+const GIVEN: [Given; 4] = [Given::Spin, Given::Rest, Given::Swing, Given::Turn];
+
+#[test]
+fn a_body_with_all_modes_lacks_nothing() {
+    let model = model();
+    let whole = body(&model, usize::MAX);
+    let scene = pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
+    let lack = estimated(&model, &whole, &scene);
+    // What double precision leaves of residuals in the norm of K^+.
+    assert!(lack.worst < 1e-6, "{lack:?}");
+}
+
+#[test]
+fn a_driven_body_with_all_modes_lacks_nothing() {
+    let model = model();
+    let whole = body(&model, usize::MAX);
+    for given in GIVEN {
+        let scene = driven(&model, given, 17, Vector3::new(1e-5, 2e-5, -1e-5), 0.4);
+        let lack = estimated(&model, &whole, &scene);
+        assert!(lack.worst < 1e-6 && lack.errors.reaction.is_some(), "{given:?}: {lack:?}");
+    }
+}
+
+/// Reactions have no static part to be estimated by: what is lacking is seen in them by its inertia.
+#[test]
+fn a_driven_body_lacks_in_its_reaction_what_all_nodes_say() {
+    let model = model();
+    for given in GIVEN {
+        for modes in [6, 9] {
+            let scene = driven(&model, given, 17, Vector3::new(1e-5, 2e-5, -1e-5), 0.4);
+            let body = body(&model, modes);
+            let lack = estimated(&model, &body, &scene).errors;
+            let found = all_true_errors(&model, &body, &scene);
+            let pairs = [
+                ("deflection", lack.deflection, found.deflection),
+                ("stress", lack.stress, found.stress),
+                ("reaction", lack.reaction, found.reaction),
+            ];
+            for (what, lack, found) in pairs {
+                let effectivity = lack.expect(what) / found.expect(what);
+                assert!(
+                    (0.6..1.7).contains(&effectivity),
+                    "{given:?}, {modes} modes, {what}: {effectivity} of {found:?}"
+                );
+            }
+            assert_eq!((lack.attitude, found.attitude < 1e-9), (0.0, true), "{given:?}");
+        }
+    }
+}
+
+/// What a carried body lacks joins it as residual vectors of the free one.
+#[test]
+fn responses_join_a_body_that_is_carried() {
+    let model = model();
+    let mut scene = driven(&model, Given::Swing, 17, Vector3::new(1e-5, 2e-5, -1e-5), 0.4);
+    scene.requirements.tolerance.stress = 0.05;
+    scene.requirements.tolerance.deflection = 0.05;
+    scene.requirements.tolerance.reaction = 0.05;
+    let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: false };
+    let Enriched { made, rounds } =
+        tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
+    assert!(first.worst > 1.0 && last.worst < PART_OF_REFERENCE, "{rounds:?}");
+    let found = all_true_errors(&model, &made.body, &scene).worst(&scene.requirements.tolerance);
+    assert!((0.4..2.5).contains(&(last.worst / found)), "{found} {rounds:?}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// The estimate is linear and without gyroscopic terms: it is near where deflections are small and the
+    /// body turns slowly.
+    #[test]
+    fn the_estimate_is_near_the_true_error(
+        (modes, node) in (3usize..9, 0usize..20),
+        force in prop::array::uniform3(-2e-4f64..2e-4),
+        (swing, spin) in (0.2f64..1.5, prop::array::uniform3(-0.02f64..0.02)),
+    ) {
+        let model = model();
+        let scene = pulled(&model, node, force.into(), swing, spin.into());
+        let body = body(&model, modes);
+        let lack = estimated(&model, &body, &scene);
+        let [deflection, stress] = true_errors(&model, &body, &scene);
+        let effectivity = lack.errors.stress.expect("a deformed body") / stress;
+        prop_assert!((0.7..1.4).contains(&effectivity), "stress: {:?} is {} of {}", lack, effectivity, stress);
+        let effectivity = lack.errors.deflection.expect("a deformed body") / deflection;
+        prop_assert!((0.7..1.4).contains(&effectivity), "deflection: {:?} is {} of {}", lack, effectivity, deflection);
+    }
+}
+
+/// The mass of ten-node tetrahedra with four points is singular: motions without mass follow loads at once,
+/// in what all nodes say as in the estimate. A single force has a resultant, so that the body accelerates.
+/// A body with all modes lacks these motions and nothing else.
+#[test]
+fn motions_without_mass_follow_a_force_that_accelerates_the_body() {
+    let model = beam_of(Element::Tet10, MassRule::Reduced, [1, 1, 1]);
+    let force = Vector3::new(1e-5, 2e-5, -1e-5);
+    let scene = pulled(&model, 11, force, 0.4, Vector3::zeros());
+    for modes in [9, 15, usize::MAX] {
+        let body = body(&model, modes);
+        let lack = estimated(&model, &body, &scene).errors;
+        let [deflection, stress] = true_errors(&model, &body, &scene);
+        for (own, found) in [(lack.deflection, deflection), (lack.stress, stress)] {
+            let effectivity = own.expect("a deformed body") / found;
+            assert!((0.97..1.03).contains(&effectivity), "{modes} modes: {effectivity} of {found}");
+        }
+    }
+}
+
+/// Instants of a thousand periods, ten times as many as were followed once.
+#[test]
+#[ignore = "slow"]
+fn a_long_run_is_followed() {
+    let model = model();
+    let mut scene = pulled(&model, 7, Vector3::new(1e-5, 2e-5, -1e-5), 0.7, Vector3::zeros());
+    scene.run.duration = scene.run.duration.map(|periods| 500.0 * periods);
+    let body = body(&model, 6);
+    let lack = estimated(&model, &body, &scene);
+    let [deflection, stress] = true_errors(&model, &body, &scene);
+    for (own, found) in [(lack.errors.deflection, deflection), (lack.errors.stress, stress)] {
+        let effectivity = own.expect("a deformed body") / found;
+        assert!((0.7..1.4).contains(&effectivity), "{effectivity} of {found}: {lack:?}");
+    }
+}
+
+#[test]
+fn responses_join_until_what_is_lacking_does_not_count() {
+    let model = model();
+    let mut scene =
+        pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
+    scene.requirements.tolerance.stress = 0.2;
+    scene.requirements.tolerance.deflection = 0.2;
+    let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: false };
+    let Enriched { made, rounds } =
+        tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
+    assert!(first.modes == 4 && first.worst > 1.0, "{rounds:?}");
+    assert!(last.modes == made.body.n_modes() && last.worst < 0.3 * first.worst, "{rounds:?}");
+    // As all nodes tell, whom nobody asked.
+    let [_, before] = true_errors(&model, &body(&model, 4), &scene);
+    let [deflection, after] = true_errors(&model, &made.body, &scene);
+    assert!(before > 0.2 && after < 0.3 * before && deflection < 0.1, "{before} {after} {deflection}");
+    assert!(after < 2.5 * last.errors.stress.expect("a deformed body"), "{after} {rounds:?}");
+    // Every one of them says where it comes from.
+    let provenance = &made.body.modes().provenance;
+    assert!(provenance.iter().any(|from| from.contains("motion 1")), "{provenance:?}");
+}
+
+#[test]
+fn a_shock_is_no_reason_for_modes_without_end() {
+    let model = beam([8, 2, 1]);
+    let force = Vector3::new(1e-4, 2e-4, -1e-4);
+    let mut scene = pulled(&model, 7, force, 0.7, Vector3::zeros());
+    scene.loads[0].force = VectorHistory::constant(force);
+    scene.initial.settled = false;
+    scene.requirements.tolerance.stress = 1e-3;
+    scene.requirements.tolerance.deflection = 1e-3;
+    let tailoring = Tailoring { settings: settings(6), by_band: false, of_motion: false };
+    let shocked = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    let lack = shocked.error().expect("an estimate");
+    assert!(lack.worst > 1.0 && lack.modes == shocked.made.body.n_modes(), "{:?}", shocked.rounds);
+    assert!(lack.modes < model.rows().len() / 2, "{:?}", shocked.rounds);
+    // The same load is there before.
+    scene.initial.settled = true;
+    let calm = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
+    assert!(calm.error().expect("an estimate").worst < PART_OF_REFERENCE, "{:?}", calm.rounds);
+}
+
+#[test]
+#[ignore = "slow"]
+fn shapes_of_the_motion_hold_the_tolerances_and_are_no_more_than_free_modes() {
+    let model = model();
+    let mut scene =
+        pulled(&model, 7, Vector3::new(1e-4, 2e-4, -1e-4), 0.7, Vector3::new(0.002, 0.003, 0.001));
+    scene.requirements.tolerance.stress = 0.05;
+    scene.requirements.tolerance.deflection = 0.05;
+    let made = |of_motion: bool| {
+        let tailoring = Tailoring { settings: settings(12), by_band: false, of_motion };
+        convert_for_scene(&model, &tailoring, &scene, Resume::default(), SILENT).expect("a body")
+    };
+    let ((free, _), (own, selection)) = (made(false), made(true));
+    assert!(own.body.n_modes() <= free.body.n_modes(), "{} {}", own.body.n_modes(), free.body.n_modes());
+    assert!(selection.holds(), "{selection:?}");
+    let errors = true_errors(&model, &own.body, &scene);
+    assert!(errors.iter().all(|error| *error < 0.05), "{errors:?}");
+    // What every body has to fulfil.
+    accept(&own.body).expect("the identities");
+    assert_eq!(own.body.source().settings["basis"], "scene");
+}
+
+/// A body of the shapes of two motions serves both; one of the shapes of either does not serve the other.
+#[test]
+fn shapes_of_several_motions_serve_all_of_them() {
+    let model = model();
+    let pull = |direction: Vector3<f64>, node: usize| {
+        let mut scene = pulled(&model, node, direction, 0.7, Vector3::zeros());
+        scene.requirements.tolerance.stress = 0.05;
+        scene.requirements.tolerance.deflection = 0.05;
+        scene
+    };
+    let cases = [pull(Vector3::z() * 2e-4, 7), pull(Vector3::x() * 2e-4, 16)];
+    let made = |cases: &[Scene]| {
+        let tailoring = Tailoring { settings: settings(12), by_band: false, of_motion: true };
+        convert_for_cases(&model, &tailoring, cases, Resume::default(), SILENT).expect("a body")
+    };
+    let holds = |body: &FlexBody| {
+        cases.each_ref().map(|case| true_errors(&model, body, case).iter().all(|error| *error < 0.05))
+    };
+    let (both, selection) = made(&cases);
+    assert!(selection.holds(), "{selection:?}");
+    assert_eq!(both.body.source().settings["basis"], "scene");
+    assert_eq!(holds(&both.body), [true, true]);
+    let [first, second] = cases.each_ref().map(|case| made(std::slice::from_ref(case)).0.body);
+    assert_eq!((holds(&first), holds(&second)), ([true, false], [false, true]));
+}
+
+#[test]
+fn a_basis_made_of_a_motion_needs_a_motion_without_numbered_modes() {
+    let model = model();
+    let mut scene = pulled(&model, 7, Vector3::x() * 1e-4, 0.7, Vector3::zeros());
+    scene.initial.settled = false;
+    scene.initial.modes = vec![ModeStart { mode: 0, amplitude: 0.01, rate: 0.0 }];
+    let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: true };
+    let refused = convert_for_scene(&model, &tailoring, &scene, Resume::default(), SILENT);
+    assert!(refused.expect_err("a refusal").has(Code::Usage));
+}
+
+#[test]
+fn a_static_start_stays_as_it_is() {
+    let model = model();
+    let body = body(&model, 8);
+    let rate = first_rate(&model);
+    let force = Vector3::new(1e-4, 2e-4, -1e-4);
+    let mut scene = pulled(&model, 7, force, 0.7, Vector3::zeros());
+    scene.loads[0].force = VectorHistory::constant(force);
+    scene.spin = Some(Spin {
+        velocity: VectorHistory::constant(Vector3::new(0.2, 0.3, 1.0).normalize() * (0.2 * rate)),
+        axes: Axes::Model,
+        start: None,
+        hold: true,
+    });
+    scene.run.scheme = Scheme::Adaptive { tolerance: 1e-12 };
+    let energies = |scene: &Scene| -> Vec<f64> {
+        let (recording, _) = simulate(&body, scene, None, |_| ()).expect("a motion");
+        recording.balances.iter().map(|balance| balance.elastic).collect()
+    };
+    let spread = |energies: &[f64]| {
+        let largest = energies.iter().copied().fold(0.0, f64::max);
+        energies.iter().map(|energy| (energy / largest - 1.0).abs()).fold(0.0, f64::max)
+    };
+    let calm = energies(&scene);
+    assert!(calm[0] > 0.0 && spread(&calm) < 1e-6, "{calm:?}");
+    scene.initial.settled = false;
+    assert!(spread(&energies(&scene)) > 0.5);
+}
+
+/// Damping of the model acts on what the body lacks too: a force at the frequency of a mode beyond its own builds up less
+/// than it would without (by a third, as 0.69 instead of 0.46 of the stress).
+#[test]
+fn what_is_lacking_is_damped_as_the_model_is() {
+    let undamped = model();
+    let rates: Vec<f64> = body(&undamped, 8).modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
+    let scene = pulled(&undamped, 16, Vector3::new(1e-5, 4e-5, 2e-5), rates[6] / rates[0], Vector3::zeros());
+    // A tenth of the critical damping at that frequency.
+    let damping = Some(Damping::Rayleigh { alpha: 0.0, beta: 0.2 / rates[6] });
+    let damped = FeModel::from_raw(RawModel { damping, ..raw_beam() }).expect("a sound model").model;
+    for model in [&undamped, &damped] {
+        let few = body(model, 6);
+        let estimate = estimated(model, &few, &scene).errors.stress.expect("a deformed body");
+        let [_, found] = true_errors(model, &few, &scene);
+        assert!((estimate / found - 1.0).abs() < 0.02, "{estimate:.3e}, {found:.3e}");
+    }
+}
+
+/// Errors of the motion of `body` against that of `whole`, both of one model.
+fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Scene) -> OutputErrors {
+    let [of_whole, own] = [whole, body].map(|body| Stage::new(body, scene).expect("a stage"));
+    let (motion, _) = trace(&of_whole.body, &of_whole.scene, None, |_| ()).expect("a motion");
+    let mut same_steps = own.scene.clone().into_owned();
+    same_steps.run.scheme = motion.scheme;
+    let moved = trace_at(&own.body, &same_steps, &motion.time, None).expect("a motion");
+    let [psi, all] = [&own, &of_whole].map(|stage| stage.body.vectors_of(model).expect("of this model"));
+    let shared = gram(psi.as_ref(), model.pencil().apply_stiffness(all.as_ref()).as_ref());
+    let modes = OtherModes::new(&own.body, &of_whole.body, shared.as_ref()).expect("of one model");
+    Measure::new(&of_whole.body, &motion).of_other(&moved, &modes).largest()
+}
+
+/// A Craig-Bampton body keeps its rigid root rigid, and lacks nothing of a model whose root is rigid when it has all
+/// fixed-interface modes: with few of them it lacks what that body does differently. The model whose root deforms is
+/// another one, by far.
+#[test]
+fn a_rigid_interface_is_rigid_in_the_model_that_the_body_is_compared_with() {
+    let model = rooted_beam(Element::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Rigid);
+    let basis = BasisChoice::CraigBampton(CraigBampton);
+    let of = |modes: usize| {
+        let settings = ConvertSettings { basis: basis.clone(), ..settings(modes) };
+        convert(&model, &settings, SILENT).expect("a body").body
+    };
+    let (whole, few) = (of(usize::MAX), of(4));
+    let force = Vector3::new(2e-4, 5e-4, -3e-4);
+    let free = pulled(&model, 16, force, 0.4, Vector3::new(0.02, 0.01, 0.03));
+    let scenes =
+        [free, driven(&model, Given::Spin, 16, force, 0.3), driven(&model, Given::Swing, 16, force, 0.3)];
+    for (at, scene) in scenes.iter().enumerate() {
+        let estimate = estimated(&model, &few, scene);
+        let found = errors_beside(&model, &whole, &few, scene);
+        for (name, estimate, found) in [
+            ("deflection", estimate.errors.deflection, found.deflection),
+            ("stress", estimate.errors.stress, found.stress),
+        ] {
+            let (estimate, found) = (estimate.expect(name), found.expect(name));
+            assert!((0.8..1.25).contains(&(estimate / found)), "{at}: {name} {estimate:.2e}, {found:.2e}");
+        }
+        let nothing = estimated(&model, &whole, scene);
+        assert!(nothing.errors.stress.is_some_and(|error| error < 1e-4), "{at}: {:?}", nothing.errors);
+        let coupling = estimate.coupling.expect("a rigid root");
+        assert_eq!(coupling.interfaces, ["root"]);
+        let of_coupling = nothing.coupling.expect("a rigid root").errors.stress.expect("a deformed body");
+        assert!(
+            of_coupling > 10.0 * nothing.errors.stress.expect("a deformed body"),
+            "{at}: {of_coupling:.2e}"
+        );
+    }
+    // Free modes deform the root.
+    assert!(estimated(&model, &body(&model, 4), &scenes[0]).coupling.is_none());
+}

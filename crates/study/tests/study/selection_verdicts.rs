@@ -1,0 +1,145 @@
+//! What `select` decides holds when it is measured: the selected body against the whole one, in the scene and
+//! at the limits of it.
+
+use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_linalg::progress::SILENT;
+use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
+use flexbody_motion::scene::{
+    AttachmentKind, Measure, MotionRange, Range, Requirements, Scene, Tolerance, simulate, trace, trace_at,
+};
+use flexbody_study::selection::{Selection, select};
+use nalgebra::Vector3;
+use oracle::scenes::{bodies, doing, nothing_happens, seeded, some_modes};
+use proptest::prelude::*;
+
+/// What integration adds to errors.
+const INTEGRATION: f64 = 1e-5;
+
+fn selected(body: &FlexBody, scene: &Scene) -> Selection {
+    select(body, scene, None, SILENT).expect("a selection")
+}
+
+fn reduced(body: &FlexBody, selection: &Selection) -> FlexBody {
+    body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body")
+}
+
+/// The scene with rotation `factor` times as fast.
+fn faster(scene: &Scene, factor: f64) -> Scene {
+    let mut scene = scene.clone();
+    scene.requirements.motion = MotionRange::default();
+    scene.initial.angular_velocity *= factor;
+    if let Some(spin) = &mut scene.spin {
+        spin.velocity = spin.velocity.scaled(factor);
+    }
+    scene
+}
+
+/// The largest error over its tolerance of a selected body in a scene; `None` where the whole body cannot
+/// follow it.
+fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f64> {
+    let (reference, _) = trace(whole, scene, None, |_| ()).ok()?;
+    let own = reduced(whole, selection);
+    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, None).expect("a motion");
+    let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
+    Some(errors.worst(&scene.requirements.tolerance))
+}
+
+proptest! {
+    #![proptest_config(seeded(30, 3))]
+
+    #[test]
+    fn no_selected_body_exceeds_the_tolerances(
+        of in 0..4usize,
+        bits in any::<u8>(),
+        doing in doing(10.0),
+        free in any::<bool>(),
+        range in prop_oneof![Just(None), (1.1..1.6f64).prop_map(Some)],
+        tolerance in (-3.0..-0.5f64).prop_map(|x| 10f64.powf(x)),
+        mild in any::<bool>(),
+    ) {
+        let whole = some_modes(&bodies()[of], bits);
+        let mut doing = doing;
+        // Slow enough that something may be dropped, and that the free body stays in one piece.
+        doing.rate *= if mild { 1e-3 } else { 0.2 };
+        let mut scene = doing.scene(&whole, free);
+        scene.requirements.tolerance =
+            Tolerance { attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None };
+        let own = match &scene.spin {
+            Some(spin) => spin.velocity.largest_until(scene.run.duration.expect("given")).0,
+            None => scene.initial.angular_velocity.norm(),
+        };
+        scene.requirements.motion.angular_velocity = range.map(|range| Range::Any(range * own));
+        prop_assume!(simulate(&whole, &faster(&scene, range.unwrap_or(1.0)), None, |_| ()).is_ok());
+        let selection = selected(&whole, &scene);
+        for factor in [Some(1.0), range].into_iter().flatten() {
+            let Some(worst) = measured(&whole, &selection, &faster(&scene, factor)) else { continue };
+            prop_assert!(worst <= 1.0 + INTEGRATION / tolerance, "{worst} at {factor}: {:#?}", selection.trials);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(seeded(4, 4))]
+
+    #[test]
+    fn costs_are_held_and_selections_repeat(
+        of in 0..4usize,
+        doing in doing(3.0),
+        free in any::<bool>(),
+        part in 0.0..1.0f64,
+    ) {
+        let whole = &bodies()[of];
+        let mut doing = doing;
+        doing.rate *= 0.1;
+        let mut scene = doing.scene(whole, free);
+        prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
+        let cost = |body: &FlexBody| EquationsOfMotion::new(body, Terms::ALL).multiplications();
+        let least = cost(&whole.reduced(&[0], Groups::NONE, selected(whole, &scene).terms.iter().map(|term| {
+            let mut term = term.clone();
+            term.kept = false;
+            term
+        }).collect()).expect("a body"));
+        let most = least + (part * (cost(whole) - least) as f64) as usize;
+        scene.requirements.multiplications = Some(most);
+        let selection = selected(whole, &scene);
+        prop_assert!(cost(&reduced(whole, &selection)) <= most);
+        prop_assert_eq!(selection.chosen.as_ref().map(|trial| trial.multiplications <= most), Some(true));
+        prop_assert_eq!(&selection, &selected(whole, &scene));
+    }
+}
+
+/// A scene that is not simulated.
+fn idle(requirements: Requirements) -> Scene {
+    let mut scene = Scene { requirements, ..nothing_happens("idle", 0.0, 1e-9) };
+    (scene.run.duration, scene.run.outputs) = (None, 500);
+    scene
+}
+
+#[test]
+fn without_a_run_only_bounds_and_the_band_decide() {
+    let body = &bodies()[0];
+    let all: Vec<usize> = (0..body.n_modes()).collect();
+    let selection = selected(body, &idle(Requirements::default()));
+    assert_eq!((selection.groups, &selection.modes), (Groups::ALL, &all));
+    assert!(
+        selection.chosen.is_none() && selection.terms.iter().all(|term| term.kept && !term.reason.is_empty())
+    );
+
+    let frequencies = body.frequencies_hz();
+    let band = 0.5 * frequencies[3] * (1.0 + 1e-9);
+    let selection = selected(body, &idle(Requirements { band: Some(band), ..Requirements::default() }));
+    assert_eq!((selection.groups, selection.modes), (Groups::ALL, vec![0, 1, 2, 3]));
+
+    // Joints that turn the body slowly, and a deflection that is not looked at.
+    let mut slow = Requirements::default();
+    slow.attachment.kind = AttachmentKind::Stiff;
+    slow.motion.angular_velocity = Some(Range::Any(1e-5 * body.modes().eigenvalue[0].sqrt()));
+    slow.motion.angular_acceleration = Some(Range::Axes(Vector3::zeros()));
+    let selection = selected(body, &idle(slow.clone()));
+    assert_eq!((selection.groups, &selection.modes), (Groups::NONE, &all));
+    assert!(selection.terms.iter().all(|term| !term.kept && term.tier == 0 && term.bound <= term.limit));
+
+    slow.motion.angular_velocity = Some(Range::Any(0.5 * body.modes().eigenvalue[0].sqrt()));
+    let selection = selected(body, &idle(slow));
+    assert_eq!(selection.groups, Groups::ALL, "half the first frequency is not slow");
+}

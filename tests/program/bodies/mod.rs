@@ -1,0 +1,3 @@
+//! Bodies, as the program converts them.
+
+mod interface_frame;
