@@ -190,6 +190,18 @@ def test_one_triangle_is_refused(cube: Given, side: str) -> None:
         cube._replace(stiffness=half).model()
 
 
+def test_texts_of_errors_move_no_terminal() -> None:
+    diagnostic = flexbody.Diagnostic("FB202", "error", "length `\x1b[31m`", "a\nb\u202e.toml", 3, "give a unit")
+    assert str(diagnostic) == "error[FB202]: length `\\u{1b}[31m`\n  in a\\nb\\u{202e}.toml, line 3\n  help: give a unit"
+    assert "\x1b" not in str(flexbody.FlexbodyWarning(diagnostic))
+
+
+def test_no_mode_at_all_is_no_body(cube: Given) -> None:
+    with pytest.raises(flexbody.InputError, match="no mode is asked for") as caught:
+        cube.convert(modes=0)
+    assert caught.value.codes == ("FB512",)
+
+
 def test_errors_carry_codes(cube: Given) -> None:
     wrong = cube.stiffness.copy().tolil()
     wrong[0, 1] = 2.0 * wrong[0, 1] + 1.0

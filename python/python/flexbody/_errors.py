@@ -4,8 +4,22 @@ from __future__ import annotations
 
 import os
 import sys
+import unicodedata
 import warnings
 from typing import NamedTuple
+
+
+# Turn the direction of writing.
+_DIRECTIONS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f"
+
+
+def _printable(text: str) -> str:
+    """The text with characters that a terminal takes as commands shown by their numbers, as the command shows them."""
+
+    def is_command(c: str) -> bool:
+        return unicodedata.category(c) == "Cc" and c not in "\n\t" or c in _DIRECTIONS
+
+    return "".join(f"\\u{{{ord(c):x}}}" if is_command(c) else c for c in text)
 
 
 class Diagnostic(NamedTuple):
@@ -25,9 +39,10 @@ class Diagnostic(NamedTuple):
     """What to do."""
 
     def __str__(self) -> str:
-        place = f"\n  in {self.file}" if self.file else ""
-        place += f", line {self.line}" if self.file and self.line else ""
-        return f"{self.severity}[{self.code}]: {self.message}{place}\n  help: {self.help}"
+        name = _printable((self.file or "").replace("\n", "\\n"))
+        place = f"\n  in {name}" if name else ""
+        place += f", line {self.line}" if name and self.line else ""
+        return f"{self.severity}[{self.code}]: {_printable(self.message)}{place}\n  help: {_printable(self.help)}"
 
 
 class FlexbodyError(Exception):
@@ -82,7 +97,7 @@ class FlexbodyWarning(UserWarning):
         self.diagnostic = diagnostic
 
     def __str__(self) -> str:
-        return f"{self.diagnostic.message} [{self.diagnostic.code}]; {self.diagnostic.help}"
+        return _printable(f"{self.diagnostic.message} [{self.diagnostic.code}]; {self.diagnostic.help}")
 
 
 _CLASSES = {1: CheckError, 2: InputError, 3: NumericalError, 4: ResourceError, 70: InternalError}

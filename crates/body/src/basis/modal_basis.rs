@@ -147,6 +147,10 @@ impl ModalBasis {
 
 /// Why there is not a single mode.
 fn no_modes(model: &FeModel, settings: &ModeSettings, solution: &EigenSolution) -> Diagnostic {
+    if settings.wanted == Wanted::Lowest(0) {
+        let message = "no mode is asked for, and a body without modes is rigid".to_owned();
+        return Diagnostic::new(Code::NoModes, message).with_help("ask for one mode or more");
+    }
     let message = match (settings.wanted, solution.next_eigenvalue) {
         (Wanted::Below(_), Some(next)) => {
             let hertz = model.units().frequency_of(next);
