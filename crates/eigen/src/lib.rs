@@ -1,6 +1,4 @@
-//! Free modes of K psi = lambda M psi: shift-invert block Lanczos or a dense solve, both followed by the same
-//! refinement, canonical form and completeness count. Sees operators, never nodes or files.
-
+#![doc = include_str!("../README.md")]
 #![deny(
     clippy::exit,
     clippy::print_stderr,

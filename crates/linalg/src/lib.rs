@@ -1,6 +1,4 @@
-//! Sparse and dense kernels: symmetric matrices, block products, ordering, factorisation,
-//! M-orthogonalisation. The only room that names the linear-algebra crates' sparse solvers.
-
+#![doc = include_str!("../README.md")]
 #![deny(
     clippy::exit,
     clippy::print_stderr,
