@@ -53,15 +53,20 @@ pub(super) struct Demand<'c> {
 }
 
 impl<'c> Demand<'c> {
-    /// Of one scene; `tier_1` says whether bounds may use norms of the invariants.
-    pub(super) fn new(stage: &'c OnStage<'_>, memory: Option<u64>, tier_1: bool) -> Result<Self> {
+    /// Of the load case `name`; `tier_1` says whether bounds may use norms of the invariants.
+    pub(super) fn new(
+        stage: &'c OnStage<'_>,
+        name: Option<&'c str>,
+        memory: Option<u64>,
+        tier_1: bool,
+    ) -> Result<Self> {
         let (body, scene) = (&*stage.body, &*stage.scene);
         let (loads, _) = points_of(body, scene)?;
         let cases =
             stage.scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
         let bounds = bounded(&cases, tier_1)?;
         Ok(Self {
-            name: None,
+            name,
             body,
             scene,
             situation: Situation::new(body, scene, &loads),

@@ -111,7 +111,7 @@ fn a_selection_for_a_pulse_holds_at_every_instant() {
     let body = soft_block(38);
     let mut scene = scene(&body, 40.0, 100, &pulse(&body, 40.0));
     scene.requirements.tolerance = Tolerance { deflection: 0.02, stress: 0.05, ..Tolerance::default() };
-    let selection = select(&body, &scene, None, SILENT).expect("a selection");
+    let selection = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
     assert!(selection.holds() && selection.modes.len() > 1, "{:?}", selection.modes);
     let own = body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
     scene.run.outputs = 20_000;
@@ -127,8 +127,10 @@ fn a_load_that_is_sampled_once_in_its_period_is_seen() {
     let rate = body.modes().eigenvalue[0].sqrt();
     // As many instants as oscillations: all of them see the same phase.
     let history = History::Sine { amplitude: 1.0, frequency: 5.0 * rate / TAU, phase: 0.0 };
-    let of =
-        |outputs| select(&body, &scene(&body, 20.0, outputs, &history), None, SILENT).expect("a selection");
+    let of = |outputs| {
+        let scene = scene(&body, 20.0, outputs, &history);
+        select(&body, &[], &scene.into(), None, SILENT).expect("a selection")
+    };
     let (sparse, dense) = (of(100), of(20_000));
     assert_eq!(sparse, dense);
 }
@@ -152,9 +154,9 @@ proptest! {
             attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None,
         };
         prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
-        let first = select(whole, &scene, None, SILENT).expect("a selection");
+        let first = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
         scene.run.outputs = outputs;
-        let again = select(whole, &scene, None, SILENT).expect("a selection");
+        let again = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
         prop_assert_eq!(&first, &again);
 
         // What is written is within the extremes, and where it is dense reaches them.

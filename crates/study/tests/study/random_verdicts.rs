@@ -17,7 +17,7 @@ use flexbody_motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Scene, Spin, Stage,
     Tolerance, Trace, VectorHistory, trace, trace_at,
 };
-use flexbody_study::selection::select_from;
+use flexbody_study::selection::select;
 use flexbody_study::tailoring::Tailoring;
 use flexbody_study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
@@ -415,24 +415,26 @@ fn outcome(case: &Case) -> Result<Outcome> {
     let Case { seed, what, model, scene, start, modes } = case;
     let tolerance = scene.requirements.tolerance;
     let tailoring = Tailoring { settings: settings(*modes), by_band: false, of_motion: false };
-    let enriched = tailoring.convert(model, scene, Resume::default(), SILENT)?;
+    let cases = scene.clone().into();
+    let enriched = tailoring.convert(model, &cases, Resume::default(), SILENT)?;
+    let rounds = &enriched.rounds[0];
     let made = &enriched.made.body;
     let plain = convert(model, &settings(*modes), SILENT)?.body;
     let mut effectivity = Vec::new();
-    if let Some(first) = enriched.rounds.first() {
+    if let Some(first) = rounds.first() {
         effectivity.extend(effectivities(
             &first.errors,
             &true_errors(model, &plain, scene)?,
             tolerance.stress,
         ));
     }
-    let selection = select_from(made, &enriched.rounds, scene, None, SILENT)?;
+    let selection = select(made, &enriched.rounds, &cases, None, SILENT)?;
     let stage = Stage::new(made, scene)?;
     let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ())?;
     let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)?;
-    if enriched.rounds.len() > 1 {
+    if rounds.len() > 1 {
         let found = errors_beside(&nodal, &stage.body, &stage.scene, &motion)?;
-        let last = enriched.error().expect("a round");
+        let last = rounds.last().expect("a round");
         effectivity.extend(effectivities(&last.errors, &found, tolerance.stress));
     }
     let all = stage.body.invariants().groups();

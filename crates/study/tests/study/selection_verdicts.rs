@@ -16,7 +16,7 @@ use proptest::prelude::*;
 const INTEGRATION: f64 = 1e-5;
 
 fn selected(body: &FlexBody, scene: &Scene) -> Selection {
-    select(body, scene, None, SILENT).expect("a selection")
+    select(body, &[], &scene.clone().into(), None, SILENT).expect("a selection")
 }
 
 fn reduced(body: &FlexBody, selection: &Selection) -> FlexBody {
