@@ -10,7 +10,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{Axes, Initial, LoadCases, ModeStart, Scene, Scheme, Tolerance, simulate};
+use flexbody_motion::scene::{Axes, Initial, LoadCases, ModeStart, PerQuantity, Scene, Scheme, simulate};
 use flexbody_study::reference::PART_OF_FINE;
 use flexbody_study::selection::select;
 use flexbody_study::trade::{
@@ -139,7 +139,7 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     let errors = row.expect("a row").outcome.as_ref().expect("a motion").deciding().errors;
     assert!(stress > 0.01, "a coarse mesh: {stress}");
     assert!((errors.stress.expect("a deformed body") / stress - 1.0).abs() < 2e-3, "{errors:?} {stress}");
-    assert!((errors.attitude / attitude - 1.0).abs() < 2e-3, "{errors:?} {attitude}");
+    assert!((errors.attitude.expect("an attitude") / attitude - 1.0).abs() < 2e-3, "{errors:?} {attitude}");
 }
 
 #[test]
@@ -366,7 +366,8 @@ fn a_study_and_a_selection_take_the_same_modes() {
     let body = soft_block(9);
     let mut scene = tumble(0.05 * first_rate(&body), 0.3);
     scene.initial.settled = true;
-    scene.requirements.tolerance = Tolerance { deflection: 0.2, stress: 0.2, ..Tolerance::default() };
+    scene.requirements.tolerance.errors.deflection = 0.2;
+    scene.requirements.tolerance.errors.stress = 0.2;
     let found = study(body.clone(), &scene);
     let row = recommended(&found);
     let taken = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
@@ -391,10 +392,11 @@ fn two_cases(body: &FlexBody) -> [Scene; 2] {
     let rate = first_rate(body);
     let mut slow = tumble(0.02 * rate, 0.05);
     slow.initial.modes = vec![ModeStart { mode: 2, amplitude: 0.02, rate: 0.0 }];
-    slow.requirements.tolerance = Tolerance { deflection: 0.02, stress: 0.02, ..Tolerance::default() };
+    slow.requirements.tolerance.errors.deflection = 0.02;
+    slow.requirements.tolerance.errors.stress = 0.02;
     let mut fast = tumble(0.15 * rate, 0.3);
-    fast.requirements.tolerance =
-        Tolerance { attitude: 0.05, deflection: 0.3, stress: 0.3, ..Tolerance::default() };
+    fast.requirements.tolerance.errors =
+        PerQuantity { attitude: 0.05, deflection: 0.3, stress: 0.3, reaction: 0.01 };
     [slow, fast]
 }
 

@@ -94,16 +94,10 @@ impl LoadCases {
 
     /// The least tolerance of each quantity in any load case, with the least deflection that counts in the first.
     pub fn least_tolerance(&self) -> Tolerance {
-        let mut least = self.0[0].requirements.tolerance;
-        for Tolerance { attitude, deflection, stress, reaction, .. } in
-            self.iter().map(|scene| scene.requirements.tolerance)
-        {
-            least.attitude = least.attitude.min(attitude);
-            least.deflection = least.deflection.min(deflection);
-            least.stress = least.stress.min(stress);
-            least.reaction = least.reaction.min(reaction);
-        }
-        least
+        self[1..].iter().fold(self[0].requirements.tolerance, |least, scene| {
+            let own = scene.requirements.tolerance.errors;
+            Tolerance { errors: least.errors.zip(own).map(|(a, b)| a.min(b)), ..least }
+        })
     }
 }
 

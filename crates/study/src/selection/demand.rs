@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Groups};
 use flexbody_motion::dynamics::BodyPoint;
-use flexbody_motion::scene::{Scene, Stage, Tolerance, damped_once, points_of};
+use flexbody_motion::scene::{PerQuantity, Scene, Stage, Tolerance, damped_once, points_of};
 use std::borrow::Cow;
 
 /// A body and a scene on their stage, and the scenes that a model is tried in: this one, and where it allows
@@ -99,7 +99,7 @@ impl<'c> Demand<'c> {
         }
         // What is measured is relative to a motion that may be larger than that of the whole body by as much
         // as bounds allow.
-        let Tolerance { deflection, stress, reaction, .. } = *self.tolerance();
+        let PerQuantity { deflection, stress, reaction, .. } = self.tolerance().errors;
         (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
     }
 

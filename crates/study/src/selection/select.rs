@@ -13,7 +13,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Groups, TermDecision};
 use flexbody_linalg::progress::{Event, Watch};
-use flexbody_motion::scene::{LoadCases, Tolerance};
+use flexbody_motion::scene::{LoadCases, PerQuantity};
 
 /// What was decided, and on what grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,9 +24,8 @@ pub struct Selection {
     pub body: String,
     /// Numbers that the decision follows from.
     pub inputs: Vec<Input>,
-    /// Largest errors that are allowed, of several load cases the least in any; in the order attitude,
-    /// deflection, stress, reaction.
-    pub tolerance: [f64; 4],
+    /// Largest errors that are allowed, of several load cases the least in any.
+    pub tolerance: PerQuantity<f64>,
     /// Sizes of all terms.
     pub significances: Vec<Significance>,
     /// Everything that was tried, in order.
@@ -146,7 +145,7 @@ pub fn select(
         scene: cases.name().to_owned(),
         body: first.body.source().name.clone(),
         inputs: inputs(&demands),
-        tolerance: least_tolerances(cases),
+        tolerance: cases.least_tolerance().errors,
         significances: largest_significances(
             demands.iter().map(|one| significances(&one.situation, one.body)),
         ),
@@ -196,12 +195,6 @@ fn inputs(demands: &[Demand<'_>]) -> Vec<Input> {
         demand.situation.inputs().map(own)
     };
     demands.iter().flat_map(of).collect()
-}
-
-/// Largest errors that are allowed in all load cases.
-fn least_tolerances(cases: &LoadCases) -> [f64; 4] {
-    let Tolerance { attitude, deflection, stress, reaction, .. } = cases.least_tolerance();
-    [attitude, deflection, stress, reaction]
 }
 
 /// What the selected modes lack of static responses; loads that several load cases have stand there once.

@@ -48,6 +48,8 @@ pub struct Trade {
     pub reference: ReferenceKind,
     /// The load cases; of a scene without there is one.
     pub cases: Vec<TradeCase>,
+    /// The least tolerance of all load cases.
+    pub tolerance: Tolerance,
     /// Multiplications that the scene allows instead.
     pub allowed: Option<usize>,
     /// All candidates; the first is the whole body of the reference.
@@ -114,7 +116,7 @@ pub fn trade(
             .map_err(|error| cases.about(at, error))
     };
     let allowed = cases.iter().filter_map(|scene| scene.requirements.multiplications).min();
-    let scene = cases.name().to_owned();
+    let (scene, tolerance) = (cases.name().to_owned(), cases.least_tolerance());
     let cases = cases.iter().enumerate().map(studied).collect::<Result<Vec<_>>>()?;
     let measures = cases.iter().map(StudyCase::measure).collect();
     let job = Job { cases: &cases, measures, allowed };
@@ -123,6 +125,7 @@ pub fn trade(
     let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
         scene,
+        tolerance,
         body: source.body().source().name.clone(),
         reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
         allowed,

@@ -6,7 +6,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
-    Axes, History, Initial, Load, Point, Recording, Requirements, Run, Scene, Scheme, Stage, Tolerance,
+    Axes, History, Initial, Load, PerQuantity, Point, Recording, Requirements, Run, Scene, Scheme, Stage,
     VectorHistory, simulate,
 };
 use flexbody_study::selection::select;
@@ -110,7 +110,8 @@ fn a_pulse_between_two_instants_is_seen() {
 fn a_selection_for_a_pulse_holds_at_every_instant() {
     let body = soft_block(38);
     let mut scene = scene(&body, 40.0, 100, &pulse(&body, 40.0));
-    scene.requirements.tolerance = Tolerance { deflection: 0.02, stress: 0.05, ..Tolerance::default() };
+    scene.requirements.tolerance.errors.deflection = 0.02;
+    scene.requirements.tolerance.errors.stress = 0.05;
     let selection = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
     assert!(selection.holds() && selection.modes.len() > 1, "{:?}", selection.modes);
     let own = body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
@@ -150,9 +151,7 @@ proptest! {
         let whole = &bodies()[of];
         doing.rate *= 0.1;
         let mut scene = doing.scene(whole, free);
-        scene.requirements.tolerance = Tolerance {
-            attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None,
-        };
+        scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
         prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
         let first = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
         scene.run.outputs = outputs;
