@@ -4,7 +4,7 @@ use crate::arrays::{Kept, by_node, matrix, matrix3, triples, vector};
 use crate::equations::EquationsOfMotion;
 use crate::errors::{diagnostics, warn};
 use crate::report::{loads, report};
-use crate::scene::{Motion, Scene, Selection, cases_of};
+use crate::scene::{Motion, Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
 use crate::work::{alone, brief, run};
 use flexbody::{Diagnostic, FlexBody, Matrix};
@@ -393,8 +393,8 @@ impl Body {
     /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path
     /// of a scene file.
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
-        let (cases, body) = (cases_of(py, scene)?, Arc::clone(&self.inner));
-        Selection::told(py, run(py, move |listener| body.select_for_cases_heard(&cases, listener))?)
+        let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
+        Selection::told(py, run(py, move |listener| body.select_heard(&scene, listener))?)
     }
 
     /// Simulates the body in a scene: a Scene, or the path of a scene file without load cases.
@@ -406,9 +406,9 @@ impl Body {
     /// Measures what accuracy costs in a scene, of parts of this body. `Model.trade` compares conversions.
     #[pyo3(signature = (scene, *, repeat=3))]
     fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
-        let (cases, body) = (cases_of(py, scene)?, Arc::clone(&self.inner));
+        let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
         let options = trade_options(self.inner.n_modes(), repeat, "full")?;
-        Trade::told(py, run(py, move |listener| body.trade_for_cases(&cases, &options, listener))?)
+        Trade::told(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
     }
 
     /// The report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.

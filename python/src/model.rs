@@ -3,7 +3,7 @@
 use crate::arrays::rows_of_three;
 use crate::body::Body;
 use crate::errors::{diagnostics, exception, warn};
-use crate::scene::cases_of;
+use crate::scene::Scene;
 use crate::trade::{Trade, options as trade_options};
 use crate::work::run;
 use flexbody::{Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, Frame, ModelBuilder, SparseMatrix};
@@ -282,9 +282,9 @@ impl Model {
                 (made.body, made.diagnostics)
             }
             Some(scene) => {
-                let cases = cases_of(py, scene)?;
+                let scene = Scene::whole(py, scene)?;
                 let (made, selection) =
-                    run(py, move |listener| model.convert_for_cases_heard(&cases, &options, listener))?;
+                    run(py, move |listener| model.convert_for_heard(&scene, &options, listener))?;
                 (made.body, [made.diagnostics, selection.diagnostics().to_vec()].concat())
             }
         };
@@ -305,9 +305,9 @@ impl Model {
         repeat: usize,
         reference: &str,
     ) -> PyResult<Trade> {
-        let (cases, options) = (cases_of(py, scene)?, trade_options(modes, repeat, reference)?);
+        let (scene, options) = (Scene::whole(py, scene)?, trade_options(modes, repeat, reference)?);
         let model = Arc::clone(&self.inner);
-        Trade::told(py, run(py, move |listener| model.trade_for_cases(&cases, &options, listener))?)
+        Trade::told(py, run(py, move |listener| model.trade(&scene, &options, listener))?)
     }
 
     fn __repr__(&self) -> String {

@@ -22,18 +22,15 @@ impl Scene {
     #[new]
     #[pyo3(signature = (path, case=None))]
     fn new(py: Python<'_>, path: PathBuf, case: Option<String>) -> PyResult<Self> {
-        let inner = alone(py, || match &case {
-            Some(case) => flexbody::Scene::read_case(&path, case),
-            None => flexbody::Scene::read(&path),
-        })?;
+        let inner = alone(py, || flexbody::Scene::read_case(&path, case.as_deref()))?;
         Ok(Self { inner })
     }
 
     /// All load cases of a scene file, in its order; of a file without cases that is one scene.
     #[staticmethod]
     fn cases(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Scene>> {
-        let cases = alone(py, || flexbody::Scene::read_cases(&path))?;
-        Ok(cases.into_iter().map(|inner| Self { inner }).collect())
+        let scene = alone(py, || flexbody::Scene::read(&path))?;
+        Ok(scene.cases().into_iter().map(|inner| Self { inner }).collect())
     }
 
     /// Name; of a load case that of the scene, a colon and its own.
@@ -54,23 +51,22 @@ impl Scene {
             return Ok(scene.get().inner.clone());
         }
         let path: PathBuf = given.extract()?;
+        alone(py, || flexbody::Scene::read_case(&path, None))
+    }
+
+    /// The scene with all load cases that a caller names: a `Scene`, a list of them, or the path of a file.
+    pub fn whole(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
+        if let Ok(scene) = given.cast::<Self>() {
+            return Ok(scene.get().inner.clone());
+        }
+        if let Ok(scenes) = given.extract::<Vec<Bound<'_, Self>>>() {
+            let cases = scenes.iter().map(|scene| scene.get().inner.clone());
+            let none = || pyo3::exceptions::PyValueError::new_err("there is no load case");
+            return flexbody::Scene::of_cases(cases).ok_or_else(none);
+        }
+        let path: PathBuf = given.extract()?;
         alone(py, || flexbody::Scene::read(&path))
     }
-}
-
-/// The load cases that a caller names: a `Scene`, a list of them, or the path of a file.
-pub fn cases_of(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<Vec<flexbody::Scene>> {
-    if let Ok(scene) = given.cast::<Scene>() {
-        return Ok(vec![scene.get().inner.clone()]);
-    }
-    if let Ok(scenes) = given.extract::<Vec<Bound<'_, Scene>>>() {
-        if scenes.is_empty() {
-            return Err(pyo3::exceptions::PyValueError::new_err("there is no load case"));
-        }
-        return Ok(scenes.iter().map(|scene| scene.get().inner.clone()).collect());
-    }
-    let path: PathBuf = given.extract()?;
-    alone(py, || flexbody::Scene::read_cases(&path))
 }
 
 /// Which terms and modes a body needs in a scene.

@@ -15,7 +15,7 @@ use flexbody_formats::{FORMATS, export, find_format};
 use flexbody_linalg::progress::Event;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
-use flexbody_study::selection::select_for_cases;
+use flexbody_study::selection::select;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
@@ -224,41 +224,26 @@ impl FlexBody {
             .collect()
     }
 
-    /// Decides which terms and modes the body needs in a scene.
+    /// Decides which terms and modes the body needs in a scene: those with which every load case is within its
+    /// tolerances.
     ///
     /// # Errors
     /// FB212 where the scene does not fit the body; FB540 when its motion cannot be integrated.
     pub fn select(&self, scene: &Scene) -> Result<Selection> {
-        self.select_for_cases(std::slice::from_ref(scene))
+        self.select_heard(scene, NOBODY)
+    }
+
+    /// Selects as [`FlexBody::select`] does, heard and perhaps stopped by a listener.
+    ///
+    /// # Errors
+    /// As [`FlexBody::select`]; FB605 where the listener stops it.
+    pub fn select_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
+        heard(listener, |watch| select(&self.0, &[], &scene.0, None, watch)).map(Selection)
     }
 
     /// The equations of motion of the body, with all terms that it holds.
     pub fn equations_of_motion(&self) -> EquationsOfMotion {
         EquationsOfMotion::new(&self.0, Terms::ALL)
-    }
-
-    /// The same for several load cases: the terms and modes with which every one of them is within its
-    /// tolerances.
-    ///
-    /// # Errors
-    /// As [`FlexBody::select`].
-    ///
-    /// # Panics
-    /// When there is no case.
-    pub fn select_for_cases(&self, cases: &[Scene]) -> Result<Selection> {
-        self.select_for_cases_heard(cases, NOBODY)
-    }
-
-    /// The same, heard and perhaps stopped by a listener.
-    ///
-    /// # Errors
-    /// As [`FlexBody::select`]; FB605 where the listener stops it.
-    ///
-    /// # Panics
-    /// When there is no case.
-    pub fn select_for_cases_heard(&self, cases: &[Scene], listener: Listener<'_>) -> Result<Selection> {
-        let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
-        heard(listener, |watch| select_for_cases(&self.0, &[], &scenes, None, watch)).map(Selection)
     }
 
     /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v
@@ -304,11 +289,11 @@ impl FlexBody {
         body_point(&self.0, Terms::ALL, place).map_err(wrong)
     }
 
-    /// Simulates the body in a scene.
+    /// Simulates the body in a scene of one load case.
     ///
     /// # Errors
-    /// FB212 where the scene does not fit the body; FB540 when the integration cannot go on; FB550 when it
-    /// takes more steps than it may.
+    /// FB219 where the scene has several load cases; FB212 where it does not fit the body; FB540 when the
+    /// integration cannot go on; FB550 when it takes more steps than it may.
     pub fn simulate(&self, scene: &Scene) -> Result<Motion> {
         self.simulate_heard(scene, NOBODY)
     }
@@ -318,11 +303,11 @@ impl FlexBody {
     /// # Errors
     /// As [`FlexBody::simulate`]; FB605 where the listener stops it.
     pub fn simulate_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
+        let scene = scene.0.single()?;
         let (recording, diagnostics) = heard(listener, |watch| {
             watch(Event::Phase("simulation"));
-            let (recording, mut found) =
-                simulate(&self.0, &scene.0, None, |part| watch(Event::Fraction(part)))?;
-            found.extend(unsettled_rate(&self.0, &scene.0, &recording, None)?);
+            let (recording, mut found) = simulate(&self.0, scene, None, |part| watch(Event::Fraction(part)))?;
+            found.extend(unsettled_rate(&self.0, scene, &recording, None)?);
             Ok((recording, found))
         })?;
         let (units, extent) = (self.0.units().clone(), self.0.extent());

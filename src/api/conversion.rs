@@ -9,8 +9,8 @@ use flexbody_body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert
 use flexbody_body::invariants::BodyFrame;
 use flexbody_body::verification::accept;
 use flexbody_eigen::{Resume, Wanted};
-use flexbody_motion::scene;
-use flexbody_study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
+use flexbody_motion::scene::LoadCases;
+use flexbody_study::tailoring::{Tailoring, convert_for, loads_for, read_loads};
 
 /// Which shapes the body has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -119,10 +119,10 @@ impl ConvertOptions {
         self
     }
 
-    fn settings(&self, model: &Model, scenes: &[scene::Scene]) -> Result<ConvertSettings> {
+    fn settings(&self, model: &Model, cases: Option<&LoadCases>) -> Result<ConvertSettings> {
         let loads = match (self.basis, self.accuracy) {
             (Basis::Free | Basis::Scene, Accuracy::Fast | Accuracy::Standard) => {
-                loads_for(scenes, &model.residual_vectors)
+                loads_for(cases, &model.residual_vectors)
             }
             _ => model.residual_vectors.clone(),
         };
@@ -197,55 +197,36 @@ impl Model {
             let message = "a basis made for a scene needs one: `convert_for`";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
-        let settings = options.settings(self, &[])?;
+        let settings = options.settings(self, None)?;
         let conversion = heard(listener, |watch| convert(&self.checked, &settings, watch))?;
         accepted(conversion)
     }
 
-    /// The same with the terms and modes alone that `scene` needs, and the decision about each.
+    /// Converts with the terms and modes alone that the load cases of `scene` need, and the decision about each.
     ///
     /// # Errors
     /// As [`Model::convert`]; FB212 where the scene does not fit the body.
     pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
-        self.convert_for_cases(std::slice::from_ref(scene), options)
+        self.convert_for_heard(scene, options, NOBODY)
     }
 
-    /// The same for several load cases, which one body has to serve.
-    ///
-    /// # Errors
-    /// As [`Model::convert_for`].
-    ///
-    /// # Panics
-    /// When there is no case.
-    pub fn convert_for_cases(
-        &self,
-        cases: &[Scene],
-        options: &ConvertOptions,
-    ) -> Result<(Conversion, Selection)> {
-        self.convert_for_cases_heard(cases, options, NOBODY)
-    }
-
-    /// The same, heard and perhaps stopped by a listener.
+    /// Converts as [`Model::convert_for`] does, heard and perhaps stopped by a listener.
     ///
     /// # Errors
     /// As [`Model::convert_for`]; FB605 where the listener stops it.
-    ///
-    /// # Panics
-    /// When there is no case.
-    pub fn convert_for_cases_heard(
+    pub fn convert_for_heard(
         &self,
-        cases: &[Scene],
+        scene: &Scene,
         options: &ConvertOptions,
         listener: Listener<'_>,
     ) -> Result<(Conversion, Selection)> {
-        let scenes: Vec<scene::Scene> = cases.iter().map(|case| case.0.clone()).collect();
-        let settings = options.settings(self, &scenes)?;
+        let settings = options.settings(self, Some(&scene.0))?;
         let by_band = options.modes.is_none()
             && options.highest.is_none()
             && matches!(options.basis, Basis::Free | Basis::Scene);
         let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
         let (conversion, selection) = heard(listener, |watch| {
-            convert_for_cases(&self.checked, &tailoring, &scenes, Resume::default(), watch)
+            convert_for(&self.checked, &tailoring, &scene.0, Resume::default(), watch)
         })?;
         Ok((accepted(conversion)?, Selection(selection)))
     }

@@ -2,43 +2,47 @@
 
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_motion::scene::{self, read_case, read_cases};
+use flexbody_motion::scene::LoadCases;
 use flexbody_study::selection;
 use std::path::Path;
 
-/// What a body is to do: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).
+/// What a body is to do (docs/simulate.md): one or more load cases, each with gravity, loads, prescribed motion, duration
+/// and tolerances.
 #[derive(Debug, Clone)]
-pub struct Scene(pub(super) scene::Scene);
+pub struct Scene(pub(super) LoadCases);
 
 impl Scene {
-    /// Reads a scene file.
+    /// Reads a scene file with all its load cases.
     ///
     /// # Errors
     /// FB101, FB106 when it or a file of its histories cannot be read; FB211, FB213 for what is wrong in it
-    /// and FB215 to FB217 in these files, all of it; FB219 when it has load cases.
+    /// and FB215 to FB217 in these files, all of it.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
-        read_case(path, None).map(Self)
+        LoadCases::read(path, None).map(Self)
     }
 
-    /// Reads one load case of a scene file.
+    /// Reads the load case of a scene file that has this name, or with `None` a scene file without load cases.
     ///
     /// # Errors
-    /// As [`Scene::read`]; FB219 when there is no such case.
-    pub fn read_case(path: impl AsRef<Path>, name: &str) -> Result<Self> {
-        read_case(path, Some(name)).map(Self)
+    /// As [`Scene::read`]; FB219 when there is no such case, or there are load cases and none is named.
+    pub fn read_case(path: impl AsRef<Path>, name: Option<&str>) -> Result<Self> {
+        LoadCases::read_single(path, name).map(|case| Self(case.into()))
     }
 
-    /// Reads all load cases of a scene file, in its order; of a file without cases that is one scene.
-    ///
-    /// # Errors
-    /// As [`Scene::read`], without FB219.
-    pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<Self>> {
-        Ok(read_cases(path)?.into_iter().map(Self).collect())
+    /// Joins the load cases of several scenes, in their order. Returns `None` without any.
+    pub fn of_cases(scenes: impl IntoIterator<Item = Self>) -> Option<Self> {
+        let cases = scenes.into_iter().flat_map(|scene| scene.0.to_vec()).collect();
+        LoadCases::new(cases).map(Self)
     }
 
-    /// Name; of a load case that of the scene, a colon and its own.
+    /// The load cases, one or more, each as a scene of its own.
+    pub fn cases(&self) -> Vec<Self> {
+        self.0.iter().map(|case| Self(case.clone().into())).collect()
+    }
+
+    /// Name of the scene; of a single load case that of its scene, a colon and its own.
     pub fn name(&self) -> &str {
-        &self.0.name
+        self.0.name()
     }
 }
 

@@ -1,4 +1,4 @@
-//! What accuracy costs in a scene, or in several load cases.
+//! What accuracy costs in a scene.
 
 use super::progress::{Listener, heard};
 use super::{FlexBody, Model, ReportFormat, Scene, report};
@@ -8,9 +8,7 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_linalg::progress::Watch;
 use flexbody_report::{TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::trade::{
-    self, Allowed, ReferenceKind, Settings, Source, WantedBodies, conversions_for_cases,
-};
+use flexbody_study::trade::{self, Allowed, ReferenceKind, Settings, Source, WantedBodies, conversions};
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
 /// everything that it has, the median time of 3 simulations of each candidate.
@@ -75,36 +73,22 @@ pub struct Trade {
 
 impl Model {
     /// Measures what accuracy costs in `scene`: candidates of the conversions of the model, as
-    /// `flexbody trade model.toml` does. All results but the times are the same at any number of threads.
+    /// `flexbody trade model.toml` does. Every candidate is measured in each load case, and as good as it is in
+    /// the worst. All results but the times are the same at any number of threads.
     ///
     /// # Errors
     /// As [`Model::convert`]; FB212 where the scene does not fit the body; FB540 when its motion cannot be
     /// integrated; FB605 where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
-        self.trade_for_cases(std::slice::from_ref(scene), options, listener)
-    }
-
-    /// The same for several load cases: every candidate is measured in each, and as good as it is in the
-    /// worst.
-    ///
-    /// # Errors
-    /// As [`Model::trade`]; FB801 when there is no case.
-    pub fn trade_for_cases(
-        &self,
-        cases: &[Scene],
-        options: &TradeOptions,
-        listener: Listener<'_>,
-    ) -> Result<Trade> {
-        let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
         heard(listener, |watch| {
             let fine = options.reference == Against::FineBody;
             let wanted = WantedBodies { modes: options.modes, fine };
-            let made = conversions_for_cases(&self.checked, &scenes, wanted, Allowed::default(), watch)?;
+            let made = conversions(&self.checked, &scene.0, wanted, Allowed::default(), watch)?;
             let nodal = (options.reference == Against::Nodes).then_some(&self.checked);
             let reserved = trade::reserved(&made.lacks, nodal.is_some());
             let settings =
                 Settings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
-            let study = trade::trade_for_cases(&made.sources, &scenes, nodal, &settings, watch)?;
+            let study = trade::trade(&made.sources, &scene.0, nodal, &settings, watch)?;
             let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
             Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
         })
@@ -112,34 +96,21 @@ impl Model {
 }
 
 impl FlexBody {
-    /// The same for parts of this body: fewer modes, fewer groups of terms, 32-bit numbers, lumped couplings.
+    /// Measures what accuracy costs in `scene` as [`Model::trade`] does, for parts of this body: fewer modes, fewer
+    /// groups of terms, 32-bit numbers, lumped couplings.
     ///
     /// # Errors
     /// FB801 for errors against all nodes, of which a body knows nothing; FB212 and FB540 as there; FB605
     /// where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
-        self.trade_for_cases(std::slice::from_ref(scene), options, listener)
-    }
-
-    /// The same for several load cases, as [`Model::trade_for_cases`].
-    ///
-    /// # Errors
-    /// As [`FlexBody::trade`]; FB801 when there is no case.
-    pub fn trade_for_cases(
-        &self,
-        cases: &[Scene],
-        options: &TradeOptions,
-        listener: Listener<'_>,
-    ) -> Result<Trade> {
         if options.reference != Against::Body {
             let message =
                 "errors against all nodes, or a finer body, need the matrices: ask the model, not the body";
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
-        let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
         let sources = vec![Source::new("file", self.0.clone(), None)?];
         let settings = Settings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
-        let measure = |watch: Watch<'_>| trade::trade_for_cases(&sources, &scenes, None, &settings, watch);
+        let measure = |watch: Watch<'_>| trade::trade(&sources, &scene.0, None, &settings, watch);
         let study = heard(listener, measure)?;
         let diagnostics = study.diagnostics.clone();
         Ok(Trade { study, sources, lacks: Vec::new(), diagnostics })

@@ -8,7 +8,6 @@ use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{Places, Reserved, format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
-use super::select::asked_cases;
 use super::terminal::body_text;
 use super::unjudged::refuse_unjudged;
 use super::watcher::Watcher;
@@ -27,10 +26,10 @@ use flexbody_input::{
 };
 use flexbody_linalg::progress::Event;
 use flexbody_model::{CheckedModel, FeModel, RawModel};
-use flexbody_motion::scene::Scene;
+use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
 use flexbody_study::checkpoint::resume;
-use flexbody_study::tailoring::{Tailoring, convert_for_cases, loads_for, read_loads};
+use flexbody_study::tailoring::{Tailoring, convert_for, loads_for, read_loads};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -51,13 +50,14 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let keep_in = elsewhere.keeps_in(&arguments.output);
     let files = ModelFiles { keep_in, ..model_files(arguments)? };
-    let asked_of = |path| asked_cases(path, arguments.case.as_deref());
-    let scenes = arguments.scene.as_deref().map(asked_of).transpose()?.unwrap_or_default();
-    let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, &scenes));
+    let read = |path| LoadCases::read(path, arguments.case.as_deref());
+    let cases = arguments.scene.as_deref().map(read).transpose()?;
+    let cases = cases.as_ref();
+    let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, cases));
     refuse_contradictions(arguments, &loads)?;
     // How many bodies there are is known after reading; that outputs can be written, before.
     let places = Places::of(arguments, arguments.split.then_some(1));
-    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, &scenes)?;
+    refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, cases)?;
     let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
 
@@ -73,7 +73,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
         lumped: &lumped,
         loads: &loads,
         formats: &formats,
-        scenes: &scenes,
+        cases,
         elsewhere,
         threads,
     };
@@ -85,7 +85,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
-    refuse_overwriting(arguments, &all, &files, &schemes, &loads, &scenes)?;
+    refuse_overwriting(arguments, &all, &files, &schemes, &loads, cases)?;
     refuse_replacing_read(all.iter().flat_map(Places::all))?;
     let mut slots = vec![reserved];
     for places in &all[1..] {
@@ -122,7 +122,7 @@ struct Job<'a> {
     loads: &'a [LoadSource],
     formats: &'a [Format],
     /// The load cases of the scene; none without one.
-    scenes: &'a [Scene],
+    cases: Option<&'a LoadCases>,
     elsewhere: &'a Elsewhere,
     threads: usize,
 }
@@ -181,8 +181,8 @@ impl Job<'_> {
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
         let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
         let resume = resume(checkpoint.as_ref(), &save);
-        let (mut conversion, selection) = match &arguments.scene {
-            Some(path) => convert_for_cases(model, &self.of_band(settings), self.scenes, resume, &watch)
+        let (mut conversion, selection) = match arguments.scene.as_ref().zip(self.cases) {
+            Some((path, cases)) => convert_for(model, &self.of_band(settings), cases, resume, &watch)
                 .map_err(|error| error.in_file(path))
                 .map(|(conversion, selection)| (conversion, Some(selection))),
             None => convert_resuming(model, &settings, resume, &watch).map(|conversion| (conversion, None)),
@@ -272,10 +272,14 @@ impl Job<'_> {
 
 /// Loads of residual vectors where the command line names none: those of the manifest; without, those of the
 /// scene, of which free modes alone know nothing.
-fn residual_vectors(arguments: &ConvertArguments, files: &ModelFiles, scenes: &[Scene]) -> Vec<LoadSource> {
+fn residual_vectors(
+    arguments: &ConvertArguments,
+    files: &ModelFiles,
+    cases: Option<&LoadCases>,
+) -> Vec<LoadSource> {
     let free = matches!(arguments.basis, BasisName::Free | BasisName::Scene)
         && arguments.accuracy != AccuracyName::Certified;
-    loads_for(if free && !arguments.lumped_modes { scenes } else { &[] }, &files.residual_vectors)
+    loads_for(cases.filter(|_| free && !arguments.lumped_modes), &files.residual_vectors)
 }
 
 /// Loads of residual vectors as named on the command line.
@@ -457,7 +461,7 @@ fn refuse_overwriting(
     files: &ModelFiles,
     schemes: &[Scheme],
     loads: &[LoadSource],
-    scenes: &[Scene],
+    cases: Option<&LoadCases>,
 ) -> Result<()> {
     let masses = schemes.iter().filter_map(|scheme| match scheme {
         Scheme::User(path) => Some(path),
@@ -467,7 +471,11 @@ fn refuse_overwriting(
     let loads = loads.iter().filter_map(LoadSource::file).map(|location| &location.path);
     let own = files.paths();
     let inputs = own.iter().chain(masses).chain(&shapes).chain(loads).chain(&arguments.scene);
-    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    let series = cases
+        .into_iter()
+        .flat_map(|cases| cases.iter())
+        .flat_map(|scene| &scene.series)
+        .map(|file| &file.path);
     refuse_replacing(inputs.chain(series), outputs.iter().flat_map(Places::all))
 }
 

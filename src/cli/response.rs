@@ -17,7 +17,7 @@ use flexbody_eigen::Wanted;
 use flexbody_input::LoadSource;
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{Point, Scene, read_case};
+use flexbody_motion::scene::{LoadCases, Point, Scene};
 use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
 use flexbody_study::response::{Band, Place, Settings, respond};
 use flexbody_study::tailoring::read_loads;
@@ -35,8 +35,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let watch = |event: Event<'_>| watcher.hear(event);
-    let scene =
-        arguments.scene.as_ref().map(|path| read_case(path, arguments.case.as_deref())).transpose()?;
+    let single = |path| LoadCases::read_single(path, arguments.case.as_deref());
+    let scene = arguments.scene.as_ref().map(single).transpose()?;
     refuse_replacing_read(outputs(arguments))?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let (model, body, diagnostics) = if is_model {

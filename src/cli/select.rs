@@ -15,12 +15,11 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::{Resume, Wanted};
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::CheckedModel;
-use flexbody_motion::scene::{Scene, read_case, read_cases};
+use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, SelectionFacts};
-use flexbody_study::reference::{EnrichedForCases, ReferenceError};
-use flexbody_study::selection::select_for_cases;
+use flexbody_study::reference::{Enriched, ReferenceError};
+use flexbody_study::selection::select;
 use flexbody_study::tailoring::{Tailoring, loads_for, read_loads};
-use std::path::Path;
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -30,19 +29,19 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
-    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    let cases = LoadCases::read(&arguments.scene, arguments.case.as_deref())?;
+    let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     refuse_replacing(series, arguments.report.iter())?;
     refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let (body, lacks, mut diagnostics) = if is_model {
-        converted(arguments, &scenes, &watch)?
+        converted(arguments, &cases, &watch)?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         (body, Vec::new(), notes)
     };
-    let selection = select_for_cases(&body, &lacks, &scenes, memory_left(None), &watch)
+    let selection = select(&body, &lacks, &cases, memory_left(None), &watch)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
@@ -60,24 +59,15 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     })
 }
 
-/// The load cases of a scene that a command is for: the one that is named, or all; of a scene without cases
-/// that scene.
-pub(super) fn asked_cases(scene: &Path, case: Option<&str>) -> Result<Vec<Scene>> {
-    match case {
-        Some(name) => Ok(vec![read_case(scene, Some(name))?]),
-        None => read_cases(scene),
-    }
-}
-
-/// The body of a model with everything that the scenes may need, and what it lacks of the model there.
+/// The body of a model with everything that the load cases may need, and what it lacks of the model there.
 fn converted(
     arguments: &SelectArguments,
-    scenes: &[Scene],
+    cases: &LoadCases,
     watch: Watch<'_>,
 ) -> Result<(FlexBody, Vec<Vec<ReferenceError>>, Vec<Diagnostic>)> {
     let (files, checked) = read_checked(&arguments.body, &arguments.job, arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = checked;
-    let loads = loads_for(scenes, &files.residual_vectors);
+    let loads = loads_for(Some(cases), &files.residual_vectors);
     let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
     let settings = ConvertSettings {
         modes: ModeSettings {
@@ -91,8 +81,8 @@ fn converted(
         ..ConvertSettings::default()
     };
     let tailoring = Tailoring { settings, by_band: arguments.modes.is_none(), of_motion: false };
-    let EnrichedForCases { made, rounds } = tailoring
-        .convert_for_cases(&model, scenes, Resume::default(), watch)
+    let Enriched { made, rounds } = tailoring
+        .convert(&model, cases, Resume::default(), watch)
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(made.diagnostics);
     Ok((made.body, rounds, diagnostics))

@@ -4,14 +4,13 @@ use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
 use super::resources::{memory_left, use_threads};
-use super::select::asked_cases;
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::progress::Event;
-use flexbody_motion::scene::{Scene, simulate, unsettled_rate};
+use flexbody_motion::scene::{LoadCases, Scene, simulate, unsettled_rate};
 use flexbody_report::{Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
 
@@ -24,11 +23,10 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
+    let cases = LoadCases::read(&arguments.scene, arguments.case.as_deref())?;
     let of_case = |scene: &Scene| Places::of(arguments, scene.case_name());
-    let all: Vec<Places> =
-        if scenes.len() == 1 { vec![places] } else { scenes.iter().map(of_case).collect() };
-    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
+    let all: Vec<Places> = if cases.len() == 1 { vec![places] } else { cases.iter().map(of_case).collect() };
+    let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     let inputs = [&arguments.body, &arguments.scene].into_iter().chain(series);
     refuse_replacing(inputs, all.iter().flat_map(Places::all))?;
     refuse_replacing_read(all.iter().flat_map(Places::all))?;
@@ -39,9 +37,9 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
     let job =
         Job { path: &arguments.scene, printing: arguments.printing, body: &body, formats: &formats, threads };
-    let several = scenes.len() > 1;
+    let several = cases.len() > 1;
     let done =
-        scenes.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
+        cases.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
     let done = done.collect::<Result<Vec<_>>>()?;
     // Nothing appears before everything is done.
     OutputSlot::commit_all(slots.into_iter().flat_map(Slots::into_all))?;

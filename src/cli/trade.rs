@@ -5,17 +5,17 @@ use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, use_threads};
-use super::select::asked_cases;
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::basis::ModeSettings;
 use flexbody_linalg::progress::Event;
+use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    Allowed, Row, Settings, Source, Trade, WantedBodies, conversions_for_cases, reserved, trade_for_cases,
+    Allowed, Row, Settings, Source, Trade, WantedBodies, conversions, reserved, trade,
 };
 use std::path::{Path, PathBuf};
 
@@ -30,8 +30,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let threads = use_threads(arguments.threads);
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
-    let scenes = asked_cases(&arguments.scene, arguments.case.as_deref())?;
-    let series = scenes.iter().flat_map(|scene| &scene.series);
+    let cases = LoadCases::read(&arguments.scene, arguments.case.as_deref())?;
+    let series = cases.iter().flat_map(|scene| &scene.series);
     refuse_replacing(series.map(|file| &file.path), outputs())?;
     refuse_replacing_read(outputs())?;
     let memory = memory_left(None);
@@ -43,7 +43,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let wanted = WantedBodies { modes, fine: arguments.reference == ReferenceName::Fine };
         let allowed = Allowed { memory, longest: longest(arguments.allow_long) };
         let watch = |event: Event<'_>| watcher.hear(event);
-        let made = conversions_for_cases(&checked.model, &scenes, wanted, allowed, &watch)
+        let made = conversions(&checked.model, &cases, wanted, allowed, &watch)
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
         (Some(checked.model), made.sources, made.lacks)
@@ -61,8 +61,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         longest: longest(arguments.allow_long),
     };
     let watch = |event: Event<'_>| watcher.hear(event);
-    let study = trade_for_cases(&sources, &scenes, nodal, &settings, &watch)
-        .map_err(|error| error.in_file(&arguments.scene))?;
+    let study =
+        trade(&sources, &cases, nodal, &settings, &watch).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;

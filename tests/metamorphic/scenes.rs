@@ -9,8 +9,8 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_model::RawModel;
 use flexbody_motion::dynamics::RotationVector;
 use flexbody_motion::scene::{
-    AttachmentKind, Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, Point, Range,
-    Samples, Scene, Scheme, Spin, Tolerance, VectorHistory, trace,
+    AttachmentKind, Axes, Carried, CarriedSpin, Drive, History, Initial, Interpolation, Load, PerQuantity,
+    Point, Range, Samples, Scene, Scheme, Spin, VectorHistory, trace,
 };
 use nalgebra::{Matrix3, Vector3};
 use oracle::random::Random;
@@ -281,13 +281,7 @@ impl Scales<'_> {
             attachment.first_frequency = one_in(self.random, 2).then_some(0.8 * self.rate / TAU);
         }
         let tolerance = 10f64.powf(between(self.random, -2.3, -0.8));
-        scene.requirements.tolerance = Tolerance {
-            attitude: tolerance,
-            deflection: tolerance,
-            stress: tolerance,
-            reaction: tolerance,
-            least_deflection: None,
-        };
+        scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
     }
 }
 

@@ -9,7 +9,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{FeModel, RawModel};
-use flexbody_motion::scene::{Scene, read_cases};
+use flexbody_motion::scene::{LoadCases, Scene};
 
 /// Modes of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +97,7 @@ impl Subject {
             return Ok(self.with_second(vec![self.scene.clone(); self.cases]));
         }
         let folder = tempfile::tempdir().expect("a folder");
-        Ok(self.with_second(read_cases(text::write(&self.scene, folder.path()))?))
+        Ok(self.with_second(LoadCases::read(text::write(&self.scene, folder.path()), None)?.to_vec()))
     }
 
     fn with_second(&self, mut scenes: Vec<Scene>) -> Vec<Scene> {

@@ -117,10 +117,10 @@ impl Text {
                 .iter()
                 .for_each(|own| self.line(&format!("first_frequency = {own:?}")));
         }
-        let tolerance = &demands.tolerance;
+        let allowed = &demands.tolerance.errors;
         self.line(&format!(
             "[tolerance]\nattitude = {:?}\ndeflection = {:?}\nstress = {:?}\nreaction = {:?}",
-            tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction
+            allowed.attitude, allowed.deflection, allowed.stress, allowed.reaction
         ));
     }
 

@@ -62,13 +62,12 @@ fn a_listener_hears_the_phases_and_stops_the_work_anywhere() {
 fn every_long_work_can_be_stopped() {
     let (body, (_folder, scene)) = (body(), spin());
     let stop = |_: Progress<'_>| ControlFlow::Break(());
-    let cases = std::slice::from_ref(&scene);
     let options = ConvertOptions::default().modes(6);
     let outcomes = [
         body.simulate_heard(&scene, &stop).map(|_| ()),
-        body.select_for_cases_heard(cases, &stop).map(|_| ()),
+        body.select_heard(&scene, &stop).map(|_| ()),
         body.trade(&scene, &TradeOptions::default(), &stop).map(|_| ()),
-        bracket().convert_for_cases_heard(cases, &options, &stop).map(|_| ()),
+        bracket().convert_for_heard(&scene, &options, &stop).map(|_| ()),
     ];
     for (at, outcome) in outcomes.into_iter().enumerate() {
         assert!(outcome.is_err_and(|error| error.has(Code::Stopped)), "{at}");

@@ -3,25 +3,24 @@
 use super::numbers::significant;
 use flexbody_motion::scene::OutputErrors;
 
-/// `attitude 0.001 rad, deflection 1 %, stress 1 %, reaction 1 %`.
-pub(super) fn tolerances_in_words(attitude: f64, deflection: f64, stress: f64, reaction: f64) -> String {
-    let parts = [("deflection", deflection), ("stress", stress), ("reaction", reaction)];
-    let relative = parts.map(|(name, part)| format!("{name} {} %", significant(100.0 * part, 3)));
-    format!("attitude {} rad, {}", significant(attitude, 3), relative.join(", "))
+/// Error of a quantity in words: `0.001 rad` of the attitude, `1 %` of others.
+pub(super) fn error_in_words(quantity: &str, error: f64, digits: usize) -> String {
+    match quantity {
+        "attitude" => format!("{} rad", significant(error, digits)),
+        _ => format!("{} %", significant(100.0 * error, digits)),
+    }
 }
 
 /// `attitude 1e-4 rad, deflection 0.2 %, stress 0.4 %`.
 pub(super) fn errors_in_words(errors: &OutputErrors) -> String {
-    let relative = |name: &str, error: Option<f64>| {
-        error.map(|error| format!("{name} {} %", significant(100.0 * error, 3)))
-    };
-    let all = [
-        Some(format!("attitude {} rad", significant(errors.attitude, 3))),
-        relative("deflection", errors.deflection),
-        relative("stress", errors.stress),
-        relative("reaction", errors.reaction),
-    ];
-    all.into_iter().flatten().collect::<Vec<_>>().join(", ")
+    errors_to_digits(errors, 3)
+}
+
+/// Known errors in words, with the given number of significant digits.
+pub(super) fn errors_to_digits(errors: &OutputErrors, digits: usize) -> String {
+    let part =
+        |(name, error): (&str, Option<f64>)| Some(format!("{name} {}", error_in_words(name, error?, digits)));
+    errors.named().into_iter().filter_map(part).collect::<Vec<_>>().join(", ")
 }
 
 /// Ascending numbers with runs drawn together: 1-4, 7, 9-10.

@@ -1,5 +1,6 @@
 //! What a body lacks of the model that it was made of.
 
+use super::errors_in_words::errors_to_digits;
 use super::numbers::significant;
 use flexbody_motion::scene::OutputErrors;
 use flexbody_study::reference::ReferenceError;
@@ -9,12 +10,9 @@ use serde::Serialize;
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct LackFacts {
     modes: usize,
-    /// Radians; zero where the rotation is prescribed.
-    attitude: Option<f64>,
-    deflection: Option<f64>,
-    stress: Option<f64>,
-    /// Nothing where no motion is prescribed.
-    reaction: Option<f64>,
+    /// The attitude is zero where the rotation is prescribed; no reaction where no motion is prescribed.
+    #[serde(flatten)]
+    errors: OutputErrors,
     /// Nothing where it is not known.
     worst: Option<f64>,
     time: f64,
@@ -24,15 +22,11 @@ pub(super) struct LackFacts {
 
 impl LackFacts {
     pub(crate) fn new(lack: &ReferenceError) -> Self {
-        let OutputErrors { attitude, deflection, stress, reaction } = lack.errors;
         let (modes, time, unknown) = (lack.modes, lack.time, lack.unknown);
         let known = |value: f64| unknown.is_none().then_some(value);
         Self {
             modes,
-            attitude: known(attitude),
-            deflection: deflection.and_then(known),
-            stress: stress.and_then(known),
-            reaction: reaction.and_then(known),
+            errors: lack.errors.map(|error| error.and_then(known)),
             worst: known(lack.worst),
             time,
             unknown,
@@ -44,18 +38,8 @@ impl LackFacts {
         if let Some(reason) = self.unknown {
             return format!("an unknown part ({reason})");
         }
-        let part = |name: &str, value: Option<f64>| {
-            value.map(|value| format!("{name} {} %", significant(100.0 * value, 2)))
-        };
-        let attitude = self.attitude.filter(|angle| *angle > 0.0);
-        let attitude = attitude.map(|angle| format!("attitude {} rad", significant(angle, 2)));
-        let parts = [
-            attitude,
-            part("deflection", self.deflection),
-            part("stress", self.stress),
-            part("reaction", self.reaction),
-        ];
-        parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
+        let attitude = self.errors.attitude.filter(|angle| *angle > 0.0);
+        errors_to_digits(&OutputErrors { attitude, ..self.errors }, 2)
     }
 
     fn in_words(&self) -> String {

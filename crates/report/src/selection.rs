@@ -1,7 +1,7 @@
 //! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
 
 use super::Format;
-use super::errors_in_words::{errors_in_words, ranges, tolerances_in_words};
+use super::errors_in_words::{errors_in_words, ranges};
 use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::significant;
@@ -13,7 +13,7 @@ use super::text::{Page, diagnostics_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{Group, TermDecision};
-use flexbody_motion::scene::OutputErrors;
+use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
 use serde::Serialize;
 use std::fmt::Write;
@@ -30,7 +30,7 @@ pub struct SelectionFacts<'a> {
     /// The selection in five lines.
     verdict: SelectionVerdict,
     inputs: Vec<InputFacts<'a>>,
-    tolerance: ToleranceFacts,
+    tolerance: PerQuantity<f64>,
     terms: Vec<TermFacts<'a>>,
     guideline: &'a str,
     modes: ModesFacts<'a>,
@@ -52,14 +52,6 @@ struct InputFacts<'a> {
     name: &'a str,
     value: f64,
     source: &'a str,
-}
-
-#[derive(Debug, Clone, Copy, Serialize)]
-struct ToleranceFacts {
-    attitude: f64,
-    deflection: f64,
-    stress: f64,
-    reaction: f64,
 }
 
 #[derive(Debug, Clone, Serialize)]
@@ -175,7 +167,6 @@ impl<'a> TrialFacts<'a> {
 impl<'a> SelectionFacts<'a> {
     /// Facts of `selection`, and of the run that made it.
     pub fn new(selection: &'a Selection, run: &'a RunData) -> Self {
-        let [attitude, deflection, stress, reaction] = selection.tolerance;
         let term = |(decision, ground): (&'a TermDecision, &Option<Ground>)| TermFacts {
             group: decision.group.name(),
             kept: decision.kept,
@@ -212,7 +203,7 @@ impl<'a> SelectionFacts<'a> {
                 .iter()
                 .map(|input| InputFacts { name: input.name, value: input.value, source: &input.source })
                 .collect(),
-            tolerance: ToleranceFacts { attitude, deflection, stress, reaction },
+            tolerance: selection.tolerance,
             terms: selection.terms.iter().zip(&selection.grounds).map(term).collect(),
             guideline: selection.guideline,
             modes: ModesFacts {
@@ -266,8 +257,7 @@ impl<'a> SelectionFacts<'a> {
     }
 
     fn tolerance_in_words(&self) -> String {
-        let ToleranceFacts { attitude, deflection, stress, reaction } = self.tolerance;
-        tolerances_in_words(attitude, deflection, stress, reaction)
+        errors_in_words(&self.tolerance.map(Some))
     }
 
     fn modes_in_words(&self) -> String {
@@ -385,8 +375,7 @@ impl<'a> SelectionFacts<'a> {
             .iter()
             .chain(&self.chosen)
             .map(|trial| {
-                let error_cell =
-                    |error: fn(&OutputErrors) -> Option<f64>| number(trial.errors.as_ref().and_then(error));
+                let errors = trial.errors.unwrap_or_default().named();
                 let verdict = match (trial.passed, trial.remark) {
                     (true, _) => "within".to_owned(),
                     (false, "") => "beyond".to_owned(),
@@ -396,17 +385,12 @@ impl<'a> SelectionFacts<'a> {
                     Some(case) => format!("{verdict} (case {})", escape(case)),
                     None => verdict,
                 };
-                vec![
-                    trial.groups(),
-                    trial.modes.to_string(),
-                    trial.tier.to_string(),
-                    trial.multiplications.to_string(),
-                    error_cell(|errors| Some(errors.attitude)),
-                    error_cell(|errors| errors.deflection),
-                    error_cell(|errors| errors.stress),
-                    error_cell(|errors| errors.reaction),
-                    verdict,
-                ]
+                let sizes = [trial.modes, trial.tier.into(), trial.multiplications];
+                let mut row = vec![trial.groups()];
+                row.extend(sizes.map(|size| size.to_string()));
+                row.extend(errors.map(|(_, error)| number(error)));
+                row.push(verdict);
+                row
             })
             .collect();
         let caption = "Errors of models with fewer terms or modes: guaranteed bounds (tiers 0 and 1) or measured (tier 2). The last row is the selection.";

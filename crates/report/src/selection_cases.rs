@@ -5,7 +5,7 @@ use super::lacks::LackFacts;
 use super::markup::{escape, table};
 use super::numbers::significant;
 use flexbody_body::flex_body::Group;
-use flexbody_motion::scene::OutputErrors;
+use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::CaseSelection;
 use serde::Serialize;
 
@@ -13,7 +13,7 @@ use serde::Serialize;
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct CaseFacts<'a> {
     name: &'a str,
-    tolerance: CaseTolerance,
+    tolerance: PerQuantity<f64>,
     /// Errors of the selected model.
     errors: Option<OutputErrors>,
     /// Its largest error over the tolerance.
@@ -29,14 +29,6 @@ pub(super) struct CaseFacts<'a> {
     reference: Vec<LackFacts>,
 }
 
-#[derive(Debug, Clone, Copy, Serialize)]
-struct CaseTolerance {
-    attitude: f64,
-    deflection: f64,
-    stress: f64,
-    reaction: f64,
-}
-
 impl<'a> CaseFacts<'a> {
     pub(crate) fn new(case: &'a CaseSelection) -> Self {
         let tolerance = &case.tolerance;
@@ -45,12 +37,7 @@ impl<'a> CaseFacts<'a> {
         let groups = case.binds_groups.iter().copied().map(Group::name);
         Self {
             name: &case.name,
-            tolerance: CaseTolerance {
-                attitude: tolerance.attitude,
-                deflection: tolerance.deflection,
-                stress: tolerance.stress,
-                reaction: tolerance.reaction,
-            },
+            tolerance: tolerance.errors,
             errors,
             worst: chosen.map(|trial| trial.worst).filter(|worst| worst.is_finite()),
             output: errors.map(|errors| errors.decisive(tolerance).0),

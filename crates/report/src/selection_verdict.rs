@@ -1,6 +1,6 @@
 //! A selection in five lines: what was asked, what to take, why, the error, and what it saves.
 
-use super::errors_in_words::{errors_in_words, ranges};
+use super::errors_in_words::{error_in_words, errors_in_words, ranges};
 use super::lacks::LackFacts;
 use super::numbers::{counted, significant};
 use flexbody_body::flex_body::Group;
@@ -50,15 +50,6 @@ fn meaning(group: Group) -> &'static str {
     }
 }
 
-fn per_cent(part: f64) -> String {
-    format!("{} %", significant(100.0 * part, 2))
-}
-
-/// An error of an output in words.
-fn size(output: &str, error: f64) -> String {
-    if output == "attitude" { format!("{} rad", significant(error, 2)) } else { per_cent(error) }
-}
-
 fn asked(selection: &Selection) -> String {
     if let Some(most) = selection.most_multiplications {
         return format!(
@@ -67,16 +58,11 @@ fn asked(selection: &Selection) -> String {
             cases_in_words(selection)
         );
     }
-    let [attitude, deflection, stress, reaction] = selection.tolerance;
-    format!(
-        "{}{}: errors of at most {} in attitude, {} in deflection, {} in stress, {} in reactions",
-        selection.scene,
-        cases_in_words(selection),
-        size("attitude", attitude),
-        per_cent(deflection),
-        per_cent(stress),
-        per_cent(reaction)
-    )
+    let parts = selection.tolerance.named().map(|(name, most)| {
+        let name = if name == "reaction" { "reactions" } else { name };
+        format!("{} in {name}", error_in_words(name, most, 2))
+    });
+    format!("{}{}: errors of at most {}", selection.scene, cases_in_words(selection), parts.join(", "))
 }
 
 /// The load cases, and whether the tolerances that are told are the least of theirs.
@@ -142,7 +128,7 @@ fn reason(kept: bool, ground: Option<Ground>, groups: &[Group]) -> String {
         let known = if kept { "stays: nothing shows that it may go" } else { "is not in the body" };
         return format!("{names} {known}");
     };
-    let error = size(output, error);
+    let error = error_in_words(output, error, 2);
     match (kept, tier) {
         (true, 2) => format!("without {names} the {output} is off by {error}"),
         (true, _) => format!("without {names} the {output} may be off by {error}"),

@@ -1,7 +1,7 @@
 //! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
 
 use super::Format;
-use super::errors_in_words::tolerances_in_words;
+use super::errors_in_words::errors_in_words;
 use super::lacks::{LackFacts, reference_in_words};
 use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::{bytes, counted, duration, plain, significant};
@@ -200,7 +200,7 @@ impl<'a> TradeFacts<'a> {
             reference: trade.reference,
             nodal: trade.cases[0].nodal.as_ref().map(NodalFacts::new),
             reference_lacks: rounds.iter().map(LackFacts::new).collect(),
-            tolerance: least_tolerance(trade),
+            tolerance: trade.tolerance,
             allowed_multiplications: trade.allowed,
             verdict: Vec::new(),
             recommended: trade.recommended.row().map(|row| row + 1),
@@ -234,8 +234,7 @@ impl<'a> TradeFacts<'a> {
     }
 
     fn tolerances_in_words(&self) -> String {
-        let Tolerance { attitude, deflection, stress, reaction, .. } = self.tolerance;
-        tolerances_in_words(attitude, deflection, stress, reaction)
+        errors_in_words(&self.tolerance.errors.map(Some))
     }
 
     fn against(&self) -> &'static str {
@@ -412,13 +411,8 @@ impl<'a> TradeFacts<'a> {
                         bytes(m.file_bytes),
                     ]);
                     cells.extend(several.then(|| made_in(m)));
-                    cells.extend([
-                        significant(m.errors.attitude, 3),
-                        optional(m.errors.deflection),
-                        optional(m.errors.stress),
-                        optional(m.errors.reaction),
-                        significant(m.worst, 3),
-                    ]);
+                    cells.extend(m.errors.named().map(|(_, error)| optional(error)));
+                    cells.push(significant(m.worst, 3));
                     cells.extend(m.case.map(escape));
                 }
                 (None, failed) => {
@@ -443,20 +437,6 @@ fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     worst.map_or(&[], Vec::as_slice)
 }
 
-/// Largest errors that are allowed in all load cases.
-fn least_tolerance(trade: &Trade) -> Tolerance {
-    let mut least = trade.cases[0].tolerance;
-    for Tolerance { attitude, deflection, stress, reaction, .. } in
-        trade.cases.iter().map(|case| case.tolerance)
-    {
-        least.attitude = least.attitude.min(attitude);
-        least.deflection = least.deflection.min(deflection);
-        least.stress = least.stress.min(stress);
-        least.reaction = least.reaction.min(reaction);
-    }
-    least
-}
-
 /// A short time.
 fn short(seconds: f64) -> String {
     if seconds < 1e-6 {
@@ -477,7 +457,7 @@ pub fn trade_csv(trade: &Trade) -> String {
         let text = |text: &str| super::simulation::csv_cell(text);
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
-        let errors = m.map(|m| m.errors);
+        let errors = m.map(|m| m.errors).unwrap_or_default();
         let count = |number: fn(&MeasuredFacts<'_>) -> Option<u64>| {
             m.and_then(number).map_or_else(String::new, |value| value.to_string())
         };
@@ -497,10 +477,10 @@ pub fn trade_csv(trade: &Trade) -> String {
             number(m.and_then(|m| m.seconds.preprocessing)),
             count(|m| m.steps),
             count(|m| Some(m.file_bytes)),
-            number(errors.map(|e| e.attitude)),
-            number(errors.and_then(|e| e.deflection)),
-            number(errors.and_then(|e| e.stress)),
-            number(errors.and_then(|e| e.reaction)),
+            number(errors.attitude),
+            number(errors.deflection),
+            number(errors.stress),
+            number(errors.reaction),
             number(m.map(|m| m.worst)),
             text(m.and_then(|m| m.case).unwrap_or_default()),
             trade.front.contains(&at).to_string(),

@@ -1,11 +1,8 @@
 //! A body made for one scene: a conversion that computes no more than the scene may need, and keeps no more
 //! than it needs.
 
-use crate::reference::{
-    Enriched, EnrichedForCases, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError,
-    enrich_for_cases,
-};
-use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select_for_cases};
+use crate::reference::{Enriched, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich};
+use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -16,7 +13,7 @@ use flexbody_eigen::{Accuracy, Resume, Wanted};
 use flexbody_input::{LoadSource, read_shapes};
 use flexbody_linalg::progress::Watch;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::Scene;
+use flexbody_motion::scene::LoadCases;
 
 /// Settings of a conversion for a scene.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,35 +28,19 @@ pub struct Tailoring {
 }
 
 impl Tailoring {
-    /// A body with everything that `scene` may need, enriched until what it lacks of the model no longer
-    /// counts there.
+    /// A body with everything that any of the load cases may need, enriched until what it lacks of the model no
+    /// longer counts there.
     ///
     /// # Errors
-    /// As [`convert`](flexbody_body::convert::convert) and [`enrich`](crate::reference::enrich).
+    /// As [`convert`](flexbody_body::convert::convert) and [`enrich`].
     pub fn convert(
         &self,
         model: &FeModel,
-        scene: &Scene,
+        cases: &LoadCases,
         resume: Resume<'_>,
         watch: Watch<'_>,
     ) -> Result<Enriched<Conversion>> {
-        let EnrichedForCases { made, rounds } =
-            self.convert_for_cases(model, std::slice::from_ref(scene), resume, watch)?;
-        Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
-    }
-
-    /// The same with everything that any of the load cases `scenes` may need.
-    ///
-    /// # Errors
-    /// As [`Tailoring::convert`].
-    pub fn convert_for_cases(
-        &self,
-        model: &FeModel,
-        scenes: &[Scene],
-        resume: Resume<'_>,
-        watch: Watch<'_>,
-    ) -> Result<EnrichedForCases<Conversion>> {
-        self.enriched(model, scenes, resume, watch, |modal| Ok(modal.condense()))
+        self.enriched(model, cases, resume, watch, |modal| Ok(modal.condense()))
     }
 
     /// Conversions by `condense`, each with more static responses than the one before, until the body lacks
@@ -67,14 +48,14 @@ impl Tailoring {
     fn enriched(
         &self,
         model: &FeModel,
-        scenes: &[Scene],
+        cases: &LoadCases,
         resume: Resume<'_>,
         watch: Watch<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
-    ) -> Result<EnrichedForCases<Conversion>> {
+    ) -> Result<Enriched<Conversion>> {
         let make = |loads: &Mat<f64>| {
             let own = self.with_motion(loads);
-            let band_settings = own.settings_of_band(scenes);
+            let band_settings = own.settings_of_band(cases);
             // A search that was interrupted is that of the free modes, which come first.
             let resume = if loads.ncols() == 0 { resume } else { Resume::default() };
             let modal = own.find_modes(band_settings.as_ref(), model, resume, watch)?;
@@ -85,7 +66,7 @@ impl Tailoring {
         let grows = settings.modes.accuracy != Accuracy::Certified
             && settings.basis.with_motion(&Mat::new()).is_some();
         let enrichment = Enrichment { memory: settings.modes.memory, grows, is_fine: false };
-        enrich_for_cases(model, scenes, enrichment, watch, make, |made| &made.body)
+        enrich(model, cases, enrichment, watch, make, |made| &made.body)
     }
 
     /// The body of the fewest shapes of its motions that leave half of the tolerances to others, in place of
@@ -96,21 +77,21 @@ impl Tailoring {
     fn of_motion(
         &self,
         model: &FeModel,
-        scenes: &[Scene],
-        whole: EnrichedForCases<Conversion>,
+        cases: &LoadCases,
+        whole: Enriched<Conversion>,
         watch: Watch<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
-    ) -> Result<EnrichedForCases<Conversion>> {
-        let EnrichedForCases { made: mut reference, rounds } = whole;
+    ) -> Result<Enriched<Conversion>> {
+        let Enriched { made: mut reference, rounds } = whole;
         let own = || rounds.iter().map(|rounds| rounds.last());
         if own().flatten().any(|own| !own.is_reference()) {
             let message =
                 "the body whose motion shapes would be made of lacks more than half of the tolerances itself";
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
-            return Ok(EnrichedForCases { made: reference, rounds });
+            return Ok(Enriched { made: reference, rounds });
         }
         let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
-        let bodies = MotionBodies::new(model, &reference.body, scenes, self.settings.modes.memory)?;
+        let bodies = MotionBodies::new(model, &reference.body, cases, self.settings.modes.memory)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
             let settings = self.settings_of_shapes(bodies.basis(count));
             let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
@@ -133,11 +114,11 @@ impl Tailoring {
                     coupling: None,
                 }]
             });
-            return Ok(EnrichedForCases { rounds: own.collect(), made });
+            return Ok(Enriched { rounds: own.collect(), made });
         }
         let message = "no number of shapes of the motion leaves half of the tolerances to the dropped terms";
         reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
-        Ok(EnrichedForCases { made: reference, rounds })
+        Ok(Enriched { made: reference, rounds })
     }
 
     /// The settings with all modes of given shapes.
@@ -154,9 +135,9 @@ impl Tailoring {
         own
     }
 
-    /// The settings with the modes that the highest band of `scenes` wants.
-    fn settings_of_band(&self, scenes: &[Scene]) -> Option<ConvertSettings> {
-        let highest = largest_eigenvalue(scenes).filter(|_| self.by_band)?;
+    /// The settings with the modes that the highest band of the load cases wants.
+    fn settings_of_band(&self, cases: &LoadCases) -> Option<ConvertSettings> {
+        let highest = largest_eigenvalue(cases).filter(|_| self.by_band)?;
         let mut settings = self.settings.clone();
         settings.modes.wanted = Wanted::Below(highest);
         Some(settings)
@@ -184,12 +165,13 @@ impl Tailoring {
 }
 
 /// Loads whose static responses join the modes where nobody names others: those `stated` with the model;
-/// without, those of the `scenes`, of which free modes alone know nothing.
-pub fn loads_for(scenes: &[Scene], stated: &[LoadSource]) -> Vec<LoadSource> {
+/// without, those of the load cases, of which free modes alone know nothing.
+pub fn loads_for(cases: Option<&LoadCases>, stated: &[LoadSource]) -> Vec<LoadSource> {
     if !stated.is_empty() {
         return stated.to_vec();
     }
-    let WantedResponses { centrifugal, interfaces } = WantedResponses::of_any(scenes);
+    let WantedResponses { centrifugal, interfaces } =
+        cases.map_or_else(WantedResponses::default, WantedResponses::of_any);
     let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
     loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
 }
@@ -216,52 +198,38 @@ fn read_set(set: &LoadSource, model: &FeModel) -> Result<Loads> {
     }
 }
 
-/// Converts `model` to a body with the terms and modes that `scene` needs: what bounds of tier 0 rule out is
+/// Converts `model` to a body with the terms and modes that the load cases need: what bounds of tier 0 rule out is
 /// never computed, the rest is decided about the converted body. The scene becomes one of its sources.
 ///
 /// # Errors
-/// As [`convert`](flexbody_body::convert::convert), [`enrich_for_cases`] and [`select_for_cases`].
-pub fn convert_for_scene(
+/// As [`convert`](flexbody_body::convert::convert), [`enrich`] and [`select`].
+pub fn convert_for(
     model: &FeModel,
     tailoring: &Tailoring,
-    scene: &Scene,
-    resume: Resume<'_>,
-    watch: Watch<'_>,
-) -> Result<(Conversion, Selection)> {
-    convert_for_cases(model, tailoring, std::slice::from_ref(scene), resume, watch)
-}
-
-/// The same for the load cases `scenes`, which one body has to serve.
-///
-/// # Errors
-/// As [`convert_for_scene`].
-pub fn convert_for_cases(
-    model: &FeModel,
-    tailoring: &Tailoring,
-    scenes: &[Scene],
+    cases: &LoadCases,
     resume: Resume<'_>,
     watch: Watch<'_>,
 ) -> Result<(Conversion, Selection)> {
     let memory = tailoring.settings.modes.memory;
-    refuse_unfit(tailoring, scenes)?;
+    refuse_unfit(tailoring, cases)?;
     let condense = |modal: &ModalModel<'_>| {
         // Rigid motion alone is multiplied by M before the scenes have said which groups they may need.
         let linear = modal.condense_linear();
-        let terms = rule_out(&modal.body(&linear)?, scenes, memory)?;
+        let terms = rule_out(&modal.body(&linear)?, cases, memory)?;
         Ok(modal.condense_kept(linear, terms))
     };
-    let mut enriched = tailoring.enriched(model, scenes, resume, watch, condense)?;
+    let mut enriched = tailoring.enriched(model, cases, resume, watch, condense)?;
     if tailoring.of_motion {
-        enriched = tailoring.of_motion(model, scenes, enriched, watch, condense)?;
+        enriched = tailoring.of_motion(model, cases, enriched, watch, condense)?;
     }
-    let EnrichedForCases { made: mut conversion, rounds } = enriched;
-    let selection = select_for_cases(&conversion.body, &rounds, scenes, memory, watch)?;
+    let Enriched { made: mut conversion, rounds } = enriched;
+    let selection = select(&conversion.body, &rounds, cases, memory, watch)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
     let mut parts = reduced.into_parts();
-    let series = scenes.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
-    for source in scenes.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {
+    let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
+    for source in cases.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {
         // Load cases share their scene file, and may share histories.
-        if scenes.len() == 1 || !parts.source.files.contains(source) {
+        if cases.len() == 1 || !parts.source.files.contains(source) {
             parts.source.files.push(source.clone());
         }
     }
@@ -270,7 +238,7 @@ pub fn convert_for_cases(
 }
 
 /// Refuses what a basis that is made of a motion cannot serve.
-fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
+fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
     if tailoring.settings.interface_frame.is_some() {
         let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
         let help = "leave --scene out, or use --frame com";
@@ -279,11 +247,11 @@ fn refuse_unfit(tailoring: &Tailoring, scenes: &[Scene]) -> Result<()> {
     if !tailoring.of_motion {
         return Ok(());
     }
-    let message = if scenes.iter().any(|scene| !scene.initial.modes.is_empty()) {
+    let message = if cases.iter().any(|scene| !scene.initial.modes.is_empty()) {
         "--basis scene: the scene starts modes by their number, which a body made of its motion does not have"
-    } else if scenes.iter().any(|scene| scene.carried.is_some()) {
+    } else if cases.iter().any(|scene| scene.carried.is_some()) {
         "--basis scene: shapes are made of the motion of a free body, and something carries this one"
-    } else if scenes.iter().any(|scene| scene.run.duration.is_none()) {
+    } else if cases.iter().any(|scene| scene.run.duration.is_none()) {
         "--basis scene: shapes are made of a motion, and the scene has no [run] with a duration"
     } else {
         return Ok(());

@@ -9,7 +9,7 @@ use crate::subject::Subject;
 use crate::transformations::Reach;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_motion::scene::{Scene, Scheme};
+use flexbody_motion::scene::{LoadCases, Scheme};
 use std::collections::BTreeSet;
 
 /// A command with its name.
@@ -80,10 +80,10 @@ const ENRICHED: &str = "of an enriched body";
 const DIGITS: f64 = 2e5;
 
 /// The load cases of a verdict.
-fn cases(subject: &Subject) -> Result<Vec<Scene>> {
+fn cases(subject: &Subject) -> Result<LoadCases> {
     let mut scenes = subject.scenes()?;
     scenes.iter_mut().for_each(|scene| scene.run.scheme = Scheme::Adaptive { tolerance: TOLERANCE });
-    Ok(scenes)
+    Ok(LoadCases::new(scenes).expect("a load case"))
 }
 
 /// Codes of findings, each once, in order.

@@ -7,9 +7,9 @@ use flexbody_base::error::Result;
 use flexbody_eigen::Resume;
 use flexbody_linalg::progress::SILENT;
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::selection::{Selection, select_for_cases};
-use flexbody_study::tailoring::{Tailoring, convert_for_cases};
-use flexbody_study::trade::{Kind, Row, Settings, Source, trade_for_cases};
+use flexbody_study::selection::{Selection, select};
+use flexbody_study::tailoring::{Tailoring, convert_for};
+use flexbody_study::trade::{Kind, Row, Settings, Source, trade};
 
 /// Errors over their tolerances are compared up to this one.
 const BEYOND: f64 = 2.0;
@@ -40,7 +40,7 @@ fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
 /// `select` of a body.
 pub fn select_body(subject: &Subject) -> Result<Outputs> {
     let body = subject.body()?;
-    let selection = select_for_cases(&body, &[], &cases(subject)?, None, SILENT)?;
+    let selection = select(&body, &[], &cases(subject)?, None, SILENT)?;
     Ok(outputs(subject, &selection, body.n_modes()))
 }
 
@@ -51,9 +51,9 @@ fn tailoring(subject: &Subject) -> Tailoring {
 /// `select` of a model.
 pub fn select_model(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let enriched = tailoring(subject).convert_for_cases(&model, &scenes, Resume::default(), SILENT)?;
+    let enriched = tailoring(subject).convert(&model, &scenes, Resume::default(), SILENT)?;
     let body = &enriched.made.body;
-    let selection = select_for_cases(body, &enriched.rounds, &scenes, None, SILENT)?;
+    let selection = select(body, &enriched.rounds, &scenes, None, SILENT)?;
     let mut outputs = outputs(subject, &selection, body.n_modes());
     let first = enriched.rounds.iter().filter_map(|rounds| Some(rounds.first()?.worst.min(BEYOND)));
     outputs.all.push(error("errors of the first body", vec![first.fold(0.0, f64::max)]));
@@ -63,8 +63,7 @@ pub fn select_model(subject: &Subject) -> Result<Outputs> {
 /// `convert --scene`.
 pub fn conversion(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let (made, selection) =
-        convert_for_cases(&model, &tailoring(subject), &scenes, Resume::default(), SILENT)?;
+    let (made, selection) = convert_for(&model, &tailoring(subject), &scenes, Resume::default(), SILENT)?;
     let mut outputs = outputs(subject, &selection, made.body.n_modes());
     let told = findings(&made.diagnostics).into_iter();
     outputs.all.extend(
@@ -80,7 +79,7 @@ pub fn trading(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
     let settings = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
     let source = Source::new("body", subject.body()?, None)?;
-    let study = trade_for_cases(&[source], &scenes, Some(&model), &settings, SILENT)?;
+    let study = trade(&[source], &scenes, Some(&model), &settings, SILENT)?;
     // Rounded numbers are others in a body that is turned.
     let exact = |row: &&Row| row.candidate.kind() != Kind::Single;
     let rows: Vec<&Row> = study.rows.iter().filter(exact).collect();

@@ -11,7 +11,7 @@ use flexbody_linalg::SymmetricMatrix;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody_motion::dynamics::{Orientation, RotationVector};
-use flexbody_motion::scene::{Recording, read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, Recording, simulate};
 use flexbody_study::selection::select;
 use nalgebra::{DVector, Vector3};
 use oracle::elements::{Kind, MassRule, Material};
@@ -152,7 +152,7 @@ fn run(body: &FlexBody, text: &str) -> (Recording, Vec<Diagnostic>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    simulate(body, &read_scene(&path).expect("a scene"), None, |_| ()).expect("a motion")
+    simulate(body, &LoadCases::read_single(&path, None).expect("a scene"), None, |_| ()).expect("a motion")
 }
 
 #[test]
@@ -276,8 +276,8 @@ fn selections_for_a_carried_body_keep_all_groups_and_hold() {
     let text = "gravity = [0, 0, -9.81]\n[run]\nduration = 0.5\noutputs = 50\n[damping]\nratio = 0.02\n[carried]\ninterface = \"root\"\n\
                 [carried.spin]\nrate = { to = 3, duration = 0.4 }\n[[watch]]\ninterface = \"tip\"\n";
     fs::write(&path, text).expect("written");
-    let scene = read_scene(&path).expect("a scene");
-    let selection = select(&body, &scene, None, SILENT).expect("a selection");
+    let scene = LoadCases::read_single(&path, None).expect("a scene");
+    let selection = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
     assert!(selection.holds() && selection.groups == body.groups());
     assert!(selection.modes.len() < body.n_modes(), "{:?}", selection.modes);
     let small = body.reduced(&selection.modes, selection.groups, Vec::new()).expect("a body");
@@ -377,7 +377,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     let at = ids.iter().position(|id| *id == 20000).expect("a node");
     let expected = Vector3::new(u[3 * at], u[3 * at + 1], u[3 * at + 2]);
     let body = flexbody_file::read(place.join("b.flex.h5")).expect("a body");
-    let described = read_scene(place.join("scene.toml")).expect("a scene");
+    let described = LoadCases::read_single(place.join("scene.toml"), None).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     let own = recording.paths[0].deflection[5];
     assert!((own - expected).norm() < 2e-3 * expected.norm(), "{own}, {expected}");

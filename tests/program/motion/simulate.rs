@@ -4,7 +4,7 @@
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
 use flexbody_motion::dynamics::Terms;
-use flexbody_motion::scene::{read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, simulate};
 use hdf5_metno as hdf5;
 use nalgebra::Vector3;
 use oracle::fixtures;
@@ -99,7 +99,7 @@ fn the_gyroscope_senses_its_rate() {
     assert_ne!(steady, text);
     scene(folder.path(), &steady);
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
-    let described = read_scene(folder.path().join("scene.toml")).expect("a scene");
+    let described = LoadCases::read_single(folder.path().join("scene.toml"), None).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     let (drive, sense) = (1, 2);
     let [w1, w2] = [drive, sense].map(|j| body.modes().eigenvalue[j].sqrt());
@@ -141,7 +141,7 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
     }
 
     let body = flexbody_file::read(place.join("body.flex.h5")).expect("a body");
-    let described = read_scene(place.join("scene.toml")).expect("a scene");
+    let described = LoadCases::read_single(place.join("scene.toml"), None).expect("a scene");
     let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
     assert_eq!(recording.time.len(), 41);
     let file = hdf5::File::open(first.path().join("motion.h5")).expect("HDF5");
@@ -268,7 +268,7 @@ fn terms_are_those_of_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let read = |terms: &str| {
         scene(folder.path(), &format!("[run]\nduration = 1\n{terms}"));
-        read_scene(folder.path().join("scene.toml")).expect("a scene").run.terms
+        LoadCases::read_single(folder.path().join("scene.toml"), None).expect("a scene").run.terms
     };
     assert_eq!(read(""), Terms::ALL);
     assert_eq!(read("terms = [\"W1\", \"W3\"]"), Terms { w2: false, ..Terms::ALL });
@@ -280,7 +280,7 @@ fn a_recording_that_does_not_fit_is_refused_before_any_work() {
     let folder = folder_with("bracket_hex20", 2);
     scene(folder.path(), "[run]\nduration = 1e-3\noutputs = 1000000\n");
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
-    let described = read_scene(folder.path().join("scene.toml")).expect("a scene");
+    let described = LoadCases::read_single(folder.path().join("scene.toml"), None).expect("a scene");
     let error =
         simulate(&body, &described, Some(1_000_000_000), |_| ()).expect_err("a gigabyte is not enough");
     assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);

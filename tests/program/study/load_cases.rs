@@ -3,8 +3,8 @@
 use crate::program::flexbody;
 use flexbody_body::flex_body::{FlexBody, Group};
 use flexbody_linalg::progress::SILENT;
-use flexbody_motion::scene::{Measure, Scene, read_cases, read_scene, trace, trace_at};
-use flexbody_study::selection::{Selection, select, select_for_cases};
+use flexbody_motion::scene::{LoadCases, Measure, Scene, trace, trace_at};
+use flexbody_study::selection::{Selection, select};
 use oracle::{fixtures, members};
 use serde_json::Value;
 use std::fs;
@@ -63,11 +63,11 @@ fn body(place: &Path) -> FlexBody {
     flexbody_file::read(place.join("rod.flex.h5")).expect("a body")
 }
 
-fn scenes(text: &str) -> Vec<Scene> {
+fn scenes(text: &str) -> LoadCases {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    read_cases(path).unwrap_or_else(|error| panic!("{error}"))
+    LoadCases::read(path, None).unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// The largest error over its tolerance of the selected body, measured by itself.
@@ -84,10 +84,10 @@ fn a_case_is_what_a_scene_of_its_own_is() {
     let folder = folder();
     let place = folder.path();
     written(place);
-    let cases = read_cases(place.join("cases.toml")).expect("cases");
-    for (mut case, own) in cases.into_iter().zip(["slow", "fast"]) {
+    let cases = LoadCases::read(place.join("cases.toml"), None).expect("cases");
+    for (mut case, own) in cases.to_vec().into_iter().zip(["slow", "fast"]) {
         assert_eq!(case.case_name(), Some(own));
-        let scene = read_scene(place.join(own).with_extension("toml")).expect("a scene");
+        let scene = LoadCases::read_single(place.join(own).with_extension("toml"), None).expect("a scene");
         (case.case, case.source) = (None, scene.source.clone());
         assert_eq!(case, scene, "{own}");
     }
@@ -118,13 +118,14 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     let place = folder.path();
     written(place);
     let whole = body(place);
-    let cases = read_cases(place.join("cases.toml")).expect("cases");
-    let both = select_for_cases(&whole, &[], &cases, None, SILENT).expect("a selection");
+    let cases = LoadCases::read(place.join("cases.toml"), None).expect("cases");
+    let both = select(&whole, &[], &cases, None, SILENT).expect("a selection");
     assert!(both.holds() && both.cases.len() == 2, "{both:#?}");
-    let alone: Vec<Selection> =
-        cases.iter().map(|case| select(&whole, case, None, SILENT).expect("a selection")).collect();
+    let select_alone =
+        |case: &Scene| select(&whole, &[], &case.clone().into(), None, SILENT).expect("a selection");
+    let alone: Vec<Selection> = cases.iter().map(select_alone).collect();
     assert_ne!(alone[0].groups, alone[1].groups, "the cases need different terms");
-    for (own, case) in alone.iter().zip(&cases) {
+    for (own, case) in alone.iter().zip(cases.iter()) {
         assert!(own.cases.is_empty());
         for group in Group::ALL {
             assert!(both.groups.has(group) || !own.groups.has(group), "{group:?} of {:?}", case.case);
@@ -132,7 +133,7 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
         assert!(both.modes.len() >= own.modes.len(), "{:?} {:?}", both.modes, own.modes);
     }
     // What is told of each case is its error.
-    for (told, case) in both.cases.iter().zip(&cases) {
+    for (told, case) in both.cases.iter().zip(cases.iter()) {
         let worst = measured(&whole, &both, case);
         let chosen = told.chosen.as_ref().expect("measured");
         // Of half of the tolerances bounds have ruled terms out of the motion that a case is measured
@@ -142,7 +143,7 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     let fast = &both.cases[1];
     assert!(fast.binds_groups.contains(&Group::W1) && both.cases[0].binds_groups.is_empty(), "{both:#?}");
     // Threads and repetitions change nothing.
-    assert_eq!(both, select_for_cases(&whole, &[], &cases, None, SILENT).expect("a selection"));
+    assert_eq!(both, select(&whole, &[], &cases, None, SILENT).expect("a selection"));
 }
 
 #[test]
@@ -153,9 +154,9 @@ fn a_case_that_needs_nothing_changes_nothing() {
     let one = scenes(&shaken);
     let with_idle = scenes(&format!("{shaken}[[case]]\n{IDLE}"));
     let twice = scenes(&format!("{shaken}[[case]]\n{}[[case.load]]\n{SHAKE}", FAST.replace("fast", "again")));
-    let alone = select(&whole, &one[0], None, SILENT).expect("a selection");
+    let alone = select(&whole, &[], &one, None, SILENT).expect("a selection");
     for cases in [with_idle, twice] {
-        let both = select_for_cases(&whole, &[], &cases, None, SILENT).expect("a selection");
+        let both = select(&whole, &[], &cases, None, SILENT).expect("a selection");
         assert_eq!((both.groups, &both.modes), (alone.groups, &alone.modes), "{:?}", cases[1].case);
         let chosen = both.cases[0].chosen.as_ref().expect("measured");
         assert_eq!(Some(chosen), alone.chosen.as_ref());
@@ -314,9 +315,9 @@ fn keys_of_a_case_take_the_place_of_those_of_the_scene() {
         [[case]]\nname = \"other\"\ngravity = [0, 9.81, 0]\nrun = { duration = 2 }\ninitial = { origin = [0, 1, 0] }\n\
         spin = { axis = [1, 0, 0], rate = 3 }\ndamping = { ratio = 0.02 }\n\
         [[case.load]]\nnode = 2\nforce = [0, 1, 0]\n[[case.watch]]\nnode = 3\n";
-    let [first, other] = scenes(text).try_into().expect("two cases");
+    let [first, other] = scenes(text).to_vec().try_into().expect("two cases");
     let (common, _) = text.split_once("[[case]]").expect("cases");
-    let mut alone = scenes(common).remove(0);
+    let mut alone = scenes(common)[0].clone();
     assert_eq!(alone.case_name(), None);
     (alone.name, alone.source, alone.case) = (first.name.clone(), first.source.clone(), first.case.clone());
     assert_eq!(first, alone);

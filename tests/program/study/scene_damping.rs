@@ -10,7 +10,7 @@ use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Damping, FeModel, RawModel};
 use flexbody_motion::integration::free_oscillation;
-use flexbody_motion::scene::{Scene, read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, Scene, simulate};
 use flexbody_study::tailoring::Tailoring;
 use oracle::fixtures;
 use std::fs;
@@ -46,7 +46,7 @@ fn folder(damping: &str) -> TempDir {
 }
 
 fn scene(place: &Path, name: &str) -> Scene {
-    read_scene(place.join(name)).expect("a scene")
+    LoadCases::read_single(place.join(name), None).expect("a scene")
 }
 
 fn body(place: &Path) -> FlexBody {
@@ -149,8 +149,9 @@ fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     let lacks = |damping: Option<Damping<_>>| -> Vec<f64> {
         let model = FeModel::from_raw(RawModel { damping, ..raw.clone() }).expect("sound").model;
         let tailoring = Tailoring { settings: settings.clone(), by_band: false, of_motion: false };
-        let made = tailoring.convert(&model, &scene, Resume::default(), SILENT).expect("a body");
-        made.rounds.iter().map(|round| round.worst).collect()
+        let made =
+            tailoring.convert(&model, &scene.clone().into(), Resume::default(), SILENT).expect("a body");
+        made.rounds[0].iter().map(|round| round.worst).collect()
     };
     let bare = lacks(None);
     assert!(!bare.is_empty());

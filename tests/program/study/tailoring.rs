@@ -9,8 +9,8 @@ use flexbody_eigen::{Resume, Wanted};
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::read_scene;
-use flexbody_study::tailoring::{Tailoring, convert_for_scene};
+use flexbody_motion::scene::LoadCases;
+use flexbody_study::tailoring::{Tailoring, convert_for};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -54,13 +54,13 @@ fn a_mild_scene_never_forms_w() {
     let folder = folder_with(MILD);
     let raw = read_model(&read_manifest(manifest()).expect("manifest")).expect("readable");
     let model = FeModel::from_raw(raw).expect("a body").model;
-    let scene = read_scene(folder.path().join("scene.toml")).expect("a scene");
+    let scene = LoadCases::read_single(folder.path().join("scene.toml"), None).expect("a scene");
     let modes = ModeSettings { wanted: Wanted::Lowest(MODES), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, ..ConvertSettings::default() };
-    let (conversion, selection) = convert_for_scene(
+    let (conversion, selection) = convert_for(
         &model,
         &Tailoring { settings, by_band: false, of_motion: false },
-        &scene,
+        &scene.clone().into(),
         Resume::default(),
         SILENT,
     )

@@ -35,12 +35,12 @@ pub struct Scene {
     /// of this body's frame.
     pub resolved: bool,
     /// Which load case it is of a scene that has several.
-    pub case: Option<LoadCase>,
+    pub case: Option<CaseName>,
 }
 
-/// A load case of a scene file.
+/// Name of a load case of a scene file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct LoadCase {
+pub struct CaseName {
     /// Name of what all cases belong to.
     pub scene: String,
     /// Name of the case.
@@ -51,6 +51,11 @@ impl Scene {
     /// Name of the load case that it is.
     pub fn case_name(&self) -> Option<&str> {
         Some(&self.case.as_ref()?.name)
+    }
+
+    /// Name of the load case, or of a scene that is none.
+    pub fn short_name(&self) -> &str {
+        self.case_name().unwrap_or(&self.name)
     }
 
     /// The same for a body that has only `modes` (from 0, ascending) of the one that it was written for.

@@ -2,7 +2,7 @@
 
 use super::lively::{LivelyNodes, along_principal_directions, longest};
 use super::peak::Peak;
-use super::{Extremes, Tolerance, Trace};
+use super::{Extremes, PerQuantity, Tolerance, Trace};
 use crate::dynamics::EulerParameters;
 use faer::MatRef;
 use flexbody_body::flex_body::FlexBody;
@@ -29,46 +29,21 @@ const MATTERS: f64 = 0.1;
 /// Force and torque.
 type Reaction = (Vector3<f64>, Vector3<f64>);
 
-/// Largest errors over the continuous motion. `None`: the reference has nothing of it.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct OutputErrors {
-    /// Angle between the frames, radians.
-    pub attitude: f64,
-    /// Difference of deflections of the watched points in body axes, relative to the largest deflection of
-    /// any of them or to the least that counts ([`Resolution`](super::Resolution)). Without watched points:
-    /// of the nodes that move most in some mode along some axis.
-    pub deflection: Option<f64>,
-    /// sqrt(V(u - u_ref) / max V(u_ref)), V being the elastic energy of a deformation; the least energy that
-    /// counts instead of the largest where that is less.
-    pub stress: Option<f64>,
-    /// Difference of force F, or torque T, that the prescribed motion takes, relative to the largest force, or
-    /// torque, or to a thousandth of w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2, or to a
-    /// hundredth of the largest T / r, or F r.
-    pub reaction: Option<f64>,
-}
+/// Largest errors over the continuous motion. `None`: the reference has nothing of it. There is always an attitude.
+pub type OutputErrors = PerQuantity<Option<f64>>;
 
 impl OutputErrors {
     /// The largest ratio of error to tolerance.
     pub fn worst(&self, tolerance: &Tolerance) -> f64 {
-        let ratio = |error: Option<f64>, allowed: f64| error.map_or(0.0, |error| error / allowed);
-        let ratios = [
-            self.attitude / tolerance.attitude,
-            ratio(self.deflection, tolerance.deflection),
-            ratio(self.stress, tolerance.stress),
-            ratio(self.reaction, tolerance.reaction),
-        ];
-        ratios.into_iter().fold(0.0, larger)
+        let ratio = |(error, allowed): (Option<f64>, f64)| error.map_or(0.0, |error| error / allowed);
+        let ratios = self.zip(tolerance.errors).map(ratio).named();
+        ratios.into_iter().fold(0.0, |largest, (_, ratio)| larger(largest, ratio))
     }
 
     /// The output whose error is largest beside its tolerance: its name, the error, and the tolerance.
     pub fn decisive(&self, tolerance: &Tolerance) -> (&'static str, f64, f64) {
-        let all = [
-            ("attitude", Some(self.attitude), tolerance.attitude),
-            ("deflection", self.deflection, tolerance.deflection),
-            ("stress", self.stress, tolerance.stress),
-            ("reaction", self.reaction, tolerance.reaction),
-        ];
-        let there = all.into_iter().filter_map(|(name, error, allowed)| Some((name, error?, allowed)));
+        let all = self.zip(tolerance.errors).named().into_iter();
+        let there = all.filter_map(|(name, (error, allowed))| Some((name, error?, allowed)));
         // NaN is the largest of all.
         let ratio = |(_, error, allowed): &(&str, f64, f64)| error / allowed;
         there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
@@ -76,13 +51,7 @@ impl OutputErrors {
 
     /// The larger of each error of two motions.
     pub fn larger_of(self, other: Self) -> Self {
-        let larger_of = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(larger);
-        Self {
-            attitude: larger(self.attitude, other.attitude),
-            deflection: larger_of(self.deflection, other.deflection),
-            stress: larger_of(self.stress, other.stress),
-            reaction: larger_of(self.reaction, other.reaction),
-        }
+        self.zip(other).map(|(a, b)| a.into_iter().chain(b).reduce(larger))
     }
 
     /// Whether every error is within its tolerance.
@@ -96,26 +65,15 @@ impl OutputErrors {
 pub struct ErrorHistory {
     /// Where the motion was looked at.
     pub time: Vec<f64>,
-    /// Errors of the attitude.
-    pub attitude: Vec<f64>,
-    /// Errors of the deflections.
-    pub deflection: Option<Vec<f64>>,
-    /// Errors of the elastic energy.
-    pub stress: Option<Vec<f64>>,
-    /// Errors of force and torque.
-    pub reaction: Option<Vec<f64>>,
+    /// Errors of each quantity there.
+    pub errors: PerQuantity<Option<Vec<f64>>>,
 }
 
 impl ErrorHistory {
     /// The largest errors, also between the places where the motion was looked at.
     pub fn largest(&self) -> OutputErrors {
         let peak = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
-        OutputErrors {
-            attitude: peak(&self.attitude),
-            deflection: self.deflection.as_deref().map(peak),
-            stress: self.stress.as_deref().map(peak),
-            reaction: self.reaction.as_deref().map(peak),
-        }
+        self.errors.as_ref().map(|history| history.as_deref().map(peak))
     }
 
     /// How much more the errors grow from the first half of the run to the second than `motion`, that of the
@@ -129,11 +87,12 @@ impl ErrorHistory {
         let energies: Vec<f64> = motion.elastic.iter().map(|energy| not_negative(*energy).sqrt()).collect();
         let motion = growth(self.halves(&energies), 0.0)?;
         // The attitude has no amplitude: it grows when it grows.
-        let attitude = growth(self.halves(&self.attitude), tolerance.attitude);
-        let deformation = [(&self.deflection, tolerance.deflection), (&self.stress, tolerance.stress)];
-        let beyond_motion = deformation.into_iter().filter_map(|(errors, allowed)| {
-            Some(growth(self.halves(errors.as_ref()?), allowed)? / motion.max(1.0))
-        });
+        let own = |(errors, allowed): (&Option<Vec<f64>>, f64)| {
+            errors.as_ref().and_then(|errors| growth(self.halves(errors), allowed))
+        };
+        let PerQuantity { attitude, deflection, stress, .. } =
+            self.errors.as_ref().zip(tolerance.errors).map(own);
+        let beyond_motion = [deflection, stress].into_iter().flatten().map(|growth| growth / motion.max(1.0));
         let most = beyond_motion.chain(attitude).reduce(f64::max);
         most.filter(|growth| *growth > GROWING)
     }
@@ -172,10 +131,12 @@ impl ErrorHistory {
         let stress = apart.energy.iter().map(|energy| energy.sqrt()).collect();
         Self {
             time: reference.time.clone(),
-            attitude: attitudes.map(|(a, b)| angle(a, b)).collect(),
-            deflection: relative(deflection, scale.max(reference.resolution.deflection)),
-            stress: relative(stress, energy.max(reference.resolution.root_energy)),
-            reaction: reactions(reference, candidate),
+            errors: PerQuantity {
+                attitude: Some(attitudes.map(|(a, b)| angle(a, b)).collect()),
+                deflection: relative(deflection, scale.max(reference.resolution.deflection)),
+                stress: relative(stress, energy.max(reference.resolution.root_energy)),
+                reaction: reactions(reference, candidate),
+            },
         }
     }
 }

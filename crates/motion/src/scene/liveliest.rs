@@ -13,7 +13,7 @@ const UNEVEN: f64 = 8.0;
 pub fn liveliest_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
     let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
-    let tolerance = &scene.requirements.tolerance;
+    let tolerance = &scene.requirements.tolerance.errors;
     let least = part * tolerance.stress.min(tolerance.deflection) * roots.fold(0.0, f64::max);
     let own = accelerations(motion, rates.len());
     let counts = |j: &usize| own[*j] > 0.0 && own[*j] / rates[*j] >= least;

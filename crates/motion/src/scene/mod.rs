@@ -14,8 +14,10 @@ mod inertia_share;
 mod instants;
 mod liveliest;
 mod lively;
+mod load_cases;
 mod nodal_point;
 mod peak;
+mod per_quantity;
 mod prepared;
 mod read;
 mod read_attitude;
@@ -37,7 +39,7 @@ mod vector_history;
 
 pub use axes::Axes;
 pub use description::{
-    Carried, CarriedSpin, Drive, Initial, Load, LoadCase, ModeStart, Point, Run, Scene, Scheme, SeriesFile,
+    Carried, CarriedSpin, CaseName, Drive, Initial, Load, ModeStart, Point, Run, Scene, Scheme, SeriesFile,
     Spin,
 };
 pub use driving::Driving;
@@ -49,10 +51,11 @@ pub use history::History;
 pub use inertia_share::inertia_share;
 pub use instants::{Instant, instants};
 pub use liveliest::liveliest_rate;
+pub use load_cases::LoadCases;
 pub use nodal_point::{find_nodal_point, nodal_point};
 pub use peak::Peak;
+pub use per_quantity::PerQuantity;
 pub use prepared::{damped, damped_once, ends_a_run};
-pub use read_cases::{read_case, read_cases, read_scene};
 pub use recording::{Path, Recording, Resolution, Setting};
 pub use requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
 pub use samples::{Interpolation, Sample, Samples, Sizes};

@@ -2,9 +2,9 @@
 //! its place.
 
 use super::read::{TOP, scene};
-use super::{LoadCase, Scene, read_requirements};
+use super::{CaseName, Scene, read_requirements};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::error::{Error, Result};
+use flexbody_base::error::Result;
 use flexbody_base::text::walk::{Table, Value, Walk, read_toml};
 use std::ops::Range;
 use std::path::Path;
@@ -21,56 +21,13 @@ const ADDED: &[&str] = &["load", "watch"];
 /// What a body is made with belongs to all cases.
 const ONLY_COMMON: &[&str] = &["case", "cost"];
 
-/// Reads the load cases of a scene file, in its order; of a file without `[[case]]` that is one scene.
-///
-/// # Errors
-/// FB101, FB106 when it or a file of its histories cannot be read; FB211 for syntax, unknown, missing or
-/// mistyped keys and values that cannot be; FB213 for what contradicts itself; FB215 to FB217 for what is
-/// wrong in files of histories. All of them, in the order of lines.
-pub fn read_cases(path: impl AsRef<Path>) -> Result<Vec<Scene>> {
-    let path = path.as_ref();
+/// Reads the load cases of a scene file in its order, one or more; a file without `[[case]]` is a single scene.
+pub(super) fn read_cases(path: &Path) -> Result<Vec<Scene>> {
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     read_toml(path, "scene", Code::SceneSyntax, |walk, top| match top.get("case") {
         None => Some(vec![scene(walk, top, stem)?]),
         Some(list) => cases(walk, top, list, stem),
     })
-}
-
-/// Reads the case of that name, or with `None` a scene that has no cases.
-///
-/// # Errors
-/// Those of [`read_cases`]; FB219 where the scene has no case of that name, or has several and none is named.
-pub fn read_case(path: impl AsRef<Path>, name: Option<&str>) -> Result<Scene> {
-    let path = path.as_ref();
-    let mut scenes = read_cases(path)?;
-    let names: Vec<&str> = scenes.iter().filter_map(Scene::case_name).collect();
-    let refused = |message: String| Error::from(Diagnostic::new(Code::SceneCase, message).in_file(path));
-    let at = match (name, &names[..]) {
-        (None, []) => 0,
-        (None, names) => {
-            let message = format!("the scene has the load cases {}, and one is needed", names.join(", "));
-            return Err(refused(message));
-        }
-        (Some(name), []) => {
-            let message = format!("there is no case `{name}`: the scene has no cases");
-            let diagnostic = Diagnostic::new(Code::SceneCase, message).in_file(path);
-            return Err(diagnostic.with_help("leave --case out").into());
-        }
-        (Some(name), names) => {
-            let unknown =
-                || refused(format!("there is no case `{name}`: the scene has {}", names.join(", ")));
-            names.iter().position(|other| *other == name).ok_or_else(unknown)?
-        }
-    };
-    Ok(scenes.swap_remove(at))
-}
-
-/// Reads a scene that has no load cases.
-///
-/// # Errors
-/// As [`read_case`].
-pub fn read_scene(path: impl AsRef<Path>) -> Result<Scene> {
-    read_case(path, None)
 }
 
 /// `None` only with something in `found`, as everything here.
@@ -97,7 +54,7 @@ fn cases(walk: &mut Walk<'_>, top: &Table<'_>, list: &Value<'_>, stem: String) -
     refuse_some_without_run(walk, &scenes, &names, &spans);
     let whole = whole?;
     for (scene, name) in scenes.iter_mut().zip(names) {
-        scene.case = Some(LoadCase { scene: whole.clone(), name });
+        scene.case = Some(CaseName { scene: whole.clone(), name });
     }
     Some(scenes)
 }

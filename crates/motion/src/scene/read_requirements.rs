@@ -1,6 +1,7 @@
 //! Reads the tables of a scene that say what is demanded of the body.
 
 use super::Axes;
+use super::PerQuantity;
 use super::read_numbers::{finite, place_of, positive};
 use super::read_values::{axes, list, mode_number, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
@@ -119,21 +120,12 @@ impl Section<'_, '_> {
 
     fn tolerance(&mut self) -> Option<Tolerance> {
         let default = Tolerance::default();
-        let [attitude, deflection, stress, reaction] = [
-            ("attitude", default.attitude),
-            ("deflection", default.deflection),
-            ("stress", default.stress),
-            ("reaction", default.reaction),
-        ]
-        .map(|(key, default)| Some(self.optional(key)?.unwrap_or(default)));
+        let mut or_default = |(key, default)| Some(self.optional(key)?.unwrap_or(default));
+        let [attitude, deflection, stress, reaction] = default.errors.named().map(&mut or_default);
         let least_deflection = self.optional("least_deflection");
-        Some(Tolerance {
-            attitude: attitude?,
-            deflection: deflection?,
-            stress: stress?,
-            reaction: reaction?,
-            least_deflection: least_deflection?,
-        })
+        let (attitude, deflection) = (attitude?, deflection?);
+        let errors = PerQuantity { attitude, deflection, stress: stress?, reaction: reaction? };
+        Some(Tolerance { errors, least_deflection: least_deflection? })
     }
 
     fn multiplications(&mut self) -> Option<usize> {

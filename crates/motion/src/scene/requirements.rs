@@ -1,7 +1,7 @@
 //! What a scene demands of a body, and what it says about motion that nobody simulates. All of it is
 //! optional.
 
-use super::Axes;
+use super::{Axes, PerQuantity};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -155,15 +155,9 @@ pub struct Limits {
 /// Largest errors of what a simulation is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Tolerance {
-    /// Attitude of the frame in radians, at any time.
-    pub attitude: f64,
-    /// Deflection of watched points, relative to the largest of any of them.
-    pub deflection: f64,
-    /// Root of the elastic energy of the error relative to the largest of the motion: stresses, as far as a
-    /// body without stress recovery knows them.
-    pub stress: f64,
-    /// Force and torque that a prescribed spin takes, relative to their largest.
-    pub reaction: f64,
+    /// Largest error of each quantity, at any time.
+    #[serde(flatten)]
+    pub errors: PerQuantity<f64>,
     /// Least deflection that counts ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent of the
     /// body.
     pub least_deflection: Option<f64>,
@@ -172,6 +166,6 @@ pub struct Tolerance {
 impl Default for Tolerance {
     /// A thousandth of a radian and one per cent: below what material data and damping are known to.
     fn default() -> Self {
-        Self { attitude: 1e-3, deflection: 0.01, stress: 0.01, reaction: 0.01, least_deflection: None }
+        Self { errors: PerQuantity { attitude: 1e-3, ..PerQuantity::all(0.01) }, least_deflection: None }
     }
 }

@@ -4,7 +4,7 @@ use flexbody_base::error::Error;
 use flexbody_body::flex_body::{FlexBody, GeometricStiffness, LoadKind, UnitLoad};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_model::{Coupling, NodeSet, RawModel};
-use flexbody_motion::scene::{Recording, Scene, read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
 use nalgebra::{DMatrix, DVector};
 use oracle::elements::{Kind, MassRule, Material};
 use oracle::flexible::{body_of, fixture};
@@ -37,7 +37,7 @@ fn scene(text: &str) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    read_scene(&path).expect("a scene")
+    LoadCases::read_single(&path, None).expect("a scene")
 }
 
 fn run(body: &FlexBody, text: &str) -> Result<Recording, Error> {

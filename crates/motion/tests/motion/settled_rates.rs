@@ -3,7 +3,7 @@
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
-use flexbody_motion::scene::{Scene, read_scene, simulate, unsettled_rate};
+use flexbody_motion::scene::{LoadCases, Scene, simulate, unsettled_rate};
 use oracle::elements::{Kind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::mesh::Mesh;
@@ -23,7 +23,7 @@ fn turning(tolerance: f64, duration: f64, rates: [f64; 3]) -> Scene {
         rates.map(|rate| rate / duration)
     );
     std::fs::write(&path, text).expect("written");
-    read_scene(&path).expect("a scene")
+    LoadCases::read_single(&path, None).expect("a scene")
 }
 
 /// Rates about the axis, and what is told of them.

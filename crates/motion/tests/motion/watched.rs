@@ -9,7 +9,7 @@ use flexbody_eigen::Wanted;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Damping, FeModel, RawMatrix, RawModel};
 use flexbody_motion::dynamics::{NodalEquations, NodalEvaluation, NodalModes, ReferenceConditions};
-use flexbody_motion::scene::{ModeStart, Path, Point, Recording, Scene, read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, ModeStart, Path, Point, Recording, Scene, simulate};
 use nalgebra::Vector3;
 use oracle::elements::Kind;
 use oracle::flexible::fixture;
@@ -22,7 +22,7 @@ fn scene(text: &str) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, text).expect("written");
-    read_scene(path).expect("a scene")
+    LoadCases::read_single(path, None).expect("a scene")
 }
 
 fn recorded(body: &FlexBody, scene: &Scene) -> Recording {

@@ -5,7 +5,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_motion::dynamics::{EulerParameters, Orientation, RotationVector};
-use flexbody_motion::scene::{Recording, read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, Recording, simulate};
 use flexbody_report::simulation_csv;
 use nalgebra::{Matrix3, Vector3};
 use oracle::brackets::footed_block;
@@ -26,7 +26,7 @@ fn run(body: &FlexBody, text: &str, files: &[(&str, &str)]) -> Recording {
     }
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    let scene = read_scene(&path).unwrap_or_else(|error| panic!("{error}\n{text}"));
+    let scene = LoadCases::read_single(&path, None).unwrap_or_else(|error| panic!("{error}\n{text}"));
     simulate(body, &scene, None, |_| ()).unwrap_or_else(|error| panic!("{error}\n{text}")).0
 }
 
@@ -319,7 +319,7 @@ fn a_file_covers_the_run_or_the_scene_says_what_is_outside() {
     let place = |text: &str, rows: &str| {
         fs::write(folder.path().join("F.csv"), rows).expect("written");
         fs::write(folder.path().join("scene.toml"), text).expect("written");
-        read_scene(folder.path().join("scene.toml"))
+        LoadCases::read_single(folder.path().join("scene.toml"), None)
     };
     let scene = |rest: &str| {
         format!(
@@ -372,7 +372,7 @@ fn rows_that_rounding_alone_tells_apart_are_refused() {
     let read = |scene: &str, rows: &str| {
         fs::write(place.join("rows.csv"), rows).expect("written");
         fs::write(place.join("scene.toml"), scene).expect("written");
-        read_scene(place.join("scene.toml"))
+        LoadCases::read_single(place.join("scene.toml"), None)
     };
     let rows = |time: &str| {
         let values = ["1,0,0,0", "1,1e-9,0,0", "1,2e-9,0,0", "1,3e-9,0,0"];

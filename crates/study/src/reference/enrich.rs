@@ -7,7 +7,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_linalg::side_by_side;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::Scene;
+use flexbody_motion::scene::{LoadCases, Scene};
 
 /// What a body still lacks, relative to the one before it, for its modes to be worth their cost: the first
 /// responses may leave most of what has inertia to those of the next round.
@@ -43,87 +43,53 @@ impl Enrichment {
     }
 }
 
-/// A body with what it lacks of its model in a scene.
+/// A body that is enriched for the load cases of a scene.
 #[derive(Debug, Clone)]
 pub struct Enriched<B> {
     /// What the body was last made as.
     pub made: B,
-    /// What every body on the way lacked, the last one that of `made`; empty where nothing can be said.
-    pub rounds: Vec<ReferenceError>,
-}
-
-impl<B> Enriched<B> {
-    /// What the body lacks.
-    pub fn error(&self) -> Option<&ReferenceError> {
-        self.rounds.last()
-    }
-}
-
-/// A body that is enriched for several load cases, with what it lacks of its model in each.
-#[derive(Debug, Clone)]
-pub struct EnrichedForCases<B> {
-    /// What the body was last made as.
-    pub made: B,
-    /// For each case what every body on the way lacked, the last one that of `made`; empty where nothing can
-    /// be said.
+    /// For each load case the estimated errors of every body on the way, the last one that of `made`; empty where
+    /// nothing can be estimated.
     pub rounds: Vec<Vec<ReferenceError>>,
 }
 
 /// Makes a body of `model` with `make`, which gets nodal forces (N x k) whose static responses the body shall
 /// have beside its modes, none at first. As long as the body lacks more than [`Enrichment::enough`] of the
-/// tolerances of `scene` in its own motion, the forces that its motion leaves unbalanced at the nodes join
-/// these, while that pays.
+/// tolerances of a load case in its own motion, the forces that its motion leaves unbalanced at the nodes join
+/// these, while that pays in one of them. A case in which it no longer pays asks for nothing more.
 ///
 /// # Errors
 /// Those of `make` and of [`trace`](flexbody_motion::scene::trace).
 pub fn enrich<B>(
     model: &FeModel,
-    scene: &Scene,
-    enrichment: Enrichment,
-    watch: Watch<'_>,
-    make: impl FnMut(&Mat<f64>) -> Result<B>,
-    body: impl Fn(&B) -> &FlexBody,
-) -> Result<Enriched<B>> {
-    let scenes = std::slice::from_ref(scene);
-    let EnrichedForCases { made, rounds } = enrich_for_cases(model, scenes, enrichment, watch, make, body)?;
-    Ok(Enriched { made, rounds: rounds.into_iter().next().unwrap_or_default() })
-}
-
-/// The same for the load cases `scenes`: what joins the body is what it lacks in any of them, while that pays
-/// in one of them. A case in which it no longer pays asks for nothing more.
-///
-/// # Errors
-/// As [`enrich`].
-pub fn enrich_for_cases<B>(
-    model: &FeModel,
-    scenes: &[Scene],
+    cases: &LoadCases,
     enrichment: Enrichment,
     watch: Watch<'_>,
     mut make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
-) -> Result<EnrichedForCases<B>> {
+) -> Result<Enriched<B>> {
     let refuse = |scene: &Scene| scene.requirements.refuse_damping_beside(model, &scene.name);
-    scenes.iter().try_for_each(refuse)?;
+    cases.iter().try_for_each(refuse)?;
     let mut loads = Mat::zeros(model.rows().len(), 0);
     let mut made = make(&loads)?;
-    let mut cases = vec![Asking::default(); scenes.len()];
+    let mut asking = vec![Asking::default(); cases.len()];
     let mut poorer = None;
     let (enough, most_rounds) = (enrichment.enough(), enrichment.most_rounds());
     for round in 0..=most_rounds {
         watch(Event::Phase("what the body lacks of the model"));
         let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, enrichment.memory);
-        let estimates = scenes.iter().map(estimate).collect::<Result<Vec<_>>>()?;
+        let estimates = cases.iter().map(estimate).collect::<Result<Vec<_>>>()?;
         if estimates.iter().all(Option::is_none) {
             break;
         }
-        let paid = cases.iter().zip(&estimates).any(|(case, own)| case.was_paid(own.as_ref()));
+        let paid = asking.iter().zip(&estimates).any(|(case, own)| case.was_paid(own.as_ref()));
         if let (Some(earlier), false) = (poorer.take(), paid) {
             // A shock excites modes without end: no number of responses follows it.
             made = earlier;
             break;
         }
         let mut wanted = vec![loads];
-        for (case, estimate) in cases.iter_mut().zip(estimates) {
+        for (case, estimate) in asking.iter_mut().zip(estimates) {
             wanted.extend(estimate.and_then(|estimate| case.hear(estimate, enough)));
         }
         let is_done = wanted.len() == 1;
@@ -133,7 +99,7 @@ pub fn enrich_for_cases<B>(
         }
         poorer = Some(std::mem::replace(&mut made, make(&loads)?));
     }
-    Ok(EnrichedForCases { made, rounds: cases.into_iter().map(|case| case.rounds).collect() })
+    Ok(Enriched { made, rounds: asking.into_iter().map(|case| case.rounds).collect() })
 }
 
 /// What a load case has asked for so far.

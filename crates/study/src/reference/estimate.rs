@@ -98,7 +98,7 @@ impl ReferenceError {
     /// The errors of a body of so many modes of which nothing is known.
     fn unknown(modes: usize, reason: &'static str) -> Self {
         let all = f64::INFINITY;
-        let errors = OutputErrors { attitude: all, deflection: Some(all), stress: Some(all), reaction: None };
+        let errors = OutputErrors { reaction: None, ..OutputErrors::all(Some(all)) };
         Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason), coupling: None }
     }
 
@@ -217,7 +217,7 @@ impl Beside<'_> {
     fn estimate(&self, view: &NodalView<'_>, allowed: f64) -> Result<Estimate> {
         let &Self { body, scene, motion, grid, looked_at, watched } = self;
         let tolerance = &scene.requirements.tolerance;
-        let least = tolerance.stress.min(tolerance.deflection);
+        let least = tolerance.errors.stress.min(tolerance.errors.deflection);
         let question = Question {
             settled: scene.initial.settled,
             negligible: PART_OF_RESONANCE * least * energy_scale(motion),

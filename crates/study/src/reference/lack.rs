@@ -89,7 +89,7 @@ impl<'a> Lack<'a> {
         let (stress, time) = self.stress(motion);
         let free = !scene.prescribes();
         let errors = OutputErrors {
-            attitude: if free { self.attitude() } else { 0.0 },
+            attitude: Some(if free { self.attitude() } else { 0.0 }),
             deflection: self.deflection(motion, watched),
             stress: Some(stress),
             reaction: if free { None } else { self.reaction(scene, motion) },

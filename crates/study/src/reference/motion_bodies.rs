@@ -6,9 +6,11 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::BasisChoice;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::{Measure, OtherModes, OutputErrors, Scene, Stage, Trace, trace, trace_at};
+use flexbody_motion::scene::{
+    LoadCases, Measure, OtherModes, OutputErrors, Scene, Stage, Trace, trace, trace_at,
+};
 
-/// The motions of a body in one or several scenes, and what bodies of their shapes make of them.
+/// The motions of a body in load cases, and what bodies of their shapes make of them.
 pub struct MotionBodies<'m> {
     model: &'m FeModel,
     reference: &'m FlexBody,
@@ -37,21 +39,21 @@ pub struct Fewest<B> {
 }
 
 impl<'m> MotionBodies<'m> {
-    /// Of the motions of `reference`, made of `model`, in `scenes`. `None` where there are no shapes of them.
+    /// Of the motions of `reference`, made of `model`, in `cases`. `None` where there are no shapes of them.
     ///
     /// # Errors
     /// Those of [`trace`].
     pub fn new(
         model: &'m FeModel,
         reference: &'m FlexBody,
-        scenes: &'m [Scene],
+        cases: &'m LoadCases,
         memory: Option<u64>,
     ) -> Result<Option<Self>> {
         let case = |scene: &'m Scene| -> Result<Case<'m>> {
             let (motion, _) = trace(reference, scene, memory, |_| ())?;
             Ok(Case { scene, staged: Stage::new(reference, scene)?.body.into_owned(), motion })
         };
-        let cases = scenes.iter().map(case).collect::<Result<Vec<_>>>()?;
+        let cases = cases.iter().map(case).collect::<Result<Vec<_>>>()?;
         let motions: Vec<_> = cases.iter().map(|case| (case.scene, &case.motion)).collect();
         let shapes = MotionShapes::new(model, reference, &motions)?;
         Ok(shapes.map(|shapes| Self { model, reference, cases, shapes }))

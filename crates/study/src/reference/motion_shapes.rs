@@ -95,7 +95,7 @@ fn weighed(lower: &Mat<f64>, scene: &Scene, motion: &Trace) -> Mat<f64> {
     let instants = Mat::from_fn(lower.nrows(), motion.q.len(), |j, i| motion.q[i][j]);
     let weighted = gram(lower.as_ref(), instants.as_ref());
     let largest = (0..weighted.ncols()).map(|i| weighted.col(i).norm_l2()).fold(0.0, larger);
-    let tolerance = &scene.requirements.tolerance;
+    let tolerance = &scene.requirements.tolerance.errors;
     let unit = largest * tolerance.stress.min(tolerance.deflection);
     // Of a body that stays rigid there is nothing to be left out.
     if unit > 0.0 { weighted * faer::Scale(unit.recip()) } else { weighted }

@@ -1,6 +1,6 @@
 //! What a scene asks of a basis before there is one.
 
-use flexbody_motion::scene::{Load, Point, Scene};
+use flexbody_motion::scene::{Load, LoadCases, Point, Scene};
 use std::f64::consts::TAU;
 
 /// The loads of a scene whose static responses belong into a basis, so that no more modes are needed than the
@@ -14,9 +14,9 @@ pub struct WantedResponses {
 }
 
 impl WantedResponses {
-    /// The responses that any of `scenes` wants.
-    pub fn of_any(scenes: &[Scene]) -> Self {
-        scenes.iter().map(Self::of).fold(Self::default(), |all, own| Self {
+    /// The responses that any of the load cases wants.
+    pub fn of_any(cases: &LoadCases) -> Self {
+        cases.iter().map(Self::of).fold(Self::default(), |all, own| Self {
             centrifugal: all.centrifugal || own.centrifugal,
             interfaces: all.interfaces || own.interfaces,
         })
@@ -39,8 +39,8 @@ impl WantedResponses {
 /// statically.
 pub const BEYOND_BAND: f64 = 2.0;
 
-/// lambda up to which free modes are wanted: by the highest band of `scenes`, where one of them has a band.
-pub fn largest_eigenvalue(scenes: &[Scene]) -> Option<f64> {
-    let bands = scenes.iter().filter_map(|scene| scene.requirements.band);
+/// lambda up to which free modes are wanted: by the highest band of the load cases, where one of them has a band.
+pub fn largest_eigenvalue(cases: &LoadCases) -> Option<f64> {
+    let bands = cases.iter().filter_map(|scene| scene.requirements.band);
     bands.reduce(f64::max).map(|band| (TAU * BEYOND_BAND * band).powi(2))
 }

@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Groups};
 use flexbody_motion::dynamics::BodyPoint;
-use flexbody_motion::scene::{Scene, Stage, Tolerance, damped_once, points_of};
+use flexbody_motion::scene::{PerQuantity, Scene, Stage, Tolerance, damped_once, points_of};
 use std::borrow::Cow;
 
 /// A body and a scene on their stage, and the scenes that a model is tried in: this one, and where it allows
@@ -53,15 +53,20 @@ pub(super) struct Demand<'c> {
 }
 
 impl<'c> Demand<'c> {
-    /// Of one scene; `tier_1` says whether bounds may use norms of the invariants.
-    pub(super) fn new(stage: &'c OnStage<'_>, memory: Option<u64>, tier_1: bool) -> Result<Self> {
+    /// Of the load case `name`; `tier_1` says whether bounds may use norms of the invariants.
+    pub(super) fn new(
+        stage: &'c OnStage<'_>,
+        name: Option<&'c str>,
+        memory: Option<u64>,
+        tier_1: bool,
+    ) -> Result<Self> {
         let (body, scene) = (&*stage.body, &*stage.scene);
         let (loads, _) = points_of(body, scene)?;
         let cases =
             stage.scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
         let bounds = bounded(&cases, tier_1)?;
         Ok(Self {
-            name: None,
+            name,
             body,
             scene,
             situation: Situation::new(body, scene, &loads),
@@ -94,7 +99,7 @@ impl<'c> Demand<'c> {
         }
         // What is measured is relative to a motion that may be larger than that of the whole body by as much
         // as bounds allow.
-        let Tolerance { deflection, stress, reaction, .. } = *self.tolerance();
+        let PerQuantity { deflection, stress, reaction, .. } = self.tolerance().errors;
         (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
     }
 

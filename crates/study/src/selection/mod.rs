@@ -28,7 +28,7 @@ pub use decisions::Ground;
 pub use norms::Norms;
 pub use participation::{Participation, participations};
 pub use search::liveliest_modes;
-pub use select::{Selection, rule_out, select, select_for_cases, select_from};
+pub use select::{Selection, rule_out, select};
 pub use significance::{Significance, significances};
 pub use situation::{Input, Situation};
 pub use trial::{ModeShare, Trial, TrialRuns};

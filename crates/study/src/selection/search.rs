@@ -30,8 +30,9 @@ impl Choice {
 
 /// What modes do beside the tolerances.
 fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
-    let weight =
-        |share: &ModeShare| (share.deflection / tolerance.deflection).max(share.stress / tolerance.stress);
+    let weight = |share: &ModeShare| {
+        (share.deflection / tolerance.errors.deflection).max(share.stress / tolerance.errors.stress)
+    };
     shares.iter().map(weight).collect()
 }
 

@@ -13,7 +13,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Groups, TermDecision};
 use flexbody_linalg::progress::{Event, Watch};
-use flexbody_motion::scene::{Scene, Tolerance};
+use flexbody_motion::scene::{LoadCases, PerQuantity};
 
 /// What was decided, and on what grounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,9 +24,8 @@ pub struct Selection {
     pub body: String,
     /// Numbers that the decision follows from.
     pub inputs: Vec<Input>,
-    /// Largest errors that are allowed, of several load cases the least in any; in the order attitude,
-    /// deflection, stress, reaction.
-    pub tolerance: [f64; 4],
+    /// Largest errors that are allowed, of several load cases the least in any.
+    pub tolerance: PerQuantity<f64>,
     /// Sizes of all terms.
     pub significances: Vec<Significance>,
     /// Everything that was tried, in order.
@@ -80,16 +79,16 @@ impl Selection {
 }
 
 /// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in these load
-/// cases, one or more, need not hold. `body` needs to hold none.
+/// cases need not hold. `body` needs to hold none.
 ///
 /// # Errors
 /// FB212 where a scene does not fit the body; those of [`simulate`](flexbody_motion::scene::simulate).
-pub fn rule_out(body: &FlexBody, scenes: &[Scene], memory: Option<u64>) -> Result<Vec<TermDecision>> {
-    if scenes.iter().any(|scene| scene.carried.is_some()) {
+pub fn rule_out(body: &FlexBody, cases: &LoadCases, memory: Option<u64>) -> Result<Vec<TermDecision>> {
+    if cases.iter().any(|scene| scene.carried.is_some()) {
         return Ok(Vec::new());
     }
-    let stages = scenes.iter().map(|scene| on_stage(body, scene, scenes)).collect::<Result<Vec<_>>>()?;
-    let demands = demands(&stages, scenes, memory, false)?;
+    let stages = stages(body, cases)?;
+    let demands = demands(&stages, cases, memory, false)?;
     let passed = |(at, demand): (usize, &Demand<'_>)| {
         let trial = demand.bounds.iter().find(|trial| trial.passed())?;
         Some(Trial { case: Some(at), ..trial.clone() })
@@ -102,58 +101,31 @@ pub fn rule_out(body: &FlexBody, scenes: &[Scene], memory: Option<u64>) -> Resul
     Ok(kept.dropped().map(|group| decision(group, false, largest, &demands, rotation)).collect())
 }
 
-/// The terms and modes of `body` that `scene` needs.
+/// The terms and modes of `body` with which every load case is within its own tolerances.
 ///
 /// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 where these leave half of
 /// the tolerances, else by the error of a motion that is integrated (tier 2), if the scene says how long it
-/// lasts. Where the scene allows faster rotation than its run has, everything holds for the run and for the
-/// run with the rotation scaled to that. Modes are ranked by what they do in the motion, and the fewest are
-/// kept whose motion, with the kept groups, is within the tolerances.
+/// lasts. A group that bounds rule out in some cases is measured in the others. Where a scene allows faster
+/// rotation than its run has, everything holds for the run and for the run with the rotation scaled to that.
+/// Modes are ranked by the most that they do beside the tolerances of any case, and the fewest are kept whose
+/// motion, with the kept groups, is within the tolerances.
+///
+/// * `lacks`: for each load case the known errors of `body`, and of those before it, against the model: what is
+///   left of the tolerances. Nothing is known of cases that it does not reach.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body; those of [`simulate`](flexbody_motion::scene::simulate).
-pub fn select(body: &FlexBody, scene: &Scene, memory: Option<u64>, watch: Watch<'_>) -> Result<Selection> {
-    select_from(body, &[], scene, memory, watch)
-}
-
-/// The same where it is known what `body`, and those before it, lack of the model in this scene: what is left
-/// of the tolerances.
-///
-/// # Errors
-/// As [`select`].
-pub fn select_from(
-    body: &FlexBody,
-    lacks: &[ReferenceError],
-    scene: &Scene,
-    memory: Option<u64>,
-    watch: Watch<'_>,
-) -> Result<Selection> {
-    select_for_cases(body, &[lacks.to_vec()], std::slice::from_ref(scene), memory, watch)
-}
-
-/// The same for the load cases `scenes`: the terms and modes with which every one of them is within its own
-/// tolerances. A group that bounds rule out in some cases is measured in the others; modes are ranked by the
-/// most that they do beside the tolerances of any case.
-///
-/// * `lacks`: for each case as in [`select_from`]; nothing is known of cases that it does not reach.
-///
-/// # Errors
-/// As [`select`].
-///
-/// # Panics
-/// When there is no case.
-pub fn select_for_cases(
+/// FB212 where a scene does not fit the body; those of [`simulate`](flexbody_motion::scene::simulate).
+pub fn select(
     body: &FlexBody,
     lacks: &[Vec<ReferenceError>],
-    scenes: &[Scene],
+    cases: &LoadCases,
     memory: Option<u64>,
     watch: Watch<'_>,
 ) -> Result<Selection> {
-    assert!(!scenes.is_empty(), "a scene to select for");
     body.require_mean_axes("select")?;
-    let stages = scenes.iter().map(|scene| on_stage(body, scene, scenes)).collect::<Result<Vec<_>>>()?;
+    let stages = stages(body, cases)?;
     watch(Event::Phase("bounds"));
-    let mut demands = demands(&stages, scenes, memory, true)?;
+    let mut demands = demands(&stages, cases, memory, true)?;
     for (demand, lacks) in demands.iter_mut().zip(lacks) {
         demand.lacks = lacks;
     }
@@ -170,15 +142,10 @@ pub fn select_for_cases(
     let (terms, grounds): (Vec<_>, Vec<_>) = decided.into_iter().unzip();
     let first = &demands[0];
     Ok(Selection {
-        scene: scenes[0]
-            .case
-            .as_ref()
-            .filter(|_| scenes.len() > 1)
-            .map_or(&first.scene.name, |case| &case.scene)
-            .clone(),
+        scene: cases.name().to_owned(),
         body: first.body.source().name.clone(),
         inputs: inputs(&demands),
-        tolerance: least_tolerances(&demands),
+        tolerance: cases.least_tolerance().errors,
         significances: largest_significances(
             demands.iter().map(|one| significances(&one.situation, one.body)),
         ),
@@ -202,28 +169,20 @@ pub fn select_for_cases(
     })
 }
 
-/// Body and scene on their stage; where there are several load cases, an error says which it belongs to.
-fn on_stage<'s>(body: &'s FlexBody, scene: &'s Scene, scenes: &[Scene]) -> Result<OnStage<'s>> {
-    OnStage::new(body, scene).map_err(|error| match scene.case_name().filter(|_| scenes.len() > 1) {
-        Some(name) => error.about(format!("case `{name}`")),
-        None => error,
-    })
+/// Body and load cases on their stages.
+fn stages<'s>(body: &'s FlexBody, cases: &'s LoadCases) -> Result<Vec<OnStage<'s>>> {
+    let staged = |(at, scene)| OnStage::new(body, scene).map_err(|error| cases.about(at, error));
+    cases.iter().enumerate().map(staged).collect()
 }
 
 fn demands<'d>(
     stages: &'d [OnStage<'_>],
-    scenes: &'d [Scene],
+    cases: &'d LoadCases,
     memory: Option<u64>,
     tier_1: bool,
 ) -> Result<Vec<Demand<'d>>> {
-    let mut demands =
-        stages.iter().map(|stage| Demand::new(stage, memory, tier_1)).collect::<Result<Vec<_>>>()?;
-    if scenes.len() > 1 {
-        for (demand, scene) in demands.iter_mut().zip(scenes) {
-            demand.name = Some(scene.case_name().unwrap_or(&scene.name));
-        }
-    }
-    Ok(demands)
+    let demand = |(at, stage)| Demand::new(stage, cases.case_name(at), memory, tier_1);
+    stages.iter().enumerate().map(demand).collect()
 }
 
 /// Numbers that the decision follows from, with their load cases where there are several.
@@ -236,15 +195,6 @@ fn inputs(demands: &[Demand<'_>]) -> Vec<Input> {
         demand.situation.inputs().map(own)
     };
     demands.iter().flat_map(of).collect()
-}
-
-/// Largest errors that are allowed in all load cases.
-fn least_tolerances(demands: &[Demand<'_>]) -> [f64; 4] {
-    let of = |tolerance: &Tolerance| {
-        [tolerance.attitude, tolerance.deflection, tolerance.stress, tolerance.reaction]
-    };
-    let all = demands.iter().map(|demand| of(demand.tolerance()));
-    all.reduce(|a, b| std::array::from_fn(|i| a[i].min(b[i]))).expect("a scene")
 }
 
 /// What the selected modes lack of static responses; loads that several load cases have stand there once.

@@ -117,7 +117,8 @@ impl TrialRuns<'_> {
     fn liveliest(&self, motion: &Recording) -> f64 {
         let roots: Vec<f64> = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
         let energies = || roots.iter().zip(&motion.extremes.amplitudes).map(|(root, q)| root * q.abs());
-        let least = TAKES_PART * self.scene.requirements.tolerance.stress * energies().fold(0.0, f64::max);
+        let least =
+            TAKES_PART * self.scene.requirements.tolerance.errors.stress * energies().fold(0.0, f64::max);
         let lively = roots.iter().zip(energies()).filter(|(_, energy)| *energy > least);
         lively.map(|(root, _)| *root).fold(0.0, f64::max)
     }
@@ -279,7 +280,7 @@ impl TrialRuns<'_> {
         };
         let least_torque = self.least_torque(driven.rotation.duration);
         OutputErrors {
-            attitude: 0.0,
+            attitude: Some(0.0),
             deflection: Some(relative(self.reach() * error.energy, &paths, least.deflection)),
             stress: Some(relative(error.energy / 2f64.sqrt(), &energies, least.root_energy)),
             reaction: self.scene.spin.is_some().then(|| relative(torque, &torques, least_torque)),

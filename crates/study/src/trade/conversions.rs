@@ -1,7 +1,7 @@
 //! Bodies that the settings of a conversion make of one model.
 
 use super::{Allowed, Source};
-use crate::reference::{EnrichedForCases, Enrichment, MotionBodies, ReferenceError, enrich_for_cases};
+use crate::reference::{Enriched, Enrichment, MotionBodies, ReferenceError, enrich};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -10,7 +10,7 @@ use flexbody_body::convert::{ConvertSettings, Lumping, convert};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_linalg::progress::Watch;
 use flexbody_model::FeModel;
-use flexbody_motion::scene::Scene;
+use flexbody_motion::scene::LoadCases;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::fmt::Write;
@@ -36,35 +36,19 @@ pub struct WantedBodies {
     pub fine: bool,
 }
 
-/// Every conversion of a study in `scene`.
+/// Every conversion of a study in these load cases.
 ///
 /// The reference has twice as many modes as are wanted, residual vectors of spin and interfaces, and what
-/// [`enrich_for_cases`] finds lacking. Beside it stand as many as are wanted, their half and their quarter
+/// [`enrich`] finds lacking in any case. Beside it stand as many as are wanted, their half and their quarter
 /// with residual vectors and without, the same at the other levels of accuracy, bodies of the shapes that the
-/// motion of the reference is made of, and what the settings of the reference make of the model with its
+/// motions of the reference are made of, and what the settings of the reference make of the model with its
 /// whole mass lumped. Each is timed.
 ///
 /// # Errors
-/// Those of [`convert`] and [`enrich_for_cases`]. Accuracy `certified` is left out where it does not cover the
-/// model.
+/// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
 pub fn conversions(
     model: &FeModel,
-    scene: &Scene,
-    wanted: WantedBodies,
-    allowed: Allowed,
-    watch: Watch<'_>,
-) -> Result<Conversions> {
-    conversions_for_cases(model, std::slice::from_ref(scene), wanted, allowed, watch)
-}
-
-/// The same for the load cases `scenes`: the reference has what it lacks in any of them, and shapes are made
-/// of the motions in all of them.
-///
-/// # Errors
-/// As [`conversions`].
-pub fn conversions_for_cases(
-    model: &FeModel,
-    scenes: &[Scene],
+    cases: &LoadCases,
     wanted: WantedBodies,
     allowed: Allowed,
     watch: Watch<'_>,
@@ -79,9 +63,9 @@ pub fn conversions_for_cases(
         making.make(&finest, loads, ConvertSettings::default().lumped)
     };
     let enrichment = Enrichment { memory: allowed.memory, grows: true, is_fine: fine };
-    let enriched = enrich_for_cases(model, scenes, enrichment, watch, make, |(made, _)| made.body())?;
-    let EnrichedForCases { made: (reference, mut diagnostics), rounds: lacks } = enriched;
-    diagnostics.extend(warnings(scenes, &lacks, enrichment.enough()));
+    let enriched = enrich(model, cases, enrichment, watch, make, |(made, _)| made.body())?;
+    let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
+    diagnostics.extend(warnings(cases, &lacks, enrichment.enough()));
     let mut sources = vec![reference];
     for wish in wishes(modes) {
         let source = match making.make(&wish, &Mat::new(), Vec::new()) {
@@ -98,7 +82,7 @@ pub fn conversions_for_cases(
     }
     let lacking = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
     let left: Vec<f64> = lacks.iter().map(|rounds| 1.0 - lacking(rounds)).collect();
-    for source in making.make_of_motion(&sources[0], scenes, &left)? {
+    for source in making.make_of_motion(&sources[0], cases, &left)? {
         sources.push(source.beside(sources[0].body(), model).expect(OF_THE_MODEL));
     }
     for lumping in lumpings(model) {
@@ -111,15 +95,15 @@ pub fn conversions_for_cases(
 }
 
 /// Warnings about what the reference lacks, each with its load case where there are several.
-fn warnings(scenes: &[Scene], lacks: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
-    let of = |(scene, rounds): (&Scene, &Vec<ReferenceError>)| {
-        let warning = rounds.last()?.warning(scene, enough)?;
-        Some(match scene.case_name().filter(|_| scenes.len() > 1) {
+fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
+    let of = |(at, rounds): (usize, &Vec<ReferenceError>)| {
+        let warning = rounds.last()?.warning(&cases[at], enough)?;
+        Some(match cases.case_name(at) {
             Some(name) => warning.about(format!("case `{name}`")),
             None => warning,
         })
     };
-    scenes.iter().zip(lacks).filter_map(of).collect()
+    lacks.iter().enumerate().filter_map(of).collect()
 }
 
 /// Part of what is left of the tolerances that bodies of the fewest shapes may take: the rest is for terms
@@ -235,15 +219,15 @@ impl<'m> Making<'m> {
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
 
-    /// Bodies of the shapes of the motion of `reference` in `scenes`: of the numbers worth trying, and of the
+    /// Bodies of the shapes of the motion of `reference` in `cases`: of the numbers worth trying, and of the
     /// fewest that are good enough where the parts `left` of the tolerances are left to them. Each takes the
     /// time of the reference and its motion besides.
-    fn make_of_motion(&self, reference: &Source, scenes: &[Scene], left: &[f64]) -> Result<Vec<Source>> {
-        if scenes.iter().any(|scene| scene.run.duration.is_none()) {
+    fn make_of_motion(&self, reference: &Source, cases: &LoadCases, left: &[f64]) -> Result<Vec<Source>> {
+        if cases.iter().any(|scene| scene.run.duration.is_none()) {
             return Ok(Vec::new());
         }
         let start = Instant::now();
-        let Some(bodies) = MotionBodies::new(self.model, reference.body(), scenes, self.allowed.memory)?
+        let Some(bodies) = MotionBodies::new(self.model, reference.body(), cases, self.allowed.memory)?
         else {
             return Ok(Vec::new());
         };

@@ -13,7 +13,7 @@ use flexbody_body::flex_body::{FlexBody, Groups, Storage};
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::FeModel;
 use flexbody_motion::integration::Work;
-use flexbody_motion::scene::{Measure, Scene, Tolerance, ends_a_run};
+use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -48,6 +48,8 @@ pub struct Trade {
     pub reference: ReferenceKind,
     /// The load cases; of a scene without there is one.
     pub cases: Vec<TradeCase>,
+    /// The least tolerance of all load cases.
+    pub tolerance: Tolerance,
     /// Multiplications that the scene allows instead.
     pub allowed: Option<usize>,
     /// All candidates; the first is the whole body of the reference.
@@ -86,12 +88,12 @@ impl Trade {
     }
 }
 
-/// Measures every candidate of `sources` in `scene`. The first source is the reference; others are
-/// [`Source::beside`] it.
+/// Measures every candidate of `sources` in each load case, which one body has to serve: a candidate is as good as
+/// it is in the worst. The first source is the reference; others are [`Source::beside`] it.
 ///
 /// Errors are those of the model: all candidates are integrated with the method and the step of the
 /// reference. They are found on all threads; the times of those that somebody may take afterwards, one after
-/// the other. Everything but the times is the same at any number of threads.
+/// the other: the simulations of all cases together. Everything but the times is the same at any number of threads.
 ///
 /// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
 ///
@@ -99,48 +101,31 @@ impl Trade {
 /// Those of [`trace`](flexbody_motion::scene::trace) and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the temporary folder.
 pub fn trade(
     sources: &[Source],
-    scene: &Scene,
+    cases: &LoadCases,
     nodal: Option<&FeModel>,
     settings: &Settings<'_>,
     watch: Watch<'_>,
 ) -> Result<Trade> {
-    trade_for_cases(sources, std::slice::from_ref(scene), nodal, settings, watch)
-}
-
-/// The same for the load cases `scenes`, which one body has to serve: a candidate is measured in each, and as
-/// good as it is in the worst. The simulations of all cases together are what it takes.
-///
-/// # Errors
-/// As [`trade`].
-pub fn trade_for_cases(
-    sources: &[Source],
-    scenes: &[Scene],
-    nodal: Option<&FeModel>,
-    settings: &Settings<'_>,
-    watch: Watch<'_>,
-) -> Result<Trade> {
-    let (Some(source), Some(first)) = (sources.first(), scenes.first()) else {
+    let Some(source) = sources.first() else {
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
     };
-    let several = scenes.len() > 1;
-    let case = |(at, scene): (usize, &Scene)| {
+    let studied = |(at, scene): (usize, &Scene)| {
         let reserved = settings.reserved.get(at).copied().unwrap_or(0.0);
-        let name = several.then(|| scene.case_name().unwrap_or(&scene.name).to_owned());
-        let label = name.clone();
-        StudyCase::new(sources, scene, name, nodal, settings, reserved, watch).map_err(|error| match label {
-            Some(name) => error.about(format!("case `{name}`")),
-            None => error,
-        })
+        let name = cases.case_name(at).map(str::to_owned);
+        StudyCase::new(sources, scene, name, nodal, settings, reserved, watch)
+            .map_err(|error| cases.about(at, error))
     };
-    let cases = scenes.iter().enumerate().map(case).collect::<Result<Vec<_>>>()?;
+    let allowed = cases.iter().filter_map(|scene| scene.requirements.multiplications).min();
+    let (scene, tolerance) = (cases.name().to_owned(), cases.least_tolerance());
+    let cases = cases.iter().enumerate().map(studied).collect::<Result<Vec<_>>>()?;
     let measures = cases.iter().map(StudyCase::measure).collect();
-    let allowed = scenes.iter().filter_map(|scene| scene.requirements.multiplications).min();
     let job = Job { cases: &cases, measures, allowed };
     let rows = job.rows(settings.repeat, watch)?;
     let recommended = Recommendation::new(&rows, allowed);
     let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
-        scene: first.case.as_ref().filter(|_| several).map_or(&first.name, |case| &case.scene).clone(),
+        scene,
+        tolerance,
         body: source.body().source().name.clone(),
         reference: if nodal.is_some() { ReferenceKind::Nodal } else { ReferenceKind::Full },
         allowed,

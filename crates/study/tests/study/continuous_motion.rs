@@ -6,7 +6,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
-    Axes, History, Initial, Load, Point, Recording, Requirements, Run, Scene, Scheme, Stage, Tolerance,
+    Axes, History, Initial, Load, PerQuantity, Point, Recording, Requirements, Run, Scene, Scheme, Stage,
     VectorHistory, simulate,
 };
 use flexbody_study::selection::select;
@@ -110,8 +110,9 @@ fn a_pulse_between_two_instants_is_seen() {
 fn a_selection_for_a_pulse_holds_at_every_instant() {
     let body = soft_block(38);
     let mut scene = scene(&body, 40.0, 100, &pulse(&body, 40.0));
-    scene.requirements.tolerance = Tolerance { deflection: 0.02, stress: 0.05, ..Tolerance::default() };
-    let selection = select(&body, &scene, None, SILENT).expect("a selection");
+    scene.requirements.tolerance.errors.deflection = 0.02;
+    scene.requirements.tolerance.errors.stress = 0.05;
+    let selection = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
     assert!(selection.holds() && selection.modes.len() > 1, "{:?}", selection.modes);
     let own = body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
     scene.run.outputs = 20_000;
@@ -127,8 +128,10 @@ fn a_load_that_is_sampled_once_in_its_period_is_seen() {
     let rate = body.modes().eigenvalue[0].sqrt();
     // As many instants as oscillations: all of them see the same phase.
     let history = History::Sine { amplitude: 1.0, frequency: 5.0 * rate / TAU, phase: 0.0 };
-    let of =
-        |outputs| select(&body, &scene(&body, 20.0, outputs, &history), None, SILENT).expect("a selection");
+    let of = |outputs| {
+        let scene = scene(&body, 20.0, outputs, &history);
+        select(&body, &[], &scene.into(), None, SILENT).expect("a selection")
+    };
     let (sparse, dense) = (of(100), of(20_000));
     assert_eq!(sparse, dense);
 }
@@ -148,13 +151,11 @@ proptest! {
         let whole = &bodies()[of];
         doing.rate *= 0.1;
         let mut scene = doing.scene(whole, free);
-        scene.requirements.tolerance = Tolerance {
-            attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None,
-        };
+        scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
         prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
-        let first = select(whole, &scene, None, SILENT).expect("a selection");
+        let first = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
         scene.run.outputs = outputs;
-        let again = select(whole, &scene, None, SILENT).expect("a selection");
+        let again = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
         prop_assert_eq!(&first, &again);
 
         // What is written is within the extremes, and where it is dense reaches them.

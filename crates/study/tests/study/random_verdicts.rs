@@ -14,10 +14,10 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
-    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Scene, Spin, Stage,
-    Tolerance, Trace, VectorHistory, trace, trace_at,
+    Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, PerQuantity, Point, Scene, Spin,
+    Stage, Trace, VectorHistory, trace, trace_at,
 };
-use flexbody_study::selection::select_from;
+use flexbody_study::selection::select;
 use flexbody_study::tailoring::Tailoring;
 use flexbody_study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
@@ -274,13 +274,7 @@ fn case(seed: u64) -> Case {
         hold: true,
     });
     scene.requirements.damping = (pick(random, 2) == 0).then_some(0.02.into());
-    scene.requirements.tolerance = Tolerance {
-        attitude: tolerance,
-        deflection: tolerance,
-        stress: tolerance,
-        reaction: tolerance,
-        least_deflection: None,
-    };
+    scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
     scale_loads(&mut scene, &probe);
     scene.carried = carried(seed, &model, speed, &probe);
     if scene.carried.is_some() {
@@ -397,15 +391,8 @@ fn errors_beside(
 
 /// Effectivities of an estimate where the true errors count.
 fn effectivities(estimated: &OutputErrors, found: &OutputErrors, tolerance: f64) -> Vec<(&'static str, f64)> {
-    let outputs = [
-        ("attitude", Some(estimated.attitude), Some(found.attitude)),
-        ("deflection", estimated.deflection, found.deflection),
-        ("stress", estimated.stress, found.stress),
-        ("reaction", estimated.reaction, found.reaction),
-    ];
-    outputs
-        .into_iter()
-        .filter_map(|(name, estimated, found)| Some((name, estimated?, found?)))
+    let both = estimated.zip(*found).named().into_iter();
+    both.filter_map(|(name, (estimated, found))| Some((name, estimated?, found?)))
         .filter(|(_, _, found)| *found > COUNTS * tolerance)
         .map(|(name, estimated, found)| (name, estimated / found))
         .collect()
@@ -415,25 +402,27 @@ fn outcome(case: &Case) -> Result<Outcome> {
     let Case { seed, what, model, scene, start, modes } = case;
     let tolerance = scene.requirements.tolerance;
     let tailoring = Tailoring { settings: settings(*modes), by_band: false, of_motion: false };
-    let enriched = tailoring.convert(model, scene, Resume::default(), SILENT)?;
+    let cases = scene.clone().into();
+    let enriched = tailoring.convert(model, &cases, Resume::default(), SILENT)?;
+    let rounds = &enriched.rounds[0];
     let made = &enriched.made.body;
     let plain = convert(model, &settings(*modes), SILENT)?.body;
     let mut effectivity = Vec::new();
-    if let Some(first) = enriched.rounds.first() {
+    if let Some(first) = rounds.first() {
         effectivity.extend(effectivities(
             &first.errors,
             &true_errors(model, &plain, scene)?,
-            tolerance.stress,
+            tolerance.errors.stress,
         ));
     }
-    let selection = select_from(made, &enriched.rounds, scene, None, SILENT)?;
+    let selection = select(made, &enriched.rounds, &cases, None, SILENT)?;
     let stage = Stage::new(made, scene)?;
     let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ())?;
     let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)?;
-    if enriched.rounds.len() > 1 {
+    if rounds.len() > 1 {
         let found = errors_beside(&nodal, &stage.body, &stage.scene, &motion)?;
-        let last = enriched.error().expect("a round");
-        effectivity.extend(effectivities(&last.errors, &found, tolerance.stress));
+        let last = rounds.last().expect("a round");
+        effectivity.extend(effectivities(&last.errors, &found, tolerance.errors.stress));
     }
     let all = stage.body.invariants().groups();
     let small = stage.body.reduced(&selection.modes, all, Vec::new())?;

@@ -5,7 +5,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
-use flexbody_motion::scene::{Recording, Scene, read_scene, simulate};
+use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
 use flexbody_study::selection::select;
 use flexbody_study::trade::{Settings, Source, trade};
 use nalgebra::Vector3;
@@ -21,7 +21,7 @@ fn scene(text: &str) -> Scene {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    read_scene(&path).expect("a scene")
+    LoadCases::read_single(&path, None).expect("a scene")
 }
 
 const POINTS: &str = "[[watch]]\nnode = 3\n[[watch]]\ninterface = \"foot\"\n[[watch]]\nnode = 40\n";
@@ -122,7 +122,9 @@ fn selections_and_studies_do_not_know_the_frame() {
     let bodies = bodies();
     for (name, mut scene) in golden() {
         scene.run.outputs = 20;
-        let selections = bodies.iter().map(|body| select(body, &scene, None, SILENT).expect("a selection"));
+        let selections = bodies
+            .iter()
+            .map(|body| select(body, &[], &scene.clone().into(), None, SILENT).expect("a selection"));
         let selections: Vec<_> = selections.collect();
         for other in &selections[1..] {
             assert_eq!((other.groups, &other.modes), (selections[0].groups, &selections[0].modes), "{name}");
@@ -135,7 +137,7 @@ fn selections_and_studies_do_not_know_the_frame() {
     let settings = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
     let studies = bodies.iter().map(|body| {
         let source = Source::new("body", body.clone(), None).expect("a body");
-        trade(&[source], &scene, None, &settings, SILENT).expect("a study")
+        trade(&[source], &scene.clone().into(), None, &settings, SILENT).expect("a study")
     });
     let studies: Vec<_> = studies.collect();
     for other in &studies[1..] {

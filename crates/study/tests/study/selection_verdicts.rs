@@ -5,7 +5,7 @@ use flexbody_body::flex_body::{FlexBody, Groups};
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
-    AttachmentKind, Measure, MotionRange, Range, Requirements, Scene, Tolerance, simulate, trace, trace_at,
+    AttachmentKind, Measure, MotionRange, PerQuantity, Range, Requirements, Scene, simulate, trace, trace_at,
 };
 use flexbody_study::selection::{Selection, select};
 use nalgebra::Vector3;
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 const INTEGRATION: f64 = 1e-5;
 
 fn selected(body: &FlexBody, scene: &Scene) -> Selection {
-    select(body, scene, None, SILENT).expect("a selection")
+    select(body, &[], &scene.clone().into(), None, SILENT).expect("a selection")
 }
 
 fn reduced(body: &FlexBody, selection: &Selection) -> FlexBody {
@@ -62,8 +62,7 @@ proptest! {
         // Slow enough that something may be dropped, and that the free body stays in one piece.
         doing.rate *= if mild { 1e-3 } else { 0.2 };
         let mut scene = doing.scene(&whole, free);
-        scene.requirements.tolerance =
-            Tolerance { attitude: tolerance, deflection: tolerance, stress: tolerance, reaction: tolerance, least_deflection: None };
+        scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
         let own = match &scene.spin {
             Some(spin) => spin.velocity.largest_until(scene.run.duration.expect("given")).0,
             None => scene.initial.angular_velocity.norm(),

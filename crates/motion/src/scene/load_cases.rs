@@ -1,0 +1,121 @@
+//! The load cases of a scene, from its file to the verdict about a body.
+
+use super::read_cases::read_cases;
+use super::{Scene, Tolerance};
+use flexbody_base::diagnostic::{Code, Diagnostic};
+use flexbody_base::error::{Error, Result};
+use std::ops::Deref;
+use std::path::Path;
+
+/// Load cases that one body has to serve: one or more scenes, in the order of their file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoadCases(Vec<Scene>);
+
+impl From<Scene> for LoadCases {
+    fn from(scene: Scene) -> Self {
+        Self(vec![scene])
+    }
+}
+
+impl Deref for LoadCases {
+    type Target = [Scene];
+
+    fn deref(&self) -> &[Scene] {
+        &self.0
+    }
+}
+
+impl LoadCases {
+    /// Returns the load cases in their order, or `None` for an empty list.
+    pub fn new(cases: Vec<Scene>) -> Option<Self> {
+        (!cases.is_empty()).then_some(Self(cases))
+    }
+
+    /// Reads the load cases of a scene file: the one of the given name, or with `None` all of them. A file without
+    /// `[[case]]` is a single scene.
+    ///
+    /// # Errors
+    /// FB101, FB106 when the scene file or a file of its histories cannot be read; FB211 for syntax, unknown, missing
+    /// or mistyped keys and values that cannot be; FB213 for contradictions; FB215 to FB217 for errors in files of
+    /// histories: all of them, in the order of lines. FB219 when the scene has no case of that name.
+    pub fn read(path: impl AsRef<Path>, case: Option<&str>) -> Result<Self> {
+        let path = path.as_ref();
+        let mut cases = read_cases(path)?;
+        let Some(name) = case else { return Ok(Self(cases)) };
+        let names = names(&cases);
+        match names.iter().position(|other| *other == name) {
+            Some(at) => Ok(cases.swap_remove(at).into()),
+            None => Err(unknown_case(name, &names).in_file(path).into()),
+        }
+    }
+
+    /// Reads the load case of the given name from a scene file, or with `None` a scene without load cases.
+    ///
+    /// # Errors
+    /// Errors of [`LoadCases::read`]; FB219 when the scene has load cases and none is named.
+    pub fn read_single(path: impl AsRef<Path>, case: Option<&str>) -> Result<Scene> {
+        let mut cases = Self::read(&path, case)?;
+        let names = names(&cases);
+        if case.is_none() && !names.is_empty() {
+            return Err(ambiguous(&names).in_file(path).into());
+        }
+        Ok(cases.0.swap_remove(0))
+    }
+
+    /// Returns the only load case.
+    ///
+    /// # Errors
+    /// FB219 when there are several.
+    pub fn single(&self) -> Result<&Scene> {
+        match &self.0[..] {
+            [scene] => Ok(scene),
+            all => Err(ambiguous(&all.iter().map(Scene::short_name).collect::<Vec<_>>()).into()),
+        }
+    }
+
+    /// Name of the scene that the load cases belong to; of a single load case its full name.
+    pub fn name(&self) -> &str {
+        let first = &self.0[0];
+        first.case.as_ref().filter(|_| self.len() > 1).map_or(&first.name, |case| &case.scene)
+    }
+
+    /// Name of a load case (from 0) among several; `None` for a scene alone.
+    pub fn case_name(&self, at: usize) -> Option<&str> {
+        (self.len() > 1).then(|| self.0[at].short_name())
+    }
+
+    /// Adds the name of a load case (from 0) to an error, where there are several.
+    pub fn about(&self, at: usize, error: Error) -> Error {
+        match self.case_name(at) {
+            Some(name) => error.about(format!("case `{name}`")),
+            None => error,
+        }
+    }
+
+    /// The least tolerance of each quantity in any load case, with the least deflection that counts in the first.
+    pub fn least_tolerance(&self) -> Tolerance {
+        self[1..].iter().fold(self[0].requirements.tolerance, |least, scene| {
+            let own = scene.requirements.tolerance.errors;
+            Tolerance { errors: least.errors.zip(own).map(|(a, b)| a.min(b)), ..least }
+        })
+    }
+}
+
+/// Names of the load cases of a scene file; empty for a scene without.
+fn names(cases: &[Scene]) -> Vec<&str> {
+    cases.iter().filter_map(Scene::case_name).collect()
+}
+
+fn ambiguous(names: &[&str]) -> Diagnostic {
+    let message = format!("the scene has the load cases {}, and one is needed", names.join(", "));
+    Diagnostic::new(Code::SceneCase, message)
+}
+
+fn unknown_case(name: &str, names: &[&str]) -> Diagnostic {
+    if names.is_empty() {
+        let message = format!("there is no case `{name}`: the scene has no cases");
+        return Diagnostic::new(Code::SceneCase, message).with_help("leave --case out");
+    }
+    let message = format!("there is no case `{name}`: the scene has {}", names.join(", "));
+    Diagnostic::new(Code::SceneCase, message)
+}
