@@ -85,7 +85,7 @@ fn a_case_is_what_a_scene_of_its_own_is() {
     let place = folder.path();
     written(place);
     let cases = LoadCases::read(place.join("cases.toml"), None).expect("cases");
-    for (mut case, own) in cases.to_vec().into_iter().zip(["slow", "fast"]) {
+    for (mut case, own) in cases.iter().cloned().zip(["slow", "fast"]) {
         assert_eq!(case.case_name(), Some(own));
         let scene = LoadCases::read_single(place.join(own).with_extension("toml"), None).expect("a scene");
         (case.case, case.source) = (None, scene.source.clone());
