@@ -34,7 +34,7 @@ pub use free_surface::{
     FreeSurface, first_eigenvalue_estimate, free_surface, free_surface_resumed, memory_estimate,
 };
 pub use imported::ImportedShapes;
-pub use interface_coordinates::InterfaceCoordinates;
+pub use interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
 pub use oscillating::oscillating_responses;
 pub use residual_vectors::{

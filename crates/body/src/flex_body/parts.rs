@@ -1,6 +1,7 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use super::{FixedInterface, Interface, InterfaceCoordinates, ReferenceConditions, Storage, TermDecision};
+use super::{Interface, ReferenceConditions, Storage, TermDecision};
+use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 use crate::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
 use faer::Mat;
 use flexbody_base::provenance::SourceFile;
@@ -35,18 +36,6 @@ pub enum MassStructure {
     Diagonal,
     /// Neither.
     General,
-}
-
-/// What the modes lack of the static response to a load, relative, in the norm of K.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Truncation {
-    /// Name of the load.
-    pub load: String,
-    /// With the free modes alone.
-    pub before: f64,
-    /// With the residual vectors.
-    pub after: f64,
 }
 
 /// Mode shapes and what is known of each mode.
