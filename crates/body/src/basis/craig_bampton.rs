@@ -16,7 +16,7 @@ use super::interface_rows::{CoupledInterface, coupled_interfaces};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::rigid_modes::rigid_modes;
-use super::{FixedInterface, ModeSettings};
+use super::{BasisKind, FixedInterface, ModeSettings};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -42,8 +42,8 @@ const COPIES: u64 = 20;
 pub struct CraigBampton;
 
 impl Basis for CraigBampton {
-    fn name(&self) -> &'static str {
-        "craig-bampton"
+    fn kind(&self) -> BasisKind {
+        BasisKind::CraigBampton
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {

@@ -14,6 +14,7 @@ mod held_interfaces;
 mod imported;
 mod interface_coordinates;
 mod interface_rows;
+mod kind;
 mod massless;
 mod modal_basis;
 mod nodal_modes;
@@ -35,6 +36,7 @@ pub use free_surface::{
 };
 pub use imported::ImportedShapes;
 pub use interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
+pub use kind::BasisKind;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
 pub use oscillating::oscillating_responses;
 pub use residual_vectors::{

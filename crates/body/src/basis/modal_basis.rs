@@ -1,6 +1,6 @@
 //! What every basis gives, and what is checked of it whichever it is.
 
-use super::{CoordinatesInModelAxes, FixedInterface, ModeSettings};
+use super::{BasisKind, CoordinatesInModelAxes, FixedInterface, ModeSettings};
 use faer::MatRef;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -12,8 +12,8 @@ use flexbody_model::FeModel;
 /// A kind of basis. A new one is one file of this room and one variant of
 /// [`BasisChoice`](super::BasisChoice).
 pub trait Basis {
-    /// Name on the command line and in files.
-    fn name(&self) -> &'static str;
+    /// Kind of the basis, whose name stands in files.
+    fn kind(&self) -> BasisKind;
 
     /// The modes of a model in this basis: mass-normalised, M-orthogonal to the rigid motions, ascending.
     ///

@@ -8,7 +8,7 @@ use crate::flex_body::{
     FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
     Storage,
 };
-use crate::invariants::{Invariants, MassProperties};
+use crate::invariants::{FrameChoice, Invariants, MassProperties};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_eigen::{Counters, Plan, Resume};
@@ -109,9 +109,9 @@ impl ModalModel<'_> {
             dimension: self.model.dimension(),
             units: self.model.units().clone(),
             frame: self.place.frame,
-            conditions: match &self.settings.interface_frame {
-                Some(name) => ReferenceConditions::Interface(name.clone()),
-                None => ReferenceConditions::MeanAxes,
+            conditions: match &self.settings.frame {
+                FrameChoice::Interface(name) => ReferenceConditions::Interface(name.clone()),
+                FrameChoice::Mean(_) => ReferenceConditions::MeanAxes,
             },
             interfaces: self.interfaces.clone(),
             coordinates: self.coordinates(),

@@ -24,7 +24,7 @@ pub use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 pub use crate::invariants::{Frame, Group, Groups};
 pub use body::FlexBody;
 pub use carried::Carrier;
-pub use flexbody_model::{GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
+pub use flexbody_model::{Coupling, GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
 pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::stiffness_about;

@@ -38,6 +38,25 @@ pub enum MassStructure {
     General,
 }
 
+impl MassStructure {
+    /// Every structure, in the order of the documentation.
+    pub const ALL: [Self; 3] = [Self::RotationInvariant, Self::Diagonal, Self::General];
+
+    /// Name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RotationInvariant => "rotation-invariant",
+            Self::Diagonal => "diagonal",
+            Self::General => "general",
+        }
+    }
+
+    /// Returns the structure of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
+    }
+}
+
 /// Mode shapes and what is known of each mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Modes {

@@ -205,7 +205,8 @@ fn craig_bampton(model: &FeModel, count: usize) -> ModalBasis {
 }
 
 fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
-    let settings = ConvertSettings { modes: lowest(count), basis, frame, ..ConvertSettings::default() };
+    let settings =
+        ConvertSettings { modes: lowest(count), basis, frame: frame.into(), ..ConvertSettings::default() };
     convert(model, &settings, SILENT).expect("a body")
 }
 

@@ -16,7 +16,7 @@ fn model(raw: RawModel) -> FeModel {
 
 fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
     let modes = lowest(count);
-    let settings = ConvertSettings { modes, basis, frame, ..ConvertSettings::default() };
+    let settings = ConvertSettings { modes, basis, frame: frame.into(), ..ConvertSettings::default() };
     convert(model, &settings, SILENT).expect("a body")
 }
 
