@@ -109,12 +109,12 @@ mod api;
 mod cli;
 
 pub use api::{
-    Accuracy, Basis, Conversion, ConvertOptions, Coupling, FlexBody, Frame, GeometricStiffness, Identity,
-    Interface, InterfaceCoordinates, Listener, Matrix, Model, ModelBuilder, Motion, PointPath, Progress,
-    ReportFormat, Scene, Selection, SourceFile, SparseMatrix,
+    Accuracy, Basis, BodyFrame, Conversion, ConvertOptions, Coupling, FlexBody, FrameChoice,
+    GeometricStiffness, Identity, Interface, InterfaceCoordinates, Listener, Matrix, Model, ModelBuilder,
+    Motion, PointPath, Progress, ReportFormat, Scene, Selection, SourceFile, SparseMatrix,
 };
 #[cfg(feature = "hdf5")]
-pub use api::{Trade, TradeOptions};
+pub use api::{ReferenceChoice, Trade, TradeOptions};
 /// The reduced equations of motion of one body, as a reference for other programs: mass matrix, velocity
 /// forces, accelerations, momenta, energies (theory sections 2 and 6). [`FlexBody::equations_of_motion`]
 /// makes them, [`FlexBody::node_point`] and [`FlexBody::interface_point`] the points where joints hold a

@@ -6,7 +6,9 @@ use crate::errors::{diagnostics, exception, warn};
 use crate::scene::Scene;
 use crate::trade::{Trade, options as trade_options};
 use crate::work::run;
-use flexbody::{Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, Frame, ModelBuilder, SparseMatrix};
+use flexbody::{
+    Accuracy, Basis, ConvertOptions, Coupling, Diagnostic, FrameChoice, ModelBuilder, SparseMatrix,
+};
 use numpy::ndarray::ArrayView1;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
@@ -50,17 +52,29 @@ type GivenInterface = (String, Vec<i64>, Option<String>, Option<[f64; 3]>);
 
 /// The coupling of that name.
 pub fn coupling(name: Option<&str>) -> PyResult<Option<Coupling>> {
-    let all = [Coupling::Rigid, Coupling::Averaging, Coupling::Free];
-    let Some(name) = name else { return Ok(None) };
-    one_of("coupling", name, all.map(|coupling| (coupling.name(), coupling))).map(Some)
+    name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
+}
+
+/// The one of `all` that is called `name`.
+pub fn called<T: Copy>(
+    what: &str,
+    name: &str,
+    all: impl IntoIterator<Item = T>,
+    name_of: fn(T) -> &'static str,
+) -> PyResult<T> {
+    one_of(what, name, all.into_iter().map(|one| (name_of(one), one)))
 }
 
 /// The choice that is called `name`.
-pub fn one_of<T, const N: usize>(what: &str, name: &str, choices: [(&str, T); N]) -> PyResult<T> {
-    let known = choices.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
-    let found = choices.into_iter().find(|(known, _)| *known == name);
-    let unknown = || PyValueError::new_err(format!("{what} is `{name}`, expected one of {known}"));
-    found.map(|(_, choice)| choice).ok_or_else(unknown)
+pub fn one_of<T: Copy>(
+    what: &str,
+    name: &str,
+    choices: impl IntoIterator<Item = (&'static str, T)>,
+) -> PyResult<T> {
+    let (names, choices): (Vec<&str>, Vec<T>) = choices.into_iter().unzip();
+    let unknown =
+        || PyValueError::new_err(format!("{what} is `{name}`, expected one of {}", names.join(", ")));
+    names.iter().position(|known| *known == name).map(|at| choices[at]).ok_or_else(unknown)
 }
 
 /// Damping as `flexbody.model` hands it on.
@@ -113,23 +127,13 @@ fn convert_options(
     if !comparators {
         options = options.without_comparators();
     }
-    let bases = [
-        ("free", Basis::Free),
-        ("craig-bampton", Basis::CraigBampton),
-        ("craig-chang", Basis::CraigChang),
-        ("scene", Basis::Scene),
-    ];
-    let accuracies =
-        [("fast", Accuracy::Fast), ("standard", Accuracy::Standard), ("certified", Accuracy::Certified)];
-    let frames = [("principal", Frame::Principal), ("com", Frame::CentreOfMass), ("model", Frame::Model)];
-    let frame = match frame.strip_prefix("interface=") {
-        Some(name) => Frame::Interface(name.to_owned()),
-        None => one_of("frame", frame, frames)?,
-    };
+    let unknown = |expected| PyValueError::new_err(format!("frame is `{frame}`, {expected}"));
+    // Imported shapes are read from a file, which is an option of the program.
+    let computed = Basis::ALL.into_iter().filter(|basis| *basis != Basis::Imported);
     Ok(options
-        .basis(one_of("basis", basis, bases)?)
-        .accuracy(one_of("accuracy", accuracy, accuracies)?)
-        .frame(frame))
+        .basis(called("basis", basis, computed, Basis::name)?)
+        .accuracy(called("accuracy", accuracy, Accuracy::ALL, Accuracy::name)?)
+        .frame(frame.parse::<FrameChoice>().map_err(unknown)?))
 }
 
 impl Model {

@@ -2,9 +2,9 @@
 
 use crate::body::Body;
 use crate::errors::{diagnostics, exception, warn};
-use crate::model::one_of;
+use crate::model::called;
 use crate::report::report;
-use flexbody::TradeOptions;
+use flexbody::{ReferenceChoice, TradeOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
@@ -16,14 +16,8 @@ pub struct Trade {
 
 /// What is asked of a study; `reference` is `full`, `fine` or `nodal`.
 pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOptions> {
-    let options = TradeOptions::default().modes(modes).repeat(repeat);
-    let choices: [(&str, fn(TradeOptions) -> TradeOptions); 3] = [
-        ("full", |options| options),
-        ("fine", TradeOptions::against_a_fine_body),
-        ("nodal", TradeOptions::against_all_nodes),
-    ];
-    let against = one_of("reference", reference, choices)?;
-    Ok(against(options))
+    let reference = called("reference", reference, ReferenceChoice::ALL, ReferenceChoice::name)?;
+    Ok(TradeOptions::default().modes(modes).repeat(repeat).reference(reference))
 }
 
 impl Trade {

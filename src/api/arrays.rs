@@ -2,7 +2,6 @@
 
 use super::matrix::shown;
 use super::{FlexBody, Matrix};
-use flexbody_body::flex_body::MassStructure;
 use nalgebra::Matrix3;
 
 /// A file that a body was made of.
@@ -69,11 +68,7 @@ impl FlexBody {
     /// Whether every 3 x 3 block of M between nodes is a multiple of the identity (`rotation-invariant`), and
     /// M is `diagonal` besides, or neither (`general`).
     pub fn mass_structure(&self) -> &'static str {
-        match self.0.source().mass_structure {
-            MassStructure::RotationInvariant => "rotation-invariant",
-            MassStructure::Diagonal => "diagonal",
-            MassStructure::General => "general",
-        }
+        self.0.source().mass_structure.name()
     }
 
     /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) of the modes (nf).

@@ -1,61 +1,15 @@
 //! From a model to a body.
 
 use super::progress::{Listener, NOBODY, heard};
-use super::{FlexBody, Model, Scene, Selection};
+use super::{Basis, FlexBody, Model, Scene, Selection};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface};
 use flexbody_body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert};
-use flexbody_body::invariants::BodyFrame;
+use flexbody_body::invariants::FrameChoice;
 use flexbody_body::verification::accept;
-use flexbody_eigen::{Resume, Wanted};
+use flexbody_eigen::{Accuracy, Resume, Wanted};
 use flexbody_motion::scene::LoadCases;
-use flexbody_study::tailoring::{Tailoring, convert_for, loads_for, read_loads};
-
-/// Which shapes the body has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Basis {
-    /// Free-surface modes, and the residual vectors that the model or the scene asks for.
-    #[default]
-    Free,
-    /// Modes with the interfaces held, and the static responses to motions of these (Craig and Bampton).
-    CraigBampton,
-    /// Free modes, and the static responses to loads at the interfaces (Craig and Chang).
-    CraigChang,
-    /// The fewest shapes that the motion of a scene is made of ([`Model::convert_for`]); another motion may
-    /// need others.
-    Scene,
-}
-
-/// How sure the modes are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Accuracy {
-    /// Residuals of 1e-6; that no mode is missing is not proved.
-    Fast,
-    /// Residuals of 1e-9, and an inertia count that proves that no mode is missing.
-    #[default]
-    Standard,
-    /// Guaranteed bounds of eigenvalues and invariants.
-    Certified,
-}
-
-/// Where the body frame is.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-#[non_exhaustive]
-pub enum Frame {
-    /// At the centre of mass, along the axes of the model.
-    #[default]
-    CentreOfMass,
-    /// At the centre of mass, along the principal axes of inertia, moments ascending.
-    Principal,
-    /// That of the model.
-    Model,
-    /// On the reference point of the interface of this name, along the axes of the model. The interface rests in every
-    /// mode: the modes are those of the body that is held there.
-    Interface(String),
-}
+use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
 
 /// Settings of a conversion. The default: 20 free-surface modes, proved complete, about the centre of mass along the
 /// axes of the model.
@@ -65,7 +19,7 @@ pub struct ConvertOptions {
     highest: Option<f64>,
     basis: Basis,
     accuracy: Accuracy,
-    frame: Frame,
+    frame: FrameChoice,
     without_comparators: bool,
     mesh: MeshChoice,
 }
@@ -96,8 +50,8 @@ impl ConvertOptions {
     }
 
     /// Which body frame.
-    pub fn frame(mut self, frame: Frame) -> Self {
-        self.frame = frame;
+    pub fn frame(mut self, frame: impl Into<FrameChoice>) -> Self {
+        self.frame = frame.into();
         self
     }
 
@@ -120,40 +74,15 @@ impl ConvertOptions {
     }
 
     fn settings(&self, model: &Model, cases: Option<&LoadCases>) -> Result<ConvertSettings> {
-        let loads = match (self.basis, self.accuracy) {
-            (Basis::Free | Basis::Scene, Accuracy::Fast | Accuracy::Standard) => {
-                loads_for(cases, &model.residual_vectors)
-            }
-            _ => model.residual_vectors.clone(),
-        };
-        let residual_vectors = || read_loads(&loads, &model.checked);
+        let followed = self.basis.follows_scene() && self.accuracy != Accuracy::Certified;
+        let loads = loads_for(cases.filter(|_| followed), &model.residual_vectors);
         let mut settings = ConvertSettings {
-            basis: match self.basis {
-                Basis::Free | Basis::Scene => {
-                    BasisChoice::Free(FreeSurface { residual_vectors: residual_vectors()? })
-                }
-                Basis::CraigBampton => BasisChoice::CraigBampton(CraigBampton),
-                Basis::CraigChang => {
-                    BasisChoice::CraigChang(CraigChang { residual_vectors: residual_vectors()? })
-                }
-            },
-            frame: match self.frame {
-                Frame::Principal => BodyFrame::Principal,
-                Frame::CentreOfMass => BodyFrame::Com,
-                Frame::Model | Frame::Interface(_) => BodyFrame::Model,
-            },
-            interface_frame: match &self.frame {
-                Frame::Interface(name) => Some(name.clone()),
-                _ => None,
-            },
+            basis: computed_basis(self.basis, &loads, &model.checked)?,
+            frame: self.frame.clone(),
             mesh: self.mesh,
             ..ConvertSettings::default()
         };
-        settings.modes.accuracy = match self.accuracy {
-            Accuracy::Fast => flexbody_eigen::Accuracy::Fast,
-            Accuracy::Standard => flexbody_eigen::Accuracy::Standard,
-            Accuracy::Certified => flexbody_eigen::Accuracy::Certified,
-        };
+        settings.modes.accuracy = self.accuracy;
         if let Some(count) = self.modes {
             settings.modes.wanted = Wanted::Lowest(count);
         }
@@ -221,9 +150,7 @@ impl Model {
         listener: Listener<'_>,
     ) -> Result<(Conversion, Selection)> {
         let settings = options.settings(self, Some(&scene.0))?;
-        let by_band = options.modes.is_none()
-            && options.highest.is_none()
-            && matches!(options.basis, Basis::Free | Basis::Scene);
+        let by_band = options.modes.is_none() && options.highest.is_none() && options.basis.follows_scene();
         let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
         let (conversion, selection) = heard(listener, |watch| {
             convert_for(&self.checked, &tailoring, &scene.0, Resume::default(), watch)

@@ -2,41 +2,7 @@
 
 use super::matrix::shown;
 use super::{FlexBody, Matrix};
-
-/// How the nodes of an interface and its reference point follow each other.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Coupling {
-    /// The nodes move as one rigid body with the reference point (RBE2).
-    Rigid,
-    /// The reference point follows the mean rigid motion of the nodes (RBE3).
-    Averaging,
-    /// No reference point: every degree of freedom of the nodes is one of the interface.
-    Free,
-}
-
-impl Coupling {
-    pub(super) fn inner(self) -> flexbody_model::Coupling {
-        match self {
-            Self::Rigid => flexbody_model::Coupling::Rigid,
-            Self::Averaging => flexbody_model::Coupling::Averaging,
-            Self::Free => flexbody_model::Coupling::Free,
-        }
-    }
-
-    fn outer(inner: flexbody_model::Coupling) -> Self {
-        match inner {
-            flexbody_model::Coupling::Rigid => Self::Rigid,
-            flexbody_model::Coupling::Averaging => Self::Averaging,
-            flexbody_model::Coupling::Free => Self::Free,
-        }
-    }
-
-    /// `rigid`, `averaging`, `free`: its name in manifests and files.
-    pub fn name(self) -> &'static str {
-        self.inner().name()
-    }
-}
+use flexbody_model::Coupling;
 
 /// An interface of a body, in body axes.
 #[derive(Debug, Clone, PartialEq)]
@@ -82,7 +48,7 @@ impl FlexBody {
             Interface {
                 name: interface.name.clone(),
                 node_ids: interface.nodes.iter().map(|&node| nodes.ids[node]).collect(),
-                coupling: interface.coupling.map(Coupling::outer),
+                coupling: interface.coupling,
                 reference: interface.reference,
                 translation: rows.as_ref().map(|rows| shown(rows.translation.as_ref())),
                 rotation: rows.and_then(|rows| rows.rotation.map(|rotation| shown(rotation.as_ref()))),

@@ -16,8 +16,14 @@ mod trade;
 
 pub use arrays::{GeometricStiffness, SourceFile};
 pub use body::{FlexBody, Identity};
-pub use conversion::{Accuracy, Basis, Conversion, ConvertOptions, Frame};
-pub use interface::{Coupling, Interface, InterfaceCoordinates};
+pub use conversion::{Conversion, ConvertOptions};
+pub use flexbody_body::basis::BasisKind as Basis;
+pub use flexbody_body::invariants::{BodyFrame, FrameChoice};
+pub use flexbody_eigen::Accuracy;
+pub use flexbody_model::Coupling;
+#[cfg(feature = "hdf5")]
+pub use flexbody_study::trade::ReferenceChoice;
+pub use interface::{Interface, InterfaceCoordinates};
 pub use matrix::Matrix;
 pub use model::{Model, ModelBuilder, SparseMatrix};
 pub use motion::{Motion, PointPath};

@@ -1,6 +1,5 @@
 //! A finite element model, read from files or made of matrices in memory.
 
-use super::Coupling;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::units::UnitSystem;
@@ -9,8 +8,8 @@ use flexbody_input::{
 };
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{
-    CheckedModel, Damping, DampingBand, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel, Reference,
-    SurfaceMesh,
+    CheckedModel, Coupling, Damping, DampingBand, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel,
+    Reference, SurfaceMesh,
 };
 use std::path::{Path, PathBuf};
 
@@ -118,7 +117,7 @@ impl Model {
         let source = |&(name, set, coupling): &(&str, &str, Option<Coupling>)| InterfaceSource {
             name: name.to_owned(),
             nodes: InterfaceNodes::Set(set.to_owned()),
-            coupling: coupling.map(Coupling::inner),
+            coupling,
             reference: Reference::Centre,
         };
         let interfaces = interfaces.iter().map(source).collect();
@@ -221,7 +220,7 @@ impl ModelBuilder {
 
     /// As [`ModelBuilder::interface`], with nodes that move as a rigid body.
     pub fn rigid_interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
-        let coupling = Some(Coupling::Rigid.inner());
+        let coupling = Some(Coupling::Rigid);
         self.raw.interfaces.push(NodeSet { coupling, ..NodeSet::new(name, nodes) });
         self
     }
@@ -235,7 +234,7 @@ impl ModelBuilder {
         coupling: Coupling,
         reference: Option<[f64; 3]>,
     ) -> Self {
-        let coupling = Some(coupling.inner());
+        let coupling = Some(coupling);
         let reference = reference.map_or(Reference::Centre, Reference::Point);
         self.raw.interfaces.push(NodeSet { coupling, reference, ..NodeSet::new(name, nodes) });
         self

@@ -8,7 +8,9 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_linalg::progress::Watch;
 use flexbody_report::{TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::trade::{self, Allowed, ReferenceKind, Settings, Source, WantedBodies, conversions};
+use flexbody_study::trade::{
+    self, Allowed, ReferenceChoice, ReferenceKind, Settings, Source, WantedBodies, conversions,
+};
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
 /// everything that it has, the median time of 3 simulations of each candidate.
@@ -16,20 +18,12 @@ use flexbody_study::trade::{self, Allowed, ReferenceKind, Settings, Source, Want
 pub struct TradeOptions {
     modes: usize,
     repeat: usize,
-    reference: Against,
-}
-
-/// What errors are measured against.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Against {
-    Body,
-    FineBody,
-    Nodes,
+    reference: ReferenceChoice,
 }
 
 impl Default for TradeOptions {
     fn default() -> Self {
-        Self { modes: ModeSettings::DEFAULT_COUNT, repeat: 3, reference: Against::Body }
+        Self { modes: ModeSettings::DEFAULT_COUNT, repeat: 3, reference: ReferenceChoice::Full }
     }
 }
 
@@ -46,17 +40,9 @@ impl TradeOptions {
         self
     }
 
-    /// Measures errors against the motion of all nodes of the model.
-    pub fn against_all_nodes(mut self) -> Self {
-        self.reference = Against::Nodes;
-        self
-    }
-
-    /// Measures errors against a body that is enriched until what it lacks of the motion of all nodes is
-    /// estimated at no more than a hundredth of the tolerances: what can be had of large models and long
-    /// scenes. Where that is not reached a warning says so.
-    pub fn against_a_fine_body(mut self) -> Self {
-        self.reference = Against::FineBody;
+    /// Measures errors against this motion; those other than [`ReferenceChoice::Full`] need a model.
+    pub fn reference(mut self, reference: ReferenceChoice) -> Self {
+        self.reference = reference;
         self
     }
 }
@@ -81,10 +67,10 @@ impl Model {
     /// integrated; FB605 where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
         heard(listener, |watch| {
-            let fine = options.reference == Against::FineBody;
+            let fine = options.reference == ReferenceChoice::Fine;
             let wanted = WantedBodies { modes: options.modes, fine };
             let made = conversions(&self.checked, &scene.0, wanted, Allowed::default(), watch)?;
-            let nodal = (options.reference == Against::Nodes).then_some(&self.checked);
+            let nodal = (options.reference == ReferenceChoice::Nodal).then_some(&self.checked);
             let reserved = trade::reserved(&made.lacks, nodal.is_some());
             let settings =
                 Settings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
@@ -103,7 +89,7 @@ impl FlexBody {
     /// FB801 for errors against all nodes, of which a body knows nothing; FB212 and FB540 as there; FB605
     /// where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
-        if options.reference != Against::Body {
+        if options.reference != ReferenceChoice::Full {
             let message =
                 "errors against all nodes, or a finer body, need the matrices: ask the model, not the body";
             return Err(Diagnostic::new(Code::Usage, message).into());

@@ -2,17 +2,20 @@
 
 mod cluster;
 mod guidance;
+mod names;
 mod response;
 
 use clap::builder::PossibleValue;
-use clap::{Args, Parser, Subcommand, ValueEnum};
-pub(super) use cluster::{
-    AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments, SolverName,
-};
-use flexbody_body::invariants::BodyFrame;
+use clap::{Args, Parser, Subcommand};
+pub(super) use cluster::{AssembleArguments, BatchArguments, EngineArguments, EngineName, PrepareArguments};
+use flexbody_body::basis::BasisKind;
+use flexbody_body::flex_body::Storage;
+use flexbody_body::invariants::FrameChoice;
+use flexbody_eigen::{Accuracy, FactorChoice};
 use flexbody_formats::FORMATS;
 use flexbody_formats::IMPORT_FORMATS;
 use flexbody_formats::export::ExportFormat;
+use flexbody_study::trade::ReferenceChoice;
 pub(super) use guidance::{CompletionsArguments, DoctorArguments, ManArguments, RecipeArguments};
 pub(super) use response::ResponseArguments;
 use std::path::PathBuf;
@@ -250,8 +253,8 @@ pub struct TradeArguments {
     pub case: Option<String>,
     /// What errors are measured against: full, the body with all modes and groups, of a model twice the
     /// modes and residual vectors; nodal, the unreduced equations (models only)
-    #[arg(long, value_enum, default_value_t = ReferenceName::Full)]
-    pub reference: ReferenceName,
+    #[arg(long, value_parser = names::reference(), default_value = ReferenceChoice::default().name())]
+    pub reference: ReferenceChoice,
     /// Free modes that candidates of a model have at most
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000))]
     pub modes: Option<u32>,
@@ -277,18 +280,6 @@ pub struct TradeArguments {
     /// How to print.
     #[command(flatten)]
     pub printing: Printing,
-}
-
-/// What errors are measured against.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum ReferenceName {
-    /// The largest body
-    Full,
-    /// A body that is enriched until it lacks no more than a hundredth of the tolerances of the motion of all
-    /// nodes, by the estimate
-    Fine,
-    /// The unreduced equations of all nodes
-    Nodal,
 }
 
 /// Arguments of `select`.
@@ -394,11 +385,11 @@ pub struct ConvertArguments {
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub max_frequency: Option<f64>,
     /// What the modes are made of
-    #[arg(long, value_enum, default_value_t = BasisName::Free)]
-    pub basis: BasisName,
+    #[arg(long, value_parser = names::basis(), default_value = BasisKind::default().name())]
+    pub basis: BasisKind,
     /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array;
     /// or modes by nodes: CalculiX (.frd), Nastran (.pch, .op2), lists of Ansys
-    #[arg(long, value_name = "FILE", required_if_eq("basis", "imported"))]
+    #[arg(long, value_name = "FILE", required_if_eq("basis", BasisKind::Imported.name()))]
     pub shapes: Option<PathBuf>,
     /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces,
     /// loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. With @HZ the responses at
@@ -406,15 +397,15 @@ pub struct ConvertArguments {
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,
     /// Promise about the modes
-    #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
-    pub accuracy: AccuracyName,
+    #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name())]
+    pub accuracy: Accuracy,
     /// Precision of the factor: auto takes f32 where f64 does not fit the memory or is slower, none where the
     /// body is large and compact
-    #[arg(long, value_enum, default_value_t = FactorName::Auto)]
-    pub factor: FactorName,
+    #[arg(long, value_parser = names::factor(), default_value = FactorChoice::default().name())]
+    pub factor: FactorChoice,
     /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
-    #[arg(long, value_enum, default_value_t = StorageName::F64)]
-    pub storage: StorageName,
+    #[arg(long, value_parser = names::storage(), default_value = Storage::default().name())]
+    pub storage: Storage,
     /// Memory that the program may use: a number with K, M, G or T
     /// [default: what the machine and its control groups leave]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
@@ -425,8 +416,8 @@ pub struct ConvertArguments {
     /// Frame of the body: com (centre of mass, axes of the model), principal (there, principal axes), model (that of the
     /// model), or interface=NAME: on the reference point of an interface, which then rests in every mode
     /// [default: com; with --from: that of the file]
-    #[arg(long, value_name = "FRAME", value_parser = frame_name)]
-    pub frame: Option<FrameName>,
+    #[arg(long, value_name = "FRAME")]
+    pub frame: Option<FrameChoice>,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,
@@ -564,54 +555,6 @@ pub struct Printing {
     pub quiet: bool,
 }
 
-/// What the modes are made of.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum BasisName {
-    /// Free-surface modes, computed here
-    Free,
-    /// Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit
-    /// motions of the interfaces
-    CraigBampton,
-    /// Free-surface modes (--modes counts them), and static responses to unit loads at the interfaces
-    CraigChang,
-    /// Shapes that were computed elsewhere: eigenvectors, static shapes, any mixture of them
-    Imported,
-    /// The fewest shapes that the motion of --scene is made of; another motion may need others
-    Scene,
-}
-
-/// Names of the accuracy levels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum AccuracyName {
-    /// Residual 1e-6, completeness may be not proved
-    Fast,
-    /// Residual 1e-9 or the rounding floor, completeness proved
-    Standard,
-    /// Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every
-    /// eigenvalue and digits of every invariant
-    Certified,
-}
-
-/// Names of the precisions of the factor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum FactorName {
-    /// Whichever fits and is faster
-    Auto,
-    /// Double precision
-    F64,
-    /// Single precision, corrected in double
-    F32,
-}
-
-/// Names of the precisions of the file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum StorageName {
-    /// 64-bit floats
-    F64,
-    /// 32-bit floats
-    F32,
-}
-
 /// A number of bytes: `20G`, `512M`, `1.5GB`; powers of 1000.
 fn memory_size(text: &str) -> Result<u64, String> {
     let text = text.trim_end_matches(['b', 'B']);
@@ -624,34 +567,6 @@ fn memory_size(text: &str) -> Result<u64, String> {
     };
     let bytes = number.trim().parse::<f64>().map_err(|e| e.to_string())? * factor;
     if (1.0..1e18).contains(&bytes) { Ok(bytes as u64) } else { Err("not a size of memory".to_owned()) }
-}
-
-/// Frames that `--frame` names.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FrameName {
-    /// A frame in mean axes.
-    Mean(BodyFrame),
-    /// A frame on the reference point of the interface of this name.
-    Interface(String),
-}
-
-impl FrameName {
-    /// The frame of a body in mean axes, and the interface that the frame stands on instead.
-    pub fn settings(named: Option<&Self>) -> (BodyFrame, Option<String>) {
-        match named {
-            None => (BodyFrame::default(), None),
-            Some(Self::Mean(frame)) => (*frame, None),
-            Some(Self::Interface(name)) => (BodyFrame::Model, Some(name.clone())),
-        }
-    }
-}
-
-fn frame_name(text: &str) -> Result<FrameName, String> {
-    if let Some(name) = text.strip_prefix("interface=").filter(|name| !name.is_empty()) {
-        return Ok(FrameName::Interface(name.to_owned()));
-    }
-    let known = BodyFrame::ALL.into_iter().find(|frame| frame.name() == text);
-    known.map(FrameName::Mean).ok_or_else(|| "expected com, principal, model or interface=NAME".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

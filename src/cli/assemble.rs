@@ -1,14 +1,14 @@
 //! `flexbody assemble`: a conversion whose modes a cluster has found.
 
-use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, JobArguments};
-use super::arguments::{AssembleArguments, EngineArguments};
+use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments};
 use super::convert::run_with;
 use super::elsewhere::Elsewhere;
 use super::outcome::Outcome;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
+use flexbody_body::basis::BasisKind;
 use flexbody_cluster::{Prepared, read_prepared};
-use flexbody_eigen::Accuracy;
+use flexbody_eigen::{Accuracy, FactorChoice};
 
 pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;
@@ -42,14 +42,14 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         output: arguments.output.clone(),
         modes: arguments.modes.or(modes),
         max_frequency: prepared.wanted.below.filter(|_| arguments.modes.is_none()).map(hertz),
-        basis: BasisName::Free,
+        basis: BasisKind::Free,
         shapes: None,
         residual_vectors: Some(String::new()),
         accuracy: match prepared.accuracy() {
-            Accuracy::Fast => AccuracyName::Fast,
-            _ => AccuracyName::Standard,
+            Accuracy::Fast => Accuracy::Fast,
+            _ => Accuracy::Standard,
         },
-        factor: FactorName::Auto,
+        factor: FactorChoice::Auto,
         storage: arguments.storage,
         memory_limit: arguments.memory_limit,
         allow_long: true,

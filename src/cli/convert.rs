@@ -1,7 +1,6 @@
 //! `flexbody convert`.
 
-use super::arguments::EngineName;
-use super::arguments::{AccuracyName, BasisName, ConvertArguments, FactorName, FrameName, StorageName};
+use super::arguments::{ConvertArguments, EngineName};
 use super::elsewhere::Elsewhere;
 use super::import;
 use super::models::of_manifest_or_job;
@@ -15,12 +14,12 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_base::units::UnitSystem;
-use flexbody_body::basis::{
-    BasisChoice, CraigBampton, CraigChang, FreeSurface, ImportedShapes, ModeSettings,
-};
+use flexbody_body::basis::{BasisChoice, BasisKind, ImportedShapes, ModeSettings};
 use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert_resuming};
+use flexbody_body::flex_body::Storage;
+use flexbody_body::invariants::LumpedScheme;
 use flexbody_body::verification::accept;
-use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Snapshot, Wanted};
+use flexbody_eigen::{Accuracy, Method, Snapshot, Wanted};
 use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
@@ -29,7 +28,7 @@ use flexbody_model::{CheckedModel, FeModel, RawModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
 use flexbody_study::checkpoint::resume;
-use flexbody_study::tailoring::{Tailoring, convert_for, loads_for, read_loads};
+use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     if let Some(from) = &arguments.from {
@@ -137,7 +136,7 @@ impl Job<'_> {
     /// The model, checked; with the order of elimination where its own modes are to be computed here.
     fn checked(&self, raw: RawModel) -> Result<CheckedModel> {
         let Self { arguments, .. } = self;
-        let searched = arguments.engine.engine == EngineName::BuiltIn && arguments.basis == BasisName::Free;
+        let searched = arguments.engine.engine == EngineName::BuiltIn && arguments.basis == BasisKind::Free;
         if searched { FeModel::from_raw_ordered(raw) } else { FeModel::from_raw(raw) }
     }
 
@@ -190,7 +189,7 @@ impl Job<'_> {
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
         refuse_unjudged(arguments, selection.as_ref(), &conversion.diagnostics)?;
-        if arguments.storage == StorageName::F32 {
+        if arguments.storage == Storage::F32 {
             conversion.body = conversion.body.rounded_to_f32()?;
         }
         accept(&conversion.body)?;
@@ -230,35 +229,24 @@ impl Job<'_> {
     /// Free modes by the band of the scene, unless their number or highest frequency is given.
     fn of_band(&self, settings: ConvertSettings) -> Tailoring {
         let ConvertArguments { modes, max_frequency, basis, .. } = self.arguments;
-        let by_band =
-            modes.is_none() && max_frequency.is_none() && matches!(basis, BasisName::Free | BasisName::Scene);
-        Tailoring { settings, by_band, of_motion: *basis == BasisName::Scene }
+        let by_band = modes.is_none() && max_frequency.is_none() && basis.follows_scene();
+        Tailoring { settings, by_band, of_motion: *basis == BasisKind::Scene }
     }
 
     fn settings(&self, model: &FeModel, basis: BasisChoice) -> ConvertSettings {
         let Self { arguments, .. } = *self;
-        let (frame, interface_frame) = FrameName::settings(arguments.frame.as_ref());
         ConvertSettings {
             modes: ModeSettings {
                 wanted: wanted(arguments, model.units()),
-                accuracy: match arguments.accuracy {
-                    AccuracyName::Fast => Accuracy::Fast,
-                    AccuracyName::Standard => Accuracy::Standard,
-                    AccuracyName::Certified => Accuracy::Certified,
-                },
+                accuracy: arguments.accuracy,
                 method: Method::Auto,
-                factor: match arguments.factor {
-                    FactorName::Auto => FactorChoice::Auto,
-                    FactorName::F64 => FactorChoice::Always(Precision::Double),
-                    FactorName::F32 => FactorChoice::Always(Precision::Single),
-                },
+                factor: arguments.factor,
                 memory: memory_left(arguments.memory_limit),
                 longest: longest(arguments.allow_long),
                 ..ModeSettings::default()
             },
             basis,
-            frame,
-            interface_frame,
+            frame: arguments.frame.clone().unwrap_or_default(),
             lumped: self.lumped.to_vec(),
             lumped_modes: arguments.lumped_modes,
             mesh: match (arguments.no_mesh, arguments.mesh_triangles) {
@@ -277,8 +265,7 @@ fn residual_vectors(
     files: &ModelFiles,
     cases: Option<&LoadCases>,
 ) -> Vec<LoadSource> {
-    let free = matches!(arguments.basis, BasisName::Free | BasisName::Scene)
-        && arguments.accuracy != AccuracyName::Certified;
+    let free = arguments.basis.follows_scene() && arguments.accuracy != Accuracy::Certified;
     loads_for(cases.filter(|_| free && !arguments.lumped_modes), &files.residual_vectors)
 }
 
@@ -310,7 +297,7 @@ pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
 }
 
 fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
-    if arguments.modes == Some(0) && arguments.basis != BasisName::CraigBampton {
+    if arguments.modes == Some(0) && arguments.basis != BasisKind::CraigBampton {
         let message = "--modes 0 leaves a body no modes: only --basis craig-bampton has static shapes that can do without";
         return Err(Diagnostic::new(Code::Usage, message)
             .with_help("give at least 1, or --basis craig-bampton for static condensation")
@@ -324,27 +311,27 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
     let basis = arguments.basis;
     let residual = !loads.is_empty();
     let slepc = arguments.engine.engine == EngineName::Slepc;
-    let searches_free_modes = matches!(basis, BasisName::Free | BasisName::CraigChang | BasisName::Scene);
-    let coupled = matches!(basis, BasisName::CraigBampton | BasisName::CraigChang);
+    let searches_free_modes = basis.searches_free_modes();
+    let coupled = matches!(basis, BasisKind::CraigBampton | BasisKind::CraigChang);
     let message = match arguments {
-        ConvertArguments { scene: None, .. } if basis == BasisName::Scene => "--basis scene needs --scene",
-        ConvertArguments { accuracy: AccuracyName::Certified, .. } if basis == BasisName::Scene => {
+        ConvertArguments { scene: None, .. } if basis == BasisKind::Scene => "--basis scene needs --scene",
+        ConvertArguments { accuracy: Accuracy::Certified, .. } if basis == BasisKind::Scene => {
             "the modes of this basis are no eigenvectors and cannot be certified"
         }
-        ConvertArguments { shapes: Some(_), .. } if basis != BasisName::Imported => {
+        ConvertArguments { shapes: Some(_), .. } if basis != BasisKind::Imported => {
             "--shapes needs --basis imported"
         }
-        ConvertArguments { storage: StorageName::F32, accuracy: AccuracyName::Certified, .. } => {
+        ConvertArguments { storage: Storage::F32, accuracy: Accuracy::Certified, .. } => {
             "--storage f32 rounds what --accuracy certified guarantees: take --storage f64"
         }
-        _ if slepc && basis != BasisName::Free => "--engine slepc finds free modes: it needs --basis free",
+        _ if slepc && basis != BasisKind::Free => "--engine slepc finds free modes: it needs --basis free",
         _ if slepc && residual => "residual vectors need the factor of --engine built-in",
         ConvertArguments { scene: Some(_), .. } if slepc => "--scene chooses modes of --engine built-in",
         ConvertArguments { split: true, .. } if slepc => "--engine slepc takes one body: --split has several",
         ConvertArguments { checkpoint: Some(_), .. } if slepc => {
             "--checkpoint is for --engine built-in: that of slepc lies in its folder"
         }
-        ConvertArguments { accuracy: AccuracyName::Certified, .. } if slepc => {
+        ConvertArguments { accuracy: Accuracy::Certified, .. } if slepc => {
             "--accuracy certified needs --engine built-in"
         }
         ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
@@ -357,13 +344,13 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
         ConvertArguments { lumped_modes: true, .. } if residual => {
             "--lumped-modes compares free-surface modes, not residual vectors"
         }
-        ConvertArguments { accuracy: AccuracyName::Certified, .. } if residual => {
+        ConvertArguments { accuracy: Accuracy::Certified, .. } if residual => {
             "residual vectors are no eigenvectors and cannot be certified"
         }
-        ConvertArguments { accuracy: AccuracyName::Certified, .. } if coupled => {
+        ConvertArguments { accuracy: Accuracy::Certified, .. } if coupled => {
             "the modes of this basis are no eigenvectors and cannot be certified"
         }
-        ConvertArguments { lumped_modes: true, .. } if basis != BasisName::Free => {
+        ConvertArguments { lumped_modes: true, .. } if basis != BasisKind::Free => {
             "--lumped-modes compares free-surface modes: it needs --basis free"
         }
         _ => return Ok(()),
@@ -374,7 +361,7 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
 /// The basis, with the shapes read that it needs.
 fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) -> Result<BasisChoice> {
     match (arguments.basis, &arguments.shapes) {
-        (BasisName::Imported, Some(shapes)) => {
+        (BasisKind::Imported, Some(shapes)) => {
             let location = MatrixLocation::parse(shapes);
             let imported = match read_imported(&location, &model.row_counts(), "shapes")? {
                 ImportedColumns::Rows(raw) => ImportedShapes::new(model, raw),
@@ -382,14 +369,7 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
             };
             imported.map(BasisChoice::Imported)
         }
-        (BasisName::CraigBampton, _) => Ok(BasisChoice::CraigBampton(CraigBampton)),
-        (name, _) => {
-            let residual_vectors = read_loads(loads, model)?;
-            Ok(match name {
-                BasisName::CraigChang => BasisChoice::CraigChang(CraigChang { residual_vectors }),
-                _ => BasisChoice::Free(FreeSurface { residual_vectors }),
-            })
-        }
+        (kind, _) => computed_basis(kind, loads, model),
     }
 }
 
@@ -410,17 +390,16 @@ impl Scheme {
 
 fn lumping_schemes(text: &str) -> Result<Vec<Scheme>> {
     let mut schemes = Vec::new();
-    for name in text.split(',').map(str::trim).filter(|name| *name != "none") {
-        schemes.push(match name {
-            "row-sum" => Scheme::Ready(Lumping::RowSum),
-            "diagonal-scaling" => Scheme::Ready(Lumping::DiagonalScaling),
-            _ => match name.strip_prefix("user=") {
-                Some(path) if !path.is_empty() => Scheme::User(path.into()),
-                _ => {
-                    let message = format!("`{name}` is not a lumping scheme");
-                    return Err(Diagnostic::new(Code::LumpedScheme, message).into());
-                }
-            },
+    for scheme in text.split(',').map(str::trim).filter(|scheme| *scheme != "none") {
+        let (name, path) = scheme.split_once('=').map_or((scheme, None), |(name, path)| (name, Some(path)));
+        schemes.push(match (LumpedScheme::from_name(name), path) {
+            (Some(LumpedScheme::RowSum), None) => Scheme::Ready(Lumping::RowSum),
+            (Some(LumpedScheme::DiagonalScaling), None) => Scheme::Ready(Lumping::DiagonalScaling),
+            (Some(LumpedScheme::User), Some(path)) if !path.is_empty() => Scheme::User(path.into()),
+            _ => {
+                let message = format!("`{scheme}` is not a lumping scheme");
+                return Err(Diagnostic::new(Code::LumpedScheme, message).into());
+            }
         });
     }
     let mut names: Vec<&str> =
@@ -484,7 +463,7 @@ pub(super) fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted
         Some(hertz) => Wanted::Below(units.eigenvalue_of(hertz)),
         None => Wanted::Lowest(match (arguments.modes, arguments.basis) {
             (Some(modes), _) => modes as usize,
-            (None, BasisName::Imported) => usize::MAX,
+            (None, BasisKind::Imported) => usize::MAX,
             (None, _) => ModeSettings::DEFAULT_COUNT,
         }),
     }

@@ -1,12 +1,11 @@
 //! Modes that are found elsewhere: by SLEPc over MPI in this run, or by a cluster before.
 
-use super::arguments::ConvertArguments;
-use super::arguments::{EngineName, SolverName};
+use super::arguments::{ConvertArguments, EngineName};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::{Error, Result};
 use flexbody_base::output::code_of;
 use flexbody_body::basis::{BasisChoice, ModeSettings};
-use flexbody_cluster::{Engine, ModelReference, PrepareSettings, Prepared, Solver, prepare, read_found};
+use flexbody_cluster::{Engine, ModelReference, PrepareSettings, Prepared, prepare, read_found};
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::FeModel;
 use std::path::{Path, PathBuf};
@@ -41,12 +40,7 @@ impl Elsewhere {
                 ),
                 python: named.or_else(|| variable("FLEXBODY_PYTHON")),
                 ranks: asked.ranks,
-                solver: match asked.solver {
-                    SolverName::Mumps => Solver::Mumps,
-                    SolverName::Slices => Solver::Slices,
-                    SolverName::Gamg => Solver::Gamg,
-                    SolverName::Lobpcg => Solver::Lobpcg,
-                },
+                solver: asked.solver,
             },
             folder: asked.cluster_folder.clone().unwrap_or_else(|| beside.into()),
             kept: asked.cluster_folder.is_some(),

@@ -1,6 +1,6 @@
 //! `flexbody convert --from`: a body of another program's file.
 
-use super::arguments::{ConvertArguments, FrameName, StorageName};
+use super::arguments::ConvertArguments;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing};
 use super::terminal::body_text;
@@ -9,8 +9,9 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
+use flexbody_body::flex_body::Storage;
 use flexbody_formats::find_import_format;
-use flexbody_formats::import::{ImportFrame, accept_imported, import_body};
+use flexbody_formats::import::{accept_imported, import_body};
 use flexbody_input::parse_units;
 use flexbody_report::{Facts, Format, RunData, render};
 
@@ -31,13 +32,9 @@ pub(super) fn run(arguments: &ConvertArguments, from: &str) -> Result<Outcome> {
     let read = format.read(&file);
     file.refuse_changed()?;
     let source = SourceFile::new("body", path, file.sha256()?);
-    let frame = match &arguments.frame {
-        None => ImportFrame::Kept,
-        Some(FrameName::Mean(at)) => ImportFrame::Mean(*at),
-        Some(FrameName::Interface(name)) => ImportFrame::Interface(name.clone()),
-    };
-    let mut imported = import_body(&read?, source, units, &frame).map_err(|error| error.in_file(path))?;
-    if arguments.storage == StorageName::F32 {
+    let mut imported =
+        import_body(&read?, source, units, arguments.frame.as_ref()).map_err(|error| error.in_file(path))?;
+    if arguments.storage == Storage::F32 {
         imported.body = imported.body.rounded_to_f32()?;
     }
     accept_imported(&imported).map_err(|error| error.in_file(path))?;

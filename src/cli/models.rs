@@ -133,7 +133,7 @@ fn interface_source(text: &str) -> Result<InterfaceSource> {
     }
     let mut coupling = None;
     if let Some((before, last)) = names.rsplit_once(',') {
-        let known = Coupling::ALL.into_iter().find(|coupling| coupling.name() == last.trim());
+        let known = Coupling::from_name(last.trim());
         let help = || format!("couplings: {}", Coupling::ALL.map(Coupling::name).join(", "));
         coupling = Some(known.ok_or_else(|| refused(format!("`{}` is no coupling", last.trim()), help()))?);
         names = before;

@@ -1,6 +1,5 @@
 //! `flexbody prepare`.
 
-use super::arguments::AccuracyName;
 use super::arguments::PrepareArguments;
 use super::elsewhere::{folder_around, in_made_folder};
 use super::models::of_manifest_or_job;
@@ -14,13 +13,9 @@ use flexbody_input::read_model;
 use flexbody_model::{CheckedModel, FeModel};
 
 pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
-    let accuracy = match arguments.accuracy {
-        AccuracyName::Fast => Accuracy::Fast,
-        AccuracyName::Standard => Accuracy::Standard,
-        AccuracyName::Certified => {
-            return Err(usage("modes of a cluster cannot be certified: take --accuracy standard"));
-        }
-    };
+    if arguments.accuracy == Accuracy::Certified {
+        return Err(usage("modes of a cluster cannot be certified: take --accuracy standard"));
+    }
     let mut files = of_manifest_or_job(&arguments.model, &arguments.job)?;
     files.allow_implausible |= arguments.allow_implausible;
     files.keep_in = Some(folder_around(&arguments.output));
@@ -36,7 +31,7 @@ pub(super) fn run(arguments: &PrepareArguments) -> Result<Outcome> {
     let path = std::path::absolute(&arguments.model).unwrap_or_else(|_| arguments.model.clone());
     let settings = PrepareSettings {
         wanted,
-        accuracy,
+        accuracy: arguments.accuracy,
         index_bytes: if arguments.indices == "64" { 8 } else { 4 },
         model: ModelReference {
             path: Some(path),

@@ -1,6 +1,6 @@
 //! `flexbody response`.
 
-use super::arguments::{BasisName, ResponseArguments};
+use super::arguments::ResponseArguments;
 use super::convert::load_sources;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
@@ -10,7 +10,7 @@ use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, FreeSurface, ModeSettings};
+use flexbody_body::basis::{BasisKind, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
@@ -20,7 +20,7 @@ use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Point, Scene};
 use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
 use flexbody_study::response::{Band, Place, Settings, respond};
-use flexbody_study::tailoring::read_loads;
+use flexbody_study::tailoring::computed_basis;
 use std::path::PathBuf;
 
 pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
@@ -83,13 +83,13 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
         _ if converts && !(is_model && arguments.body.is_none()) => {
             "--modes, --basis and --residual-vectors are for a model without a body: a file has the modes that it has"
         }
-        ResponseArguments { basis: Some(BasisName::Scene), .. } => {
+        ResponseArguments { basis: Some(BasisKind::Scene), .. } => {
             "a basis made for a scene is for convert: convert the model, and give the body beside it"
         }
-        ResponseArguments { basis: Some(BasisName::Imported), .. } => {
+        ResponseArguments { basis: Some(BasisKind::Imported), .. } => {
             "imported shapes are for convert: convert the model, and give the body beside it"
         }
-        ResponseArguments { basis: Some(BasisName::CraigBampton), residual_vectors: Some(_), .. } => {
+        ResponseArguments { basis: Some(BasisKind::CraigBampton), residual_vectors: Some(_), .. } => {
             "residual vectors need --basis free or craig-chang"
         }
         _ => return Ok(()),
@@ -111,13 +111,7 @@ fn model_and_body(
         return Ok((model, body, diagnostics));
     }
     let loads = asked.unwrap_or_else(|| files.residual_vectors.clone());
-    let basis = match arguments.basis {
-        Some(BasisName::CraigBampton) => BasisChoice::CraigBampton(CraigBampton),
-        Some(BasisName::CraigChang) => {
-            BasisChoice::CraigChang(CraigChang { residual_vectors: read_loads(&loads, &model)? })
-        }
-        _ => BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),
-    };
+    let basis = computed_basis(arguments.basis.unwrap_or_default(), &loads, &model)?;
     let settings = ConvertSettings {
         modes: ModeSettings {
             wanted: Wanted::Lowest(

@@ -9,7 +9,7 @@ use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
-use flexbody_body::basis::{BasisChoice, FreeSurface, ModeSettings};
+use flexbody_body::basis::{BasisKind, ModeSettings};
 use flexbody_body::convert::ConvertSettings;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::{Resume, Wanted};
@@ -19,7 +19,7 @@ use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, SelectionFacts};
 use flexbody_study::reference::{Enriched, ReferenceError};
 use flexbody_study::selection::select;
-use flexbody_study::tailoring::{Tailoring, loads_for, read_loads};
+use flexbody_study::tailoring::{Tailoring, computed_basis, loads_for};
 
 pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
@@ -76,7 +76,7 @@ fn converted(
             longest: longest(arguments.allow_long),
             ..ModeSettings::default()
         },
-        basis: BasisChoice::Free(FreeSurface { residual_vectors: read_loads(&loads, &model)? }),
+        basis: computed_basis(BasisKind::Free, &loads, &model)?,
         lumped: Vec::new(),
         ..ConvertSettings::default()
     };

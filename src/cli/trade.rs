@@ -1,6 +1,6 @@
 //! `flexbody trade`.
 
-use super::arguments::{ReferenceName, TradeArguments};
+use super::arguments::TradeArguments;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
@@ -15,7 +15,7 @@ use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    Allowed, Row, Settings, Source, Trade, WantedBodies, conversions, reserved, trade,
+    Allowed, ReferenceChoice, Row, Settings, Source, Trade, WantedBodies, conversions, reserved, trade,
 };
 use std::path::{Path, PathBuf};
 
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
-        let wanted = WantedBodies { modes, fine: arguments.reference == ReferenceName::Fine };
+        let wanted = WantedBodies { modes, fine: arguments.reference == ReferenceChoice::Fine };
         let allowed = Allowed { memory, longest: longest(arguments.allow_long) };
         let watch = |event: Event<'_>| watcher.hear(event);
         let made = conversions(&checked.model, &cases, wanted, allowed, &watch)
@@ -52,7 +52,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         diagnostics.extend(notes);
         (None, vec![Source::new("file", body, None)?], Vec::new())
     };
-    let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceName::Nodal);
+    let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
     let reserved = reserved(&lacks, nodal.is_some());
     let settings = Settings {
         repeat: arguments.repeat.into(),
@@ -114,10 +114,10 @@ fn candidate_bodies(
 fn refuse_contradictions(arguments: &TradeArguments, is_model: bool) -> Result<()> {
     let message = match arguments {
         _ if is_model => return Ok(()),
-        TradeArguments { reference: ReferenceName::Nodal, .. } => {
+        TradeArguments { reference: ReferenceChoice::Nodal, .. } => {
             "--reference nodal needs the matrices: give the model"
         }
-        TradeArguments { reference: ReferenceName::Fine, .. } => {
+        TradeArguments { reference: ReferenceChoice::Fine, .. } => {
             "--reference fine is made of the matrices: give the model"
         }
         TradeArguments { modes: Some(_), .. } => "--modes is for conversions: give the model",

@@ -67,7 +67,7 @@ impl Subject {
         ConvertSettings {
             modes: ModeSettings { wanted: Wanted::Lowest(wanted), ..ModeSettings::default() },
             basis,
-            frame: self.frame,
+            frame: self.frame.into(),
             lumped: Vec::new(),
             ..ConvertSettings::default()
         }

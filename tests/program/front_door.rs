@@ -1,8 +1,8 @@
 //! The library as a program that uses it sees it: listeners, interfaces, reports, motions, trade studies, jobs.
 
 use flexbody::{
-    Basis, Code, ConvertOptions, Coupling, ExitCode, FlexBody, Model, Progress, ReportFormat, Scene,
-    SparseMatrix, TradeOptions,
+    Basis, Code, ConvertOptions, Coupling, ExitCode, FlexBody, Model, Progress, ReferenceChoice,
+    ReportFormat, Scene, SparseMatrix, TradeOptions,
 };
 use oracle::fixtures;
 use std::ops::ControlFlow;
@@ -168,8 +168,9 @@ fn motions_selections_and_studies_tell_their_numbers() {
     assert!(trade.holds() && trade.front().contains(&trade.recommended().expect("a candidate")));
     assert_eq!(trade.body(0).expect("the whole body").n_modes(), 6);
     assert!(trade.body(trade.candidates()).expect_err("no candidate").has(Code::Usage));
-    let nodal =
-        body.trade(&scene, &TradeOptions::default().against_all_nodes(), &|_| ControlFlow::Continue(()));
+    let nodal = body.trade(&scene, &TradeOptions::default().reference(ReferenceChoice::Nodal), &|_| {
+        ControlFlow::Continue(())
+    });
     assert!(nodal.expect_err("no matrices").has(Code::Usage));
     for (json, scene) in [
         (selection.report(ReportFormat::Json), "spin"),

@@ -39,7 +39,7 @@ pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
 /// What the frame of `body` was meant to be.
 fn frame_of(body: &FlexBody) -> BodyFrame {
     let name = body.source().settings["frame"].as_str();
-    BodyFrame::ALL.into_iter().find(|frame| Some(frame.name()) == name).unwrap_or(BodyFrame::Model)
+    name.and_then(BodyFrame::from_name).unwrap_or(BodyFrame::Model)
 }
 
 /// Refuses a body that [`own_identities`] would not pass: what is written is what `flexbody check` accepts.

@@ -24,7 +24,10 @@ pub enum Solver {
 }
 
 impl Solver {
-    /// Name for the driver.
+    /// Every solver, in the order of the documentation.
+    pub const ALL: [Self; 4] = [Self::Mumps, Self::Slices, Self::Gamg, Self::Lobpcg];
+
+    /// Name for the driver and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mumps => "mumps",

@@ -118,8 +118,7 @@ pub struct Prepared {
 impl Prepared {
     /// The accuracy that was asked for; standard where its name is not known.
     pub fn accuracy(&self) -> Accuracy {
-        let all = [Accuracy::Fast, Accuracy::Standard, Accuracy::Certified];
-        all.into_iter().find(|accuracy| accuracy.name() == self.accuracy).unwrap_or(Accuracy::Standard)
+        Accuracy::from_name(&self.accuracy).unwrap_or_default()
     }
 }
 

@@ -10,11 +10,12 @@ pub enum Wanted {
 }
 
 /// Promises about the result.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Accuracy {
     /// K-residual 1e-6; completeness is not proved.
     Fast,
     /// K-residual 1e-9 or the rounding floor of the matrices; completeness proved.
+    #[default]
     Standard,
     /// K-residual 1e-12 or the rounding floor; completeness proved from both sides; guaranteed bounds of
     /// every eigenvalue and, in a conversion, of the invariants.
@@ -22,6 +23,9 @@ pub enum Accuracy {
 }
 
 impl Accuracy {
+    /// Every accuracy, in the order of the documentation.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Standard, Self::Certified];
+
     /// K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) that is promised.
     pub fn residual(self) -> f64 {
         match self {
@@ -38,6 +42,11 @@ impl Accuracy {
             Self::Standard => "standard",
             Self::Certified => "certified",
         }
+    }
+
+    /// Returns the accuracy of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
@@ -87,9 +96,9 @@ impl Default for EigenSettings {
     fn default() -> Self {
         Self {
             wanted: Wanted::Lowest(Self::DEFAULT_COUNT),
-            accuracy: Accuracy::Standard,
+            accuracy: Accuracy::default(),
             method: Method::Auto,
-            factor: FactorChoice::Auto,
+            factor: FactorChoice::default(),
             // Below, the columns that its corrections solve cost what the factorisation saves.
             single_pays: 4e11,
             // Measured: a compact solid of 40,000 rows, a bar of 70,000. What is thin has less to factor, and
@@ -121,14 +130,29 @@ impl Precision {
     }
 }
 
-/// What the user says about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// Requested precision of the factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FactorChoice {
     /// Single where double does not fit the memory, or where it is faster; back to double where conditioning
     /// defeats it.
+    #[default]
     Auto,
     /// This one.
     Always(Precision),
+}
+
+impl FactorChoice {
+    /// Every choice, in the order of the documentation.
+    pub const ALL: [Self; 3] = [Self::Auto, Self::Always(Precision::Double), Self::Always(Precision::Single)];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Always(Precision::Double) => "f64",
+            Self::Always(Precision::Single) => "f32",
+        }
+    }
 }
 
 /// The promise about a K-residual: the tolerance, or what rounding leaves of it (measured: up to 6 times the

@@ -1,15 +1,14 @@
 //! Puts the values of a file together to the parts of a body.
 
 use super::scan::Scan;
-use super::schema::MASS_STRUCTURES;
 use super::schema::terms::KEPT;
 use super::value::Value;
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
     Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LumpedBody, Modes, Parts, ReferenceConditions, Source, SurfaceMesh,
-    TermDecision, UnitLoad,
+    InterfaceCoordinates, InternalRows, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
+    SurfaceMesh, TermDecision, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
@@ -167,9 +166,9 @@ impl Take<'_> {
         let number = self.number();
         let n_dofs = self.count("/source@n_dofs");
         let structure = self.text("/source@mass_structure");
-        let mass_structure = MASS_STRUCTURES.iter().find(|(name, _)| *name == structure).map(|(_, s)| *s);
+        let mass_structure = MassStructure::from_name(&structure);
         if mass_structure.is_none() {
-            let known = MASS_STRUCTURES.map(|(name, _)| format!("`{name}`")).join(", ");
+            let known = MassStructure::ALL.map(|structure| format!("`{}`", structure.name())).join(", ");
             self.scan.add(format!("/source@mass_structure: expected one of {known}, found {structure:?}"));
         }
         let approximation = self.optional_text("/source@approximation");
@@ -495,7 +494,7 @@ impl Take<'_> {
 
     fn coupling(&mut self, path: &str) -> Option<Coupling> {
         let Some(Value::Text(name)) = self.scan.values.remove(path) else { return None };
-        let coupling = Coupling::ALL.into_iter().find(|coupling| coupling.name() == name);
+        let coupling = Coupling::from_name(&name);
         if coupling.is_none() {
             let known = Coupling::ALL.map(|coupling| format!("`{}`", coupling.name())).join(", ");
             self.scan.add(format!("{path}: expected one of {known}, found {name:?}"));

@@ -336,7 +336,7 @@ impl Scan {
 
     fn precision(&mut self) -> Storage {
         let Some(Value::Text(name)) = self.values.get("/@storage") else { return Storage::F64 };
-        let known = Storage::ALL.into_iter().find(|storage| storage.name() == name);
+        let known = Storage::from_name(name);
         if known.is_none() {
             let message = format!("/@storage: expected `f64` or `f32`, found {name:?}");
             self.add(message);

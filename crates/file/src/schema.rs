@@ -8,7 +8,7 @@ use super::item::{Get, Group, Item, Kind, Origin, Per};
 use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
 use flexbody_base::provenance;
-use flexbody_body::flex_body::{Group as TermGroup, MassStructure, Parts, Storage};
+use flexbody_body::flex_body::{Group as TermGroup, Parts, Storage};
 use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
 use interfaces::{COORDINATES, INTERFACES};
 use terms::TERMS;
@@ -198,7 +198,7 @@ const SOURCE: &[Item] = &[
         Text,
         ONE,
         "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither, and `/invariants/W0` is there",
-        |v| text(mass_structure_name(v.body.source.mass_structure)),
+        |v| text(v.body.source.mass_structure.name()),
     ),
     attribute(
         "approximation",
@@ -604,14 +604,3 @@ pub(super) const TABLE: &[Group] = &[
         items: &[COORDINATES],
     },
 ];
-
-/// Names of the mass structures in the file.
-pub(super) const MASS_STRUCTURES: [(&str, MassStructure); 3] = [
-    ("rotation-invariant", MassStructure::RotationInvariant),
-    ("diagonal", MassStructure::Diagonal),
-    ("general", MassStructure::General),
-];
-
-fn mass_structure_name(structure: MassStructure) -> &'static str {
-    MASS_STRUCTURES.iter().find(|(_, s)| *s == structure).map_or("general", |(name, _)| name)
-}

@@ -18,9 +18,9 @@ pub(super) struct Entry {
     pub value: f64,
 }
 
-/// What the entries of a file stand for.
+/// The entries of a matrix that a file has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Storage {
+pub(super) enum StoredEntries {
     /// All entries of the matrix.
     Full,
     /// One triangle of a symmetric matrix: every off-diagonal entry stands for two.
@@ -34,7 +34,7 @@ pub(super) struct Sides {
     pub upper: bool,
 }
 
-impl Storage {
+impl StoredEntries {
     /// Of a file that does not say it: entries on one side alone stand for both.
     pub(super) fn of(sides: Sides) -> Self {
         match sides {
@@ -113,12 +113,12 @@ pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> Strin
 pub(super) fn assemble(
     n: usize,
     pieces: Vec<Vec<Entry>>,
-    storage: Storage,
+    stored: StoredEntries,
     written: u8,
     path: &Path,
 ) -> Result<RawMatrix, Diagnostic> {
     let digits = digits_of(&pieces, written);
-    finish(n, Counted::of(n, pieces, storage).added_up(), digits, path)
+    finish(n, Counted::of(n, pieces, stored).added_up(), digits, path)
 }
 
 /// [`assemble`] where no entry may be given twice; `twice` tells the first that is, by row and then column.
@@ -129,13 +129,13 @@ pub(super) fn assemble(
 pub(super) fn assemble_distinct(
     n: usize,
     pieces: Vec<Vec<Entry>>,
-    storage: Storage,
+    stored: StoredEntries,
     written: u8,
     path: &Path,
     twice: impl FnOnce(u32, u32) -> Diagnostic,
 ) -> Result<RawMatrix, Diagnostic> {
     let digits = digits_of(&pieces, written);
-    match Counted::of(n, pieces, storage).distinct(storage) {
+    match Counted::of(n, pieces, stored).distinct(stored) {
         Ok(matrix) => finish(n, Ok(matrix), digits, path),
         Err((row, col)) => Err(twice(row, col)),
     }
@@ -204,8 +204,8 @@ struct Counted {
 }
 
 impl Counted {
-    fn of(n: usize, pieces: Vec<Vec<Entry>>, storage: Storage) -> Self {
-        let list = List::new(pieces, storage);
+    fn of(n: usize, pieces: Vec<Vec<Entry>>, stored: StoredEntries) -> Self {
+        let list = List::new(pieces, stored);
         let mut col_ptr = vec![0usize; n + 1];
         let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
         col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
@@ -243,7 +243,7 @@ impl Counted {
     }
 
     /// `Err` holds the first entry that is there twice, by row and then column.
-    fn distinct(self, storage: Storage) -> Result<CscMatrix, (u32, u32)> {
+    fn distinct(self, stored: StoredEntries) -> Result<CscMatrix, (u32, u32)> {
         if !self.has_duplicates {
             return self.added_up();
         }
@@ -252,7 +252,7 @@ impl Counted {
             rows.windows(2).filter(|pair| pair[0] == pair[1]).map(move |pair| (pair[0], col))
         });
         // Each of a triangle was put into both.
-        let twice = twice.filter(|(row, col)| storage == Storage::Full || row >= col);
+        let twice = twice.filter(|(row, col)| stored == StoredEntries::Full || row >= col);
         Err(twice.min().expect("duplicates were found"))
     }
 }
@@ -360,8 +360,8 @@ struct List {
 }
 
 impl List {
-    fn new(pieces: Vec<Vec<Entry>>, storage: Storage) -> Self {
-        let mirror = storage == Storage::Triangle;
+    fn new(pieces: Vec<Vec<Entry>>, stored: StoredEntries) -> Self {
+        let mirror = stored == StoredEntries::Triangle;
         let extent = |piece: &Vec<Entry>| {
             piece.iter().fold((u32::MAX, 0), |(low, high): (u32, u32), e| {
                 let other = if mirror { e.row } else { e.col };
@@ -463,7 +463,7 @@ mod tests {
             entries(&[(2, 0, 1e16), (0, 0, 3.0), (1, 1, 0.0)]),
             entries(&[(2, 0, 1.0), (2, 1, 5.0), (2, 0, -1e16), (2, 1, -2.0)]),
         ];
-        let raw = assemble(3, pieces, Storage::Triangle, 17, Path::new("K.mtx")).unwrap();
+        let raw = assemble(3, pieces, StoredEntries::Triangle, 17, Path::new("K.mtx")).unwrap();
         let expected = CscMatrix::from_triplets(3, 3, &[(0, 0, 3.0), (2, 1, 3.0), (1, 2, 3.0)]);
         assert_eq!(raw.matrix, expected);
     }
@@ -497,7 +497,8 @@ mod tests {
         let pieces: Vec<Vec<Entry>> = list.chunks(777).map(<[Entry]>::to_vec).collect();
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-            let raw = pool.install(|| assemble(n, pieces.clone(), Storage::Triangle, 17, Path::new("K.mtx")));
+            let raw =
+                pool.install(|| assemble(n, pieces.clone(), StoredEntries::Triangle, 17, Path::new("K.mtx")));
             assert_eq!(raw.unwrap().matrix, expected, "{threads} threads");
         }
         // The same column by column, as binary files have them.
@@ -511,14 +512,14 @@ mod tests {
         let lower: Vec<_> = ordered.iter().map(|e| (e.row, e.col, e.value)).collect();
         let full = assemble_columns(columns(), 17, Path::new("K.h5")).unwrap();
         assert_eq!(full.matrix, CscMatrix::from_triplets(n, n, &lower));
-        let mirrored = assemble(n, columns().into_entries(), Storage::Triangle, 17, Path::new("K.h5"));
+        let mirrored = assemble(n, columns().into_entries(), StoredEntries::Triangle, 17, Path::new("K.h5"));
         assert_eq!(mirrored.unwrap().matrix, expected);
     }
 
     #[test]
     fn sums_that_overflow_are_refused_by_name() {
         let pieces = vec![entries(&[(1, 0, 1e308), (1, 0, 1e308)])];
-        let error = assemble(2, pieces, Storage::Full, 17, Path::new("K.mtx")).unwrap_err();
+        let error = assemble(2, pieces, StoredEntries::Full, 17, Path::new("K.mtx")).unwrap_err();
         assert_eq!(error.code(), Code::MatrixNotFinite);
         assert!(error.message().contains("(2, 1)"), "{error}");
     }

@@ -2,7 +2,9 @@
 
 mod columns;
 
-use super::assemble::{Entry, Sides, Storage, assemble_distinct, check_size, push, undeclared_triangle};
+use super::assemble::{
+    Entry, Sides, StoredEntries, assemble_distinct, check_size, push, undeclared_triangle,
+};
 use super::bulk_cards::{Card, Item, MatrixLines, is_bulk_data, read_cards, read_deck};
 use super::nastran_names::choose;
 use super::reader::{MatrixSource, Reader};
@@ -220,9 +222,9 @@ impl Dmigs {
             let help = "write real matrices, without structural damping";
             return Err(about(Diagnostic::new(Code::MatrixKind, message).with_help(help)));
         }
-        let storage = match own.form {
-            1 | 2 | 9 => Storage::Full,
-            6 => Storage::Triangle,
+        let stored = match own.form {
+            1 | 2 | 9 => StoredEntries::Full,
+            6 => StoredEntries::Triangle,
             other => {
                 let message = format!("form {other} is none of a symmetric matrix");
                 return Err(about(
@@ -232,13 +234,13 @@ impl Dmigs {
         };
         let (pieces, sides) = self.in_rows(pieces, points);
         let n = points.len() as u64;
-        if storage == Storage::Full
+        if stored == StoredEntries::Full
             && let Some(triangle) = undeclared_triangle(sides, |_| "declare form 6 in the DMIG header".into())
         {
             return Err(about(triangle));
         }
         let n = check_size(n, n, count).map_err(about)?;
-        assemble_distinct(n, pieces, storage, own.written, &own.path, |row, column| {
+        assemble_distinct(n, pieces, stored, own.written, &own.path, |row, column| {
             let [row, column] = [row, column].map(|row| named(points[row as usize]));
             let message = format!("the entry of {row} and {column} is given twice");
             let help = "form 6 has one triangle; write the matrix again";

@@ -1,6 +1,6 @@
 //! Matrix Market coordinate files, plain or compressed: <https://math.nist.gov/MatrixMarket/formats.html>.
 
-use super::assemble::{Storage, assemble, check_size, refuse_beyond_memory, undeclared_triangle};
+use super::assemble::{StoredEntries, assemble, check_size, refuse_beyond_memory, undeclared_triangle};
 use super::coordinates::{Blocks, Coordinates, Limits};
 use super::reader::{MatrixSource, Reader};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -64,11 +64,11 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
     if !found.is_empty() {
         return Err(found);
     }
-    let storage = match header.symmetry {
-        Symmetry::Symmetric => Storage::Triangle,
-        Symmetry::General => Storage::Full,
+    let stored = match header.symmetry {
+        Symmetry::Symmetric => StoredEntries::Triangle,
+        Symmetry::General => StoredEntries::Full,
     };
-    assemble(header.rows as usize, body.pieces, storage, body.written, path).map_err(|d| vec![d])
+    assemble(header.rows as usize, body.pieces, stored, body.written, path).map_err(|d| vec![d])
 }
 
 /// Largest number of entries that can stand in the file, whatever it announces.

@@ -1,7 +1,7 @@
 //! Rows along axes of their nodes, turned into those of the model: K becomes A K A', where A has the axes of the
 //! rows of each node in its columns.
 
-use crate::assemble::{Entry, Storage, assemble, push};
+use crate::assemble::{Entry, StoredEntries, assemble, push};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{DofLabel, NodeAxes as Block, RawMatrix};
@@ -83,7 +83,7 @@ impl Turn {
             }
         }
         let RawMatrix { digits, path, .. } = raw;
-        let turned = assemble(self.group_of.len(), pieces, Storage::Full, 17, &path)?;
+        let turned = assemble(self.group_of.len(), pieces, StoredEntries::Full, 17, &path)?;
         Ok(RawMatrix { digits, ..turned })
     }
 }

@@ -1,7 +1,7 @@
 //! Sparse matrices of SciPy (`scipy.sparse.save_npz`): an archive of the arrays of a matrix in CSC, CSR, COO
 //! or BSR form, <https://docs.scipy.org/doc/scipy/reference/generated/scipy.sparse.save_npz.html>.
 
-use super::assemble::{Storage, assemble, check_size, push, refuse_beyond_memory, undeclared_triangle};
+use super::assemble::{StoredEntries, assemble, check_size, push, refuse_beyond_memory, undeclared_triangle};
 use super::compressed::{Compressed, EntryCheck};
 use super::npy;
 use super::reader::{MatrixSource, Reader};
@@ -136,7 +136,7 @@ fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Resu
     }
     let raw = match undeclared_triangle(check.sides, |_| BOTH_TRIANGLES.into()) {
         Some(triangle) => return Err(triangle),
-        None => assemble(n, pieces, Storage::Full, 17, path)?,
+        None => assemble(n, pieces, StoredEntries::Full, 17, path)?,
     };
     Ok(RawMatrix { digits: raw.digits.min(digits), ..raw })
 }
@@ -157,7 +157,7 @@ fn coordinates(
     }
     match undeclared_triangle(check.sides, |_| BOTH_TRIANGLES.into()) {
         Some(triangle) => Err(triangle),
-        None => assemble(n, pieces, Storage::Full, 17, path),
+        None => assemble(n, pieces, StoredEntries::Full, 17, path),
     }
 }
 

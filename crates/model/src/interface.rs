@@ -25,13 +25,18 @@ impl Coupling {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Rigid, Self::Averaging, Self::Free];
 
-    /// Name in manifests and files.
+    /// Name in manifests, files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",
             Self::Averaging => "averaging",
             Self::Free => "free",
         }
+    }
+
+    /// Returns the coupling of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 

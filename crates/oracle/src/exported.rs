@@ -10,7 +10,7 @@ use crate::fixtures;
 use flexbody_body::basis::{BasisChoice, CraigBampton};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
-use flexbody_body::invariants::BodyFrame;
+use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_eigen::Wanted;
 use flexbody_formats::export::{ExportOptions, Exported};
 use flexbody_formats::{export, find_format};
@@ -30,7 +30,7 @@ pub fn models() -> Vec<String> {
 /// What flexbody makes of a model with seven modes.
 pub fn body_of(raw: RawModel, basis: BasisChoice, frame: BodyFrame) -> FlexBody {
     let model = FeModel::from_raw(raw).expect("a body").model;
-    let mut settings = ConvertSettings { basis, frame, ..ConvertSettings::default() };
+    let mut settings = ConvertSettings { basis, frame: frame.into(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(7);
     convert(&model, &settings, SILENT).expect("converts").body
 }
@@ -104,10 +104,10 @@ pub fn on_interfaces() -> Vec<(String, FlexBody)> {
         let mut raw =
             RawModel { damping: Some(Damping::Rayleigh { alpha: 4.0, beta: 2e-6 }), ..raw_fixture(name) };
         raw.interfaces.iter_mut().for_each(|interface| interface.coupling = Some(Coupling::Rigid));
-        let interface_frame = Some(raw.interfaces[0].name.clone());
+        let frame = FrameChoice::Interface(raw.interfaces[0].name.clone());
         let model = FeModel::from_raw(raw).expect("a body").model;
         let basis = BasisChoice::CraigBampton(CraigBampton);
-        let mut settings = ConvertSettings { basis, interface_frame, ..ConvertSettings::default() };
+        let mut settings = ConvertSettings { basis, frame, ..ConvertSettings::default() };
         settings.modes.wanted = Wanted::Lowest(4);
         let body = convert(&model, &settings, SILENT).expect("converts").body;
         (format!("{name}, frame on an interface"), body)

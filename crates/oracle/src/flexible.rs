@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 pub fn body_of(raw: RawModel, modes: usize, frame: BodyFrame) -> FlexBody {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    let settings = ConvertSettings { modes, frame, ..ConvertSettings::default() };
+    let settings = ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() };
     convert(&model, &settings, SILENT).expect("converts").body
 }
 

@@ -2,6 +2,7 @@
 
 use super::craig_bampton;
 use super::numbers::{counted, plain, significant};
+use flexbody_body::basis::BasisKind;
 use flexbody_body::flex_body::{FlexBody, is_static};
 
 /// The certificate of a body, judged.
@@ -74,7 +75,6 @@ fn counted_elsewhere(body: &FlexBody) -> bool {
 
 /// The verdict in one word, and in a few.
 fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
-    let basis = body.source().settings["basis"].as_str().unwrap_or_default();
     match (&body.certificate().fixed_interface, proved) {
         (Some(fixed), true) if fixed.modes == 0 => ("proved", "Static condensation."),
         (Some(_), true) => ("proved", "No fixed-interface mode is missing."),
@@ -82,9 +82,11 @@ fn head(body: &FlexBody, proved: bool) -> (&'static str, &'static str) {
         (None, true) if static_shapes(body) > 0 => ("proved", "No free mode is missing."),
         (None, true) => ("proved", "No mode is missing."),
         // Files of earlier versions tell what was proved in the remark only.
-        (None, false) if basis == "craig-bampton" => (GIVEN, "Craig-Bampton basis."),
+        (None, false) if body.basis() == Some(BasisKind::CraigBampton) => (GIVEN, "Craig-Bampton basis."),
         // Without a count nothing spoke against them either.
-        (None, false) if basis == "imported" && body.certificate().negative_pivots.is_none() => {
+        (None, false)
+            if body.basis() == Some(BasisKind::Imported) && body.certificate().negative_pivots.is_none() =>
+        {
             (GIVEN, "Shapes as given.")
         }
         (None, false) if counted_elsewhere(body) => {

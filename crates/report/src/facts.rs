@@ -12,7 +12,9 @@ use super::term_facts::TermFacts;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{self, SourceFile};
 use flexbody_base::units::UnitSystem;
-use flexbody_body::flex_body::{FlexBody, Interface, MassStructure, Truncation, is_static};
+use flexbody_body::flex_body::{
+    Coupling, FlexBody, Interface, MassStructure, Storage, Truncation, is_static,
+};
 use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
@@ -139,7 +141,7 @@ impl InterfaceFacts {
 
     /// Whether it deforms although it was declared rigid.
     pub(crate) fn breaks_its_word(&self) -> bool {
-        self.coupling == Some("rigid") && self.deformation.is_some_and(|part| part > RIGID)
+        self.coupling == Some(Coupling::Rigid.name()) && self.deformation.is_some_and(|part| part > RIGID)
     }
 
     /// `, at 0, 0, 12.5 mm`: the reference point in model axes; empty without one. Coordinates that are rounding beside
@@ -320,11 +322,7 @@ impl ModelFacts {
             body: source.number.map(|n| BodyFacts { number: n.number, of: n.of }),
             n_nodes: body.n_nodes(),
             n_dofs: source.n_dofs,
-            mass_structure: match source.mass_structure {
-                MassStructure::RotationInvariant => "rotation-invariant",
-                MassStructure::Diagonal => "diagonal",
-                MassStructure::General => "general",
-            },
+            mass_structure: source.mass_structure.name(),
             storage: body.storage().name(),
             approximation: source.approximation.clone(),
             units: UnitFacts::new(units),
@@ -341,7 +339,8 @@ impl ModelFacts {
 
     /// What rounding took; nothing of 64-bit floats.
     pub(crate) fn storage_in_words(&self) -> Option<&'static str> {
-        (self.storage == "f32").then_some("shapes and inertia of the modes rounded to 32-bit floats")
+        (self.storage == Storage::F32.name())
+            .then_some("shapes and inertia of the modes rounded to 32-bit floats")
     }
 
     /// `21 nodes, 63 degrees of freedom, consistent mass`.
@@ -362,10 +361,10 @@ impl ModelFacts {
 
     /// What the structure of the mass matrix means for `exact`.
     fn mass_in_words(&self) -> &'static str {
-        match self.mass_structure {
-            "rotation-invariant" => "consistent mass",
-            "diagonal" => "DIAGONAL mass: lumped before it came here, exact for that only",
-            _ => "mass on rotations of nodes or different by direction",
+        match MassStructure::from_name(self.mass_structure) {
+            Some(MassStructure::RotationInvariant) => "consistent mass",
+            Some(MassStructure::Diagonal) => "DIAGONAL mass: lumped before it came here, exact for that only",
+            Some(MassStructure::General) | None => "mass on rotations of nodes or different by direction",
         }
     }
 }

@@ -5,7 +5,7 @@ use super::facts::ModelFacts;
 use super::glossary::word_as;
 use super::markup::{escape, printed, section, table, terms_in_markup, texts};
 use super::numbers::{counted, significant};
-use flexbody_body::flex_body::FlexBody;
+use flexbody_body::flex_body::{FlexBody, MassStructure};
 
 /// The picture, where there is one, and what is known of the undeformed body.
 pub(super) fn body(html: &mut String, facts: &Facts<'_>, panel: Option<&str>) {
@@ -87,7 +87,7 @@ fn limits(html: &mut String, model: &ModelFacts) {
     if let Some(remark) = &model.approximation {
         minded.push(format!("Approximation: {}.", escape(remark)));
     }
-    if model.mass_structure == "diagonal" {
+    if model.mass_structure == MassStructure::Diagonal.name() {
         minded.push(
             "The mass matrix is diagonal: it was lumped before it came here, and all numbers are exact for that mass only."
                 .to_owned(),

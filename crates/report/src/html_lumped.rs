@@ -7,7 +7,7 @@ use super::lumped::{LumpedFacts, distinct};
 use super::lumped_effect::scheme_in_words;
 use super::markup::{escape, fold, section, table, texts};
 use super::numbers::{percent, significant};
-use flexbody_body::invariants::ERROR_NORMS;
+use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};
 use std::collections::HashMap;
 
 /// The section about lumped masses; nothing without any.
@@ -35,10 +35,11 @@ pub(super) fn lumped(html: &mut String, facts: &Facts<'_>) {
 
 /// `Nodal masses from row sums: 410 NEGATIVE masses, ...`.
 fn in_words(lumped: &LumpedFacts) -> String {
-    let whose = match lumped.scheme.as_str() {
-        "row-sum" => "Nodal masses from row sums",
-        "diagonal-scaling" => "Nodal masses from the scaled diagonal",
-        other => scheme_in_words(other),
+    let words = scheme_in_words(&lumped.scheme);
+    let whose = match LumpedScheme::from_name(&lumped.scheme) {
+        Some(LumpedScheme::RowSum) => format!("Nodal masses from {words}"),
+        Some(LumpedScheme::DiagonalScaling) => format!("Nodal masses from the {words}"),
+        Some(LumpedScheme::User) | None => words.to_owned(),
     };
     let words = escape(&lumped.in_words(true));
     let words = match (lumped.negative_masses, words.split_once(", ")) {
@@ -46,7 +47,7 @@ fn in_words(lumped: &LumpedFacts) -> String {
         (_, Some((negative, rest))) => format!("<span class=\"error\">{negative}</span>, {rest}"),
         (_, None) => format!("<span class=\"error\">{words}</span>"),
     };
-    format!("<strong>{}:</strong> {words}.", escape(whose))
+    format!("<strong>{}:</strong> {words}.", escape(&whose))
 }
 
 /// Worst error and negative masses of every scheme.

@@ -3,7 +3,7 @@
 
 use super::mass_properties::{centre_of_mass, inertia_about_com, principal_moments};
 use super::numbers::significant;
-use flexbody_body::invariants::Invariants;
+use flexbody_body::invariants::{Invariants, LumpedScheme};
 
 /// Errors up to this are rounding.
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
@@ -79,11 +79,11 @@ fn rough(part: f64) -> String {
 
 /// A scheme of lumping as engineers call it.
 pub(super) fn scheme_in_words(scheme: &str) -> &str {
-    match scheme {
-        "row-sum" => "row sums",
-        "diagonal-scaling" => "scaled diagonal",
-        "user" => "user masses",
-        other => other,
+    match LumpedScheme::from_name(scheme) {
+        Some(LumpedScheme::RowSum) => "row sums",
+        Some(LumpedScheme::DiagonalScaling) => "scaled diagonal",
+        Some(LumpedScheme::User) => "user masses",
+        None => scheme,
     }
 }
 

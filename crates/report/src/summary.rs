@@ -8,6 +8,7 @@ use super::lumped_effect::scheme_in_words;
 use super::numbers::{bytes, coordinates, counted, duration, plain, significant, triple};
 use super::text::{LABEL, WIDTH, entry_lines, first_and_last, own_modes};
 use flexbody_base::diagnostic::Severity;
+use flexbody_body::flex_body::MassStructure;
 
 /// Entries of a list that are shown.
 const LISTED: usize = 4;
@@ -141,7 +142,7 @@ fn body(summary: &mut Summary, facts: &Facts<'_>) {
     let title = format!("{}{number} ({})", plain(&model.name), model.units.in_words());
     summary.entry(tone, "body", &title, 2);
     let plane = if model.dimension == 2 { ", PLANE model" } else { "" };
-    let lumped = model.mass_structure == "diagonal";
+    let lumped = model.mass_structure == MassStructure::Diagonal.name();
     let tone = if lumped || !plane.is_empty() { Tone::Warning } else { Tone::Plain };
     let size = match &model.approximation {
         Some(_) => model.nodes_in_words(),

@@ -6,6 +6,7 @@ use super::geometric_stiffness::softening_in_words;
 use super::lumped::{ErrorNorm, Errors, LumpedModesFacts};
 use super::numbers::{bytes, coordinates, counted, duration, percent, plain, significant, triple};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
+use flexbody_body::basis::BasisKind;
 
 /// Columns of a terminal that every terminal has.
 pub(super) const WIDTH: usize = 80;
@@ -158,7 +159,8 @@ fn modes(page: &mut Page, facts: &Facts<'_>) {
     let whose = modes.whose_residual();
     page.entry("modes", &format!("{} flexible, worst residual {residual}{whose}{accuracy}", modes.count));
     page.entry("frequency", &first_and_last(hz));
-    if let Some(basis) = facts.model.settings["basis"].as_str().filter(|basis| *basis != "free") {
+    let body = facts.flex_body;
+    if let Some(basis) = body.basis_name().filter(|_| body.basis() != Some(BasisKind::Free)) {
         let made_of = modes.craig_bampton.as_ref().map_or(String::new(), |cb| format!(": {}", cb.made_of()));
         page.entry("basis", &format!("{}{made_of}", plain(basis)));
     }

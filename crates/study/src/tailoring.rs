@@ -6,7 +6,7 @@ use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out,
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::basis::{BasisChoice, Loads, UserLoads};
+use flexbody_body::basis::{BasisChoice, BasisKind, CraigBampton, CraigChang, FreeSurface, Loads, UserLoads};
 use flexbody_body::convert::{Condensation, Conversion, ConvertSettings, ModalModel};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::{Accuracy, Resume, Wanted};
@@ -176,11 +176,33 @@ pub fn loads_for(cases: Option<&LoadCases>, stated: &[LoadSource]) -> Vec<LoadSo
     loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
 }
 
+/// The basis of a kind that is computed from the model, with the residual vectors of `loads` where it takes them.
+///
+/// # Errors
+/// [`Usage`](Code::Usage) for imported shapes, which are no result of the model; errors of the files of loads.
+pub fn computed_basis(kind: BasisKind, loads: &[LoadSource], model: &FeModel) -> Result<BasisChoice> {
+    let residual_vectors = || read_loads(loads, model);
+    match kind {
+        BasisKind::Free | BasisKind::Scene => {
+            Ok(BasisChoice::Free(FreeSurface { residual_vectors: residual_vectors()? }))
+        }
+        BasisKind::CraigBampton => Ok(BasisChoice::CraigBampton(CraigBampton)),
+        BasisKind::CraigChang => {
+            Ok(BasisChoice::CraigChang(CraigChang { residual_vectors: residual_vectors()? }))
+        }
+        BasisKind::Imported => {
+            let message = "imported shapes are not computed from the model";
+            let help = "read them from a file: flexbody convert --basis imported --shapes FILE";
+            Err(Diagnostic::new(Code::Usage, message).with_help(help).into())
+        }
+    }
+}
+
 /// Loads of residual vectors, with the files read that they need.
 ///
 /// # Errors
 /// Those of [`read_shapes`] and [`UserLoads::new`].
-pub fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
+fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
     loads.iter().map(|set| read_set(set, model)).collect()
 }
 
@@ -239,7 +261,7 @@ pub fn convert_for(
 
 /// Refuses what a basis that is made of a motion cannot serve.
 fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
-    if tailoring.settings.interface_frame.is_some() {
+    if tailoring.settings.frame.interface().is_some() {
         let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";
         let help = "leave --scene out, or use --frame com";
         return Err(Diagnostic::new(Code::Usage, message).with_help(help).into());

@@ -1,9 +1,11 @@
 //! What can be said on the command line about work on a cluster and about many bodies.
 
-use super::{
-    AccuracyName, FrameName, JobArguments, Printing, StorageName, frame_name, memory_size, positive,
-};
+use super::{JobArguments, Printing, memory_size, names, positive};
 use clap::{Args, ValueEnum};
+use flexbody_body::flex_body::Storage;
+use flexbody_body::invariants::FrameChoice;
+use flexbody_cluster::Solver;
+use flexbody_eigen::Accuracy;
 use std::path::PathBuf;
 
 /// Arguments of `prepare`.
@@ -28,8 +30,8 @@ pub struct PrepareArguments {
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub max_frequency: Option<f64>,
     /// Promise about the modes: fast or standard
-    #[arg(long, value_enum, default_value_t = AccuracyName::Standard)]
-    pub accuracy: AccuracyName,
+    #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name())]
+    pub accuracy: Accuracy,
     /// Bits of the whole numbers of the PETSc on the cluster; matrices of more than two billion entries need
     /// 64
     #[arg(long, value_name = "BITS", default_value = "32", value_parser = ["32", "64"])]
@@ -58,16 +60,16 @@ pub struct AssembleArguments {
     #[arg(long)]
     pub prove: bool,
     /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
-    #[arg(long, value_enum, default_value_t = StorageName::F64)]
-    pub storage: StorageName,
+    #[arg(long, value_parser = names::storage(), default_value = Storage::default().name())]
+    pub storage: Storage,
     /// Memory that the program may use: a number with K, M, G or T
     /// [default: what the machine and its control groups leave]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
     /// Frame of the body: com (centre of mass, axes of the model), principal (there, principal axes), model (that of the
     /// model), or interface=NAME: on the reference point of an interface, which then rests in every mode [default: com]
-    #[arg(long, value_name = "FRAME", value_parser = frame_name)]
-    pub frame: Option<FrameName>,
+    #[arg(long, value_name = "FRAME")]
+    pub frame: Option<FrameChoice>,
     /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,
@@ -119,8 +121,8 @@ pub struct EngineArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub ranks: u32,
     /// How --engine slepc solves
-    #[arg(long, value_enum, default_value_t = SolverName::Mumps)]
-    pub solver: SolverName,
+    #[arg(long, value_parser = names::solver(), default_value = Solver::default().name())]
+    pub solver: Solver,
     /// Words that start MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
     #[arg(long, value_name = "WORDS")]
     pub mpiexec: Option<String>,
@@ -140,7 +142,7 @@ impl Default for EngineArguments {
         Self {
             engine: EngineName::BuiltIn,
             ranks: 1,
-            solver: SolverName::Mumps,
+            solver: Solver::default(),
             mpiexec: None,
             python: None,
             cluster_folder: None,
@@ -155,17 +157,4 @@ pub enum EngineName {
     BuiltIn,
     /// SLEPc over MPI
     Slepc,
-}
-
-/// Names of the solvers of SLEPc.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum SolverName {
-    /// Krylov-Schur, shift-invert, on one factor of MUMPS
-    Mumps,
-    /// Spectrum slicing, one factor for each part of the spectrum: hundreds of modes
-    Slices,
-    /// Krylov-Schur on conjugate gradients with algebraic multigrid: no factor, no count
-    Gamg,
-    /// LOBPCG with algebraic multigrid: no factor, no count
-    Lobpcg,
 }

@@ -1,7 +1,8 @@
 //! What can be said on the command line about transfer functions.
 
-use super::{BasisName, JobArguments, Printing, positive};
+use super::{JobArguments, Printing, names, positive};
 use clap::Args;
+use flexbody_body::basis::BasisKind;
 use flexbody_study::response::{Band, Settings as ResponseSettings};
 use std::path::PathBuf;
 
@@ -50,8 +51,8 @@ pub struct ResponseArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub modes: Option<u32>,
     /// Of a model without a body: what the modes are made of [default: free]
-    #[arg(long, value_enum)]
-    pub basis: Option<BasisName>,
+    #[arg(long, value_parser = names::basis())]
+    pub basis: Option<BasisKind>,
     /// Of a model without a body: static responses to add to free modes, as `convert` has them
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,

@@ -7,7 +7,7 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, CraigBampton};
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::flex_body::{FlexBody, ReferenceConditions};
-use flexbody_body::invariants::BodyFrame;
+use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_body::verification::{own_identities, verify};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_linalg::progress::SILENT;
@@ -39,8 +39,11 @@ fn bar() -> RawModel {
 }
 
 fn on_interface(model: &FeModel, name: &str, basis: BasisChoice, modes: usize) -> Result<Conversion> {
-    let mut settings =
-        ConvertSettings { basis, interface_frame: Some(name.to_owned()), ..ConvertSettings::default() };
+    let mut settings = ConvertSettings {
+        basis,
+        frame: FrameChoice::Interface(name.to_owned()),
+        ..ConvertSettings::default()
+    };
     settings.modes.wanted = Wanted::Lowest(modes);
     convert(model, &settings, SILENT)
 }
@@ -106,7 +109,7 @@ fn every_identity_holds_for_every_kind_of_model() {
 
 /// The body in mean axes has the eigenvalues of the body that was made in mean axes.
 fn is_the_body_in_mean_axes(body: &FlexBody, model: &FeModel, basis: BasisChoice, what: &str) {
-    let mut settings = ConvertSettings { basis, frame: BodyFrame::Com, ..ConvertSettings::default() };
+    let mut settings = ConvertSettings { basis, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(8);
     let expected = convert(model, &settings, SILENT).expect("a body").body;
     let mean = body.in_mean_axes_at(BodyFrame::Com).expect(what);
@@ -136,7 +139,7 @@ fn what_no_frame_can_stand_on_is_refused() {
         assert!(error.has(code) && error.to_string().contains(words), "{name}: {error}");
     }
     let mut settings =
-        ConvertSettings { interface_frame: Some("root".to_owned()), ..ConvertSettings::default() };
+        ConvertSettings { frame: FrameChoice::Interface("root".to_owned()), ..ConvertSettings::default() };
     settings.modes.accuracy = Accuracy::Certified;
     assert!(convert(&model, &settings, SILENT).expect_err("bounds").has(Code::Usage));
 }

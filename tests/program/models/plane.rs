@@ -24,7 +24,7 @@ fn model(raw: RawModel) -> FeModel {
 
 fn settings(modes: usize, frame: BodyFrame) -> ConvertSettings {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    ConvertSettings { modes, frame, ..ConvertSettings::default() }
+    ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() }
 }
 
 fn converted(model: &FeModel, modes: usize, frame: BodyFrame) -> Conversion {

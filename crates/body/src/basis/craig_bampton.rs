@@ -11,12 +11,12 @@ use super::failure::explain;
 use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
 use super::free_surface::{polynomial_estimate, single_precision_note};
 use super::held_interfaces::{check_prescribable, hold, unit_motions};
-use super::interface_coordinates::InterfaceCoordinates;
+use super::interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
 use super::interface_rows::{CoupledInterface, coupled_interfaces};
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::pseudo_free_surface::{Independent, independent, largest_shares, named};
 use super::rigid_modes::rigid_modes;
-use super::{FixedInterface, ModeSettings};
+use super::{BasisKind, FixedInterface, ModeSettings};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -42,8 +42,8 @@ const COPIES: u64 = 20;
 pub struct CraigBampton;
 
 impl Basis for CraigBampton {
-    fn name(&self) -> &'static str {
-        "craig-bampton"
+    fn kind(&self) -> BasisKind {
+        BasisKind::CraigBampton
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
@@ -352,7 +352,7 @@ impl<'a> Parts<'a> {
         problem: &EigenProblem<'_>,
         modes: MatRef<'_, f64>,
         dimension: usize,
-    ) -> InterfaceCoordinates {
+    ) -> CoordinatesInModelAxes {
         let (pencil, rigid) = (&problem.pencil, problem.rigid);
         let (c, lambda) = (self.constraint.ncols(), &self.fixed.eigenvalues);
         // K annihilates rigid motion: without it the energies keep their digits, and R'K R = 0 to the last.
@@ -373,9 +373,8 @@ impl<'a> Parts<'a> {
         let y = self.elimination.free_rows(left.as_ref());
         let eta = gram(self.fixed.vectors.as_ref(), self.reduced.pencil().apply_mass(y.as_ref()).as_ref());
         let modal = (1..=lambda.len()).map(|j| format!("fixed-interface mode {j}"));
-        InterfaceCoordinates {
+        let coordinates = InterfaceCoordinates {
             names: self.names.iter().cloned().chain(modal).collect(),
-            vectors: self.vectors(dimension),
             stiffness: Mat::from_fn(size, size, |i, j| match (i < c, j < c) {
                 (true, true) => mean(&stiffness, i, j),
                 (false, false) if i == j => lambda[i - c],
@@ -387,7 +386,8 @@ impl<'a> Parts<'a> {
                 modes.ncols(),
                 |i, j| if i < c { q[(i, j)] } else { eta[(i - c, j)] },
             ),
-        }
+        };
+        CoordinatesInModelAxes { coordinates, vectors: self.vectors(dimension) }
     }
 
     /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in

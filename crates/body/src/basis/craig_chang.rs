@@ -1,9 +1,9 @@
 //! Craig-Chang basis: free modes with the attachment modes of the interfaces (Craig and Chang, NASA CR-2781,
 //! 1977; theory section 5).
 
-use super::Loads;
 use super::free_surface::free_modes_with;
 use super::modal_basis::{Basis, ModalBasis, Task};
+use super::{BasisKind, Loads};
 use flexbody_base::error::Result;
 
 /// Free-surface modes and inertia-relief attachment modes: the part that the modes lack of the static
@@ -23,8 +23,8 @@ impl CraigChang {
 }
 
 impl Basis for CraigChang {
-    fn name(&self) -> &'static str {
-        "craig-chang"
+    fn kind(&self) -> BasisKind {
+        BasisKind::CraigChang
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {

@@ -4,7 +4,7 @@ use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, input_error, problem_of_span};
 use super::residual_vectors::{NamedLoads, interface_truncation, with_residual_vectors};
 use super::rigid_modes::rigid_modes;
-use super::{Loads, ModeSettings};
+use super::{BasisKind, Loads, ModeSettings};
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -29,8 +29,8 @@ pub struct FreeSurface {
 }
 
 impl Basis for FreeSurface {
-    fn name(&self) -> &'static str {
-        "free"
+    fn kind(&self) -> BasisKind {
+        BasisKind::Free
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {

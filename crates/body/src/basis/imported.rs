@@ -2,6 +2,7 @@
 //! model, freed from rigid motion, M-orthonormalised. Nothing is factored unless eigenvectors are to be
 //! proved complete.
 
+use super::BasisKind;
 use super::columns::{Given, columns};
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
@@ -93,10 +94,10 @@ impl ImportedShapes {
 }
 
 impl Basis for ImportedShapes {
-    fn name(&self) -> &'static str {
+    fn kind(&self) -> BasisKind {
         match self.origin {
-            Origin::User => "imported",
-            Origin::Motion => "scene",
+            Origin::User => BasisKind::Imported,
+            Origin::Motion => BasisKind::Scene,
         }
     }
 

@@ -4,29 +4,41 @@ use faer::Mat;
 use flexbody_linalg::combine;
 use nalgebra::Matrix3;
 
-/// K and M of a body in the motions q of its interfaces and the amplitudes eta of its fixed-interface modes
-/// (c + m in all), in this order, and the transformation from the modes of the body: \[q; eta\] = B p for
-/// modal amplitudes p, so that B'K B = diag(lambda), B'M B = I.
+/// The stiffness and mass matrices of a body in the motions of its interfaces and the amplitudes of its fixed-interface
+/// modes, and the transformation from its modes. The axes are those of the body, or of the model while a basis is made.
+///
+/// The coordinates of an interface are those of its reference point (three translations, three rotations; in the plane two
+/// and one) or, of a free one, the displacements of its nodes in the order of the nodes of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceCoordinates {
-    /// What each coordinate is: `left ux`, `left rz`, `fixed-interface mode 1`.
+    /// Name of each of the nc coordinates (`left ux`, `left rz`, `fixed-interface mode 1`): those of the interfaces in
+    /// their order, then the fixed-interface modes.
     pub names: Vec<String>,
-    /// First of the d coordinates of each vector among them: these change with the axes, all others do not.
-    pub(super) vectors: Vec<usize>,
-    /// blkdiag(K_cc, diag(lambda of the fixed-interface modes)): as many zero-energy motions as the body has
-    /// rigid ones.
+    /// Stiffness matrix (nc x nc): blkdiag(K_cc, diag(lambda of the fixed-interface modes)), with as many zero-energy
+    /// motions as the body has rigid ones.
     pub stiffness: Mat<f64>,
-    /// \[M_cc, M_cm; M_mc, I\].
+    /// Mass matrix (nc x nc): \[M_cc, M_cm; M_mc, I\].
     pub mass: Mat<f64>,
-    /// B ((c + m) x nf).
+    /// Transformation B (nc x nf): coordinates B p for the amplitudes p of the modes, B'K B = diag(lambda), B'M B = I.
     pub of_modes: Mat<f64>,
 }
 
-impl InterfaceCoordinates {
-    /// The same with vectors along the columns of `axes` (right-handed, in the plane about z), for modes
+/// Interface coordinates along the axes of the model, with the places of vectors among them, by which they turn into
+/// other axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CoordinatesInModelAxes {
+    /// The coordinates.
+    pub coordinates: InterfaceCoordinates,
+    /// First of the d coordinates of each vector: these change with the axes, all others do not.
+    pub(super) vectors: Vec<usize>,
+}
+
+impl CoordinatesInModelAxes {
+    /// Returns the coordinates with vectors along the columns of `axes` (right-handed, in the plane about z), for modes
     /// multiplied by `signs`.
-    pub fn in_axes(&self, axes: &Matrix3<f64>, dimension: usize, signs: &[f64]) -> Self {
-        let size = self.names.len();
+    pub fn in_axes(&self, axes: &Matrix3<f64>, dimension: usize, signs: &[f64]) -> InterfaceCoordinates {
+        let InterfaceCoordinates { names, stiffness, mass, of_modes } = &self.coordinates;
+        let size = names.len();
         let mut turn = Mat::<f64>::identity(size, size);
         for &first in &self.vectors {
             for i in 0..dimension {
@@ -39,12 +51,11 @@ impl InterfaceCoordinates {
             let b = combine(turn.as_ref(), combine(a.as_ref(), turn.as_ref().transpose()).as_ref());
             Mat::from_fn(size, size, |i, j| 0.5 * (b[(i, j)] + b[(j, i)]))
         };
-        let of_modes = combine(turn.as_ref(), self.of_modes.as_ref());
-        Self {
-            names: self.names.clone(),
-            vectors: self.vectors.clone(),
-            stiffness: turned(&self.stiffness),
-            mass: turned(&self.mass),
+        let of_modes = combine(turn.as_ref(), of_modes.as_ref());
+        InterfaceCoordinates {
+            names: names.clone(),
+            stiffness: turned(stiffness),
+            mass: turned(mass),
             of_modes: Mat::from_fn(size, of_modes.ncols(), |i, j| of_modes[(i, j)] * signs[j]),
         }
     }

@@ -14,6 +14,7 @@ mod held_interfaces;
 mod imported;
 mod interface_coordinates;
 mod interface_rows;
+mod kind;
 mod massless;
 mod modal_basis;
 mod nodal_modes;
@@ -34,7 +35,8 @@ pub use free_surface::{
     FreeSurface, first_eigenvalue_estimate, free_surface, free_surface_resumed, memory_estimate,
 };
 pub use imported::ImportedShapes;
-pub use interface_coordinates::InterfaceCoordinates;
+pub use interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
+pub use kind::BasisKind;
 pub use modal_basis::{Basis, ModalBasis, Task, Truncation};
 pub use oscillating::oscillating_responses;
 pub use residual_vectors::{

@@ -1,6 +1,6 @@
 //! What every basis gives, and what is checked of it whichever it is.
 
-use super::{FixedInterface, InterfaceCoordinates, ModeSettings};
+use super::{BasisKind, CoordinatesInModelAxes, FixedInterface, ModeSettings};
 use faer::MatRef;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -12,8 +12,8 @@ use flexbody_model::FeModel;
 /// A kind of basis. A new one is one file of this room and one variant of
 /// [`BasisChoice`](super::BasisChoice).
 pub trait Basis {
-    /// Name on the command line and in files.
-    fn name(&self) -> &'static str;
+    /// Kind of the basis, whose name stands in files.
+    fn kind(&self) -> BasisKind;
 
     /// The modes of a model in this basis: mass-normalised, M-orthogonal to the rigid motions, ascending.
     ///
@@ -38,7 +38,8 @@ pub struct Task<'a> {
 
 /// What a basis lacks of the static response x = K^+ f to a load: |x - x_basis| / |x| in the norm of K, which
 /// is sqrt(1 - sum_p (psi_p'f)^2 / lambda_p / f'K^+ f).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Truncation {
     /// Name of the load.
     pub load: String,
@@ -64,7 +65,7 @@ pub struct ModalBasis {
     /// For each load of the residual vectors, what the basis lacks.
     pub truncation: Vec<Truncation>,
     /// K and M in interface coordinates, of a basis that has them.
-    pub coordinates: Option<InterfaceCoordinates>,
+    pub coordinates: Option<CoordinatesInModelAxes>,
     /// What the basis is made of and how far it goes, of one with fixed-interface modes.
     pub fixed_interface: Option<FixedInterface>,
     /// Warnings and notes.

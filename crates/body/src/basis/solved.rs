@@ -1,6 +1,7 @@
 //! Free-surface modes that another eigen-solver found for the same K and M: Rayleigh quotients and residuals
 //! are computed anew, and nothing is taken on trust but, where no count of our own is wanted, the count.
 
+use super::BasisKind;
 use super::failure::explain;
 use super::modal_basis::{Basis, ModalBasis, Task, problem_of_span};
 use super::rigid_modes::rigid_modes;
@@ -47,8 +48,8 @@ pub struct SolvedModes {
 }
 
 impl Basis for SolvedModes {
-    fn name(&self) -> &'static str {
-        "free"
+    fn kind(&self) -> BasisKind {
+        BasisKind::Free
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {

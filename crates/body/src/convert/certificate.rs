@@ -1,8 +1,7 @@
 //! What is proved of the modes of a body, and what rounding leaves.
 
 use super::ModalModel;
-use crate::basis;
-use crate::flex_body::{Certificate, FixedInterface, Guarantee};
+use crate::flex_body::{Certificate, Guarantee};
 use flexbody_eigen::{Proof, energy_noise};
 use flexbody_model::rigid_count;
 
@@ -26,7 +25,7 @@ impl ModalModel<'_> {
             eigenvalue_rounding: self.eigenvalue_rounding(),
             inertia_rounding: 0.0,
             guarantee,
-            fixed_interface: found.fixed_interface.clone().map(fixed_interface),
+            fixed_interface: found.fixed_interface.clone(),
         }
     }
 
@@ -42,19 +41,4 @@ impl ModalModel<'_> {
             noise.iter().zip(&self.found.solution.eigenvalues).map(|(noise, lambda)| noise / lambda);
         ROUNDINGS * relative.fold(0.0, f64::max)
     }
-}
-
-/// The same of the body; written out, so that neither room need know the other.
-fn fixed_interface(found: basis::FixedInterface) -> FixedInterface {
-    let basis::FixedInterface {
-        modes,
-        interface_motions,
-        counted,
-        shift,
-        next,
-        residual,
-        free_estimate,
-        free_lower,
-    } = found;
-    FixedInterface { modes, interface_motions, counted, shift, next, residual, free_estimate, free_lower }
 }

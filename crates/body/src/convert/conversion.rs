@@ -4,12 +4,11 @@
 use super::geometric_stiffness::softening_warning;
 use super::remarks::{free_frequencies, interface_compliance, poor_fits};
 use super::{Condensation, ConvertSettings, LumpedPipeline, ModalModel, lumped, modal_damping};
-use crate::basis;
 use crate::flex_body::{
     FlexBody, InterfaceCoordinates, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
-    Storage, Truncation,
+    Storage,
 };
-use crate::invariants::{Invariants, MassProperties};
+use crate::invariants::{FrameChoice, Invariants, MassProperties};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_eigen::{Counters, Plan, Resume};
@@ -110,9 +109,9 @@ impl ModalModel<'_> {
             dimension: self.model.dimension(),
             units: self.model.units().clone(),
             frame: self.place.frame,
-            conditions: match &self.settings.interface_frame {
-                Some(name) => ReferenceConditions::Interface(name.clone()),
-                None => ReferenceConditions::MeanAxes,
+            conditions: match &self.settings.frame {
+                FrameChoice::Interface(name) => ReferenceConditions::Interface(name.clone()),
+                FrameChoice::Mean(_) => ReferenceConditions::MeanAxes,
             },
             interfaces: self.interfaces.clone(),
             coordinates: self.coordinates(),
@@ -167,16 +166,13 @@ impl ModalModel<'_> {
             Some(damping) => (damping.ratio, Some(damping.matrix), damping.warning),
             None => (vec![0.0; eigenvalues.len()], None, None),
         };
-        let truncation = self.found.truncation.iter().cloned();
         let modes = Modes {
             damping_ratio,
             modal_damping,
             eigenvalue: eigenvalues.clone(),
             residual: solution.residuals.clone(),
             provenance: self.found.provenance.clone(),
-            truncation: truncation
-                .map(|basis::Truncation { load, before, after }| Truncation { load, before, after })
-                .collect(),
+            truncation: self.found.truncation.clone(),
             shape: copied(self.modes.of_nodes()),
             rotation: self.modes.rotations.clone(),
             internal: self.modes.internal.clone(),
@@ -188,9 +184,7 @@ impl ModalModel<'_> {
     fn coordinates(&self) -> Option<InterfaceCoordinates> {
         let own = self.found.coordinates.as_ref()?;
         let axes = &self.place.frame.axes;
-        let turned = own.in_axes(axes, self.model.dimension(), &self.modes.signs);
-        let basis::InterfaceCoordinates { names, stiffness, mass, of_modes, .. } = turned;
-        Some(InterfaceCoordinates { names, stiffness, mass, of_modes })
+        Some(own.in_axes(axes, self.model.dimension(), &self.modes.signs))
     }
 
     /// Warnings and notes about the finished body.

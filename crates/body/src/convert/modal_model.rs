@@ -7,8 +7,8 @@ use super::{
 use crate::basis::{BasisChoice, ModalBasis, Task};
 use crate::flex_body::Interface;
 use crate::invariants::{
-    BodyFrame, Frame, InertiaStiffness, LumpedMasses, MassProperties, choose_frame, choose_general_frame,
-    choose_plane_frame,
+    BodyFrame, Frame, FrameChoice, InertiaStiffness, LumpedMasses, MassProperties, choose_frame,
+    choose_general_frame, choose_plane_frame,
 };
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -60,11 +60,11 @@ impl<'m> ModalModel<'m> {
         let task = Task { model, settings: &settings.modes, resume, watch };
         let mut found = settings.basis.basis().modes(&task)?;
         watch(Event::Phase("invariants"));
-        let (frame, mass_properties) = body_frame(model, settings.frame)?;
+        let (frame, mass_properties) = body_frame(model, &settings.frame)?;
         let frame = own_frame.unwrap_or(frame);
         let place = NodesInFrame::new(model, frame);
         let coupled = matches!(settings.basis, BasisChoice::CraigBampton(_) | BasisChoice::CraigChang(_));
-        if let Some(name) = &settings.interface_frame {
+        if let Some(name) = settings.frame.interface() {
             interface_frame::constrain(model, &place, name, coupled, &mut found)?;
         }
         let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
@@ -128,7 +128,7 @@ fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
 /// [`Usage`](Code::Usage) beside settings that are about free modes; those of
 /// [`frame_of_interface`](interface_frame::frame_of_interface).
 fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
-    let Some(name) = &settings.interface_frame else { return Ok(None) };
+    let Some(name) = settings.frame.interface() else { return Ok(None) };
     let refuse = |message: &str, help: &str| {
         Err(Diagnostic::new(Code::Usage, message.to_owned()).with_help(help.to_owned()).into())
     };
@@ -144,7 +144,11 @@ fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame
 }
 
 /// The body frame that is wanted, and the mass properties in model axes.
-fn body_frame(model: &FeModel, wanted: BodyFrame) -> Result<(Frame, MassProperties)> {
+fn body_frame(model: &FeModel, wanted: &FrameChoice) -> Result<(Frame, MassProperties)> {
+    let wanted = match wanted {
+        FrameChoice::Mean(frame) => *frame,
+        FrameChoice::Interface(_) => BodyFrame::Model,
+    };
     let positions = &model.nodes().positions;
     match (model.scalar_mass(), model.dimension()) {
         (Some(mass), 2) => choose_plane_frame(mass, positions, wanted),

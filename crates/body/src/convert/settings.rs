@@ -1,7 +1,7 @@
 //! What is asked of a conversion.
 
 use crate::basis::{BasisChoice, Loads, ModeSettings};
-use crate::invariants::{BodyFrame, LumpedScheme};
+use crate::invariants::{FrameChoice, LumpedScheme};
 use flexbody_eigen::Wanted;
 use flexbody_model::{Damping, FeModel, SurfaceMesh};
 
@@ -45,10 +45,8 @@ pub struct ConvertSettings {
     pub modes: ModeSettings,
     /// Which basis.
     pub basis: BasisChoice,
-    /// Body frame of a body in mean axes.
-    pub frame: BodyFrame,
-    /// Interface that the frame stands on instead: at its reference point, along the axes of the model.
-    pub interface_frame: Option<String>,
+    /// Body frame.
+    pub frame: FrameChoice,
     /// Comparators.
     pub lumped: Vec<Lumping>,
     /// Also compute the modes of each lumped mass.
@@ -63,8 +61,7 @@ impl Default for ConvertSettings {
         Self {
             modes: ModeSettings::default(),
             basis: BasisChoice::default(),
-            frame: BodyFrame::default(),
-            interface_frame: None,
+            frame: FrameChoice::default(),
             lumped: vec![Lumping::RowSum, Lumping::DiagonalScaling],
             lumped_modes: false,
             mesh: MeshChoice::default(),
@@ -83,11 +80,8 @@ impl ConvertSettings {
         let loads: Vec<String> = self.basis.residual_vectors().iter().map(Loads::name).collect();
         let mut described = serde_json::json!({
             "accuracy": self.modes.accuracy.name(),
-            "basis": self.basis.basis().name(),
-            "frame": self.interface_frame.as_ref().map_or_else(
-                || self.frame.name().to_owned(),
-                |name| format!("interface {name}"),
-            ),
+            "basis": self.basis.basis().kind().name(),
+            "frame": self.frame.text(),
             "lumped": schemes,
             "max_eigenvalue": below,
             "modes": modes,

@@ -5,6 +5,7 @@ use super::{
     Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, ReferenceConditions,
     Source, Storage, TermDecision,
 };
+use crate::basis::BasisKind;
 use crate::invariants::{
     BodyFrame, Expected, Frame, IdentityCheck, InertiaStiffness, Invariants, Turning, identities,
 };
@@ -253,6 +254,16 @@ impl FlexBody {
     /// What was decided about the groups of the kinetic energy; empty where nobody asked.
     pub fn terms(&self) -> &[TermDecision] {
         &self.parts.terms
+    }
+
+    /// Name of the basis that the modes were computed in, as the settings of the conversion record it.
+    pub fn basis_name(&self) -> Option<&str> {
+        self.source().settings["basis"].as_str()
+    }
+
+    /// Kind of basis of this name; `None` of a body that records none, or one that is not known here.
+    pub fn basis(&self) -> Option<BasisKind> {
+        self.basis_name().and_then(BasisKind::from_name)
     }
 
     /// Precision of shapes and of the inertia of the modes.

@@ -2,7 +2,7 @@
 //! file whose digests were stated anew after a change is found by these where mechanics can tell.
 
 use super::{MassStructure, Parts};
-use crate::invariants::{CauchySchwarz, IdentityCheck};
+use crate::invariants::{CauchySchwarz, IdentityCheck, LumpedScheme};
 use flexbody_linalg::{larger, largest};
 
 /// Two ways to the same sum: rounding, relative to its Cauchy-Schwarz bound.
@@ -19,7 +19,8 @@ impl Parts {
 
     /// Row sums keep the mass, the centre of mass and the linear momentum of every mode.
     fn row_sums(&self) -> Option<IdentityCheck> {
-        let lumped = &self.lumped.iter().find(|lumped| lumped.scheme == "row-sum")?.invariants;
+        let lumped =
+            &self.lumped.iter().find(|lumped| lumped.scheme == LumpedScheme::RowSum.name())?.invariants;
         let own = &self.invariants;
         let bound = CauchySchwarz::of(own);
         let relative =

@@ -2,7 +2,7 @@
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
 use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, ReferenceConditions};
-use crate::invariants::{BodyFrame, Groups, Invariants, error_norms, principal_axes};
+use crate::invariants::{BodyFrame, FrameChoice, Groups, Invariants, error_norms, principal_axes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -45,7 +45,7 @@ impl FlexBody {
             }
         };
         let mut parts = placed.into_parts();
-        parts.source.settings["frame"] = serde_json::json!(at.name());
+        parts.source.settings["frame"] = FrameChoice::Mean(at).text().into();
         Self::new(parts)
     }
 
@@ -64,7 +64,7 @@ impl FlexBody {
         let change = ModalChange::in_own_frame(carried.invariants(), carried.dimension())
             .map_err(|reason| impossible(format!("no frame can stand on interface `{name}`: {reason}")))?;
         let mut parts = carried.changed(&change, conditions)?.into_parts();
-        parts.source.settings["frame"] = serde_json::json!(format!("interface {name}"));
+        parts.source.settings["frame"] = FrameChoice::Interface(name.to_owned()).text().into();
         Self::new(parts)
     }
 

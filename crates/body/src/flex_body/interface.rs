@@ -95,20 +95,3 @@ impl Interface {
         .then_some(rows)
     }
 }
-
-/// K and M of a body in the motions of its interfaces and the amplitudes of its fixed-interface modes, and
-/// the transformation from its modes. In body axes: the coordinates of an interface are those of its
-/// reference point (three translations, three rotations; in the plane two and one) or, of a free one, the
-/// displacements of its nodes in the order of the nodes of the body.
-#[derive(Debug, Clone, PartialEq)]
-pub struct InterfaceCoordinates {
-    /// What each of the nc coordinates is: those of the interfaces in their order, then the fixed-interface
-    /// modes.
-    pub names: Vec<String>,
-    /// K (nc x nc), with as many zero-energy motions as the body has rigid ones.
-    pub stiffness: Mat<f64>,
-    /// M (nc x nc).
-    pub mass: Mat<f64>,
-    /// B (nc x nf): coordinates B p for the amplitudes p of the modes, B'K B = diag(lambda), B'M B = I.
-    pub of_modes: Mat<f64>,
-}

@@ -3,7 +3,6 @@
 mod body;
 mod carried;
 mod cross_checks;
-mod fixed_interface;
 mod frames;
 mod in_units;
 mod interface;
@@ -21,17 +20,16 @@ mod storage;
 mod terms;
 mod validate;
 
+pub use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 pub use crate::invariants::{Frame, Group, Groups};
 pub use body::FlexBody;
 pub use carried::Carrier;
-pub use fixed_interface::FixedInterface;
-pub use flexbody_model::{GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
-pub use interface::{Interface, InterfaceCoordinates, InterfaceRows};
+pub use flexbody_model::{Coupling, GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};
+pub use interface::{Interface, InterfaceRows};
 pub use modal_change::{ModalChange, RigidMotions, diagonal_eigenvalues, reduced_residuals, rigid_motions};
 pub use model_axes::stiffness_about;
 pub use parts::{
-    Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, Truncation,
-    is_static,
+    Certificate, Guarantee, InternalRows, LumpedBody, MassStructure, Modes, Parts, Source, is_static,
 };
 pub use reference_conditions::ReferenceConditions;
 pub use softening::{SOFTENING, axis_in_words};

@@ -1,6 +1,7 @@
 //! What a flexible body is made of: plain data, not yet checked.
 
-use super::{FixedInterface, Interface, InterfaceCoordinates, ReferenceConditions, Storage, TermDecision};
+use super::{Interface, ReferenceConditions, Storage, TermDecision};
+use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
 use crate::invariants::{DIGITS, Frame, InertiaStiffness, Invariants};
 use faer::Mat;
 use flexbody_base::provenance::SourceFile;
@@ -37,16 +38,23 @@ pub enum MassStructure {
     General,
 }
 
-/// What the modes lack of the static response to a load, relative, in the norm of K.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Truncation {
-    /// Name of the load.
-    pub load: String,
-    /// With the free modes alone.
-    pub before: f64,
-    /// With the residual vectors.
-    pub after: f64,
+impl MassStructure {
+    /// Every structure, in the order of the documentation.
+    pub const ALL: [Self; 3] = [Self::RotationInvariant, Self::Diagonal, Self::General];
+
+    /// Name in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RotationInvariant => "rotation-invariant",
+            Self::Diagonal => "diagonal",
+            Self::General => "general",
+        }
+    }
+
+    /// Returns the structure of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
+    }
 }
 
 /// Mode shapes and what is known of each mode.

@@ -22,6 +22,11 @@ impl Storage {
         }
     }
 
+    /// Returns the storage of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
+    }
+
     /// What rounding of the arrays may add to sums of entries that are relative to their Cauchy-Schwarz
     /// bounds; zero for 64-bit floats, whose rounding every limit knows.
     pub fn rounding(self) -> f64 {

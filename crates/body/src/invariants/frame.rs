@@ -98,6 +98,65 @@ impl BodyFrame {
             Self::Model => "model",
         }
     }
+
+    /// Returns the frame of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
+    }
+}
+
+/// Which body frame to use, and what ties it to the deformed body.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum FrameChoice {
+    /// This frame, which follows the mean motion of the body (mean axes).
+    Mean(BodyFrame),
+    /// On the reference point of the interface of this name, along the axes of the model. The interface rests in every
+    /// mode: the modes are those of the body that is held there.
+    Interface(String),
+}
+
+impl FrameChoice {
+    /// Name in the settings of a file.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Mean(frame) => frame.name().to_owned(),
+            Self::Interface(name) => format!("interface {name}"),
+        }
+    }
+
+    /// The interface that the frame stands on; `None` of a frame in mean axes.
+    pub fn interface(&self) -> Option<&str> {
+        match self {
+            Self::Mean(_) => None,
+            Self::Interface(name) => Some(name),
+        }
+    }
+}
+
+impl Default for FrameChoice {
+    fn default() -> Self {
+        BodyFrame::default().into()
+    }
+}
+
+impl From<BodyFrame> for FrameChoice {
+    fn from(frame: BodyFrame) -> Self {
+        Self::Mean(frame)
+    }
+}
+
+impl std::str::FromStr for FrameChoice {
+    type Err = String;
+
+    /// The name of a frame in mean axes, or `interface=NAME`.
+    fn from_str(text: &str) -> std::result::Result<Self, String> {
+        if let Some(name) = text.strip_prefix("interface=").filter(|name| !name.is_empty()) {
+            return Ok(Self::Interface(name.to_owned()));
+        }
+        let known = || BodyFrame::ALL.map(BodyFrame::name).join(", ");
+        let unknown = || format!("expected {} or interface=NAME", known());
+        BodyFrame::from_name(text).map(Self::Mean).ok_or_else(unknown)
+    }
 }
 
 /// Mass, centre of mass and inertia of the undeformed body.

@@ -33,6 +33,11 @@ impl LumpedScheme {
             Self::User => "user",
         }
     }
+
+    /// Returns the scheme of this name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|known| known.name() == name)
+    }
 }
 
 /// Nodal masses of one scheme, in node order.

@@ -32,7 +32,9 @@ pub use comparison::{ERROR_NORMS, error_norms};
 pub use condense::condense;
 pub use condense_linear::{condense_linear, condense_lumped_linear};
 pub use derived::Derived;
-pub use frame::{BodyFrame, Frame, MassProperties, choose_frame, choose_general_frame, choose_plane_frame};
+pub use frame::{
+    BodyFrame, Frame, FrameChoice, MassProperties, choose_frame, choose_general_frame, choose_plane_frame,
+};
 pub use general::rigid_first_moment;
 pub use general::{MassProduct, RigidMotion, condense_general, condense_general_linear};
 pub use groups::{Group, Groups};

@@ -205,7 +205,8 @@ fn craig_bampton(model: &FeModel, count: usize) -> ModalBasis {
 }
 
 fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
-    let settings = ConvertSettings { modes: lowest(count), basis, frame, ..ConvertSettings::default() };
+    let settings =
+        ConvertSettings { modes: lowest(count), basis, frame: frame.into(), ..ConvertSettings::default() };
     convert(model, &settings, SILENT).expect("a body")
 }
 
@@ -226,7 +227,7 @@ fn modal_responses(basis: &ModalBasis, forces: MatRef<'_, f64>) -> Mat<f64> {
 
 /// Eigenvalues of the fixed-interface modes.
 fn fixed(basis: &ModalBasis) -> Vec<f64> {
-    let coordinates = basis.coordinates.as_ref().expect("a Craig-Bampton basis");
+    let coordinates = &basis.coordinates.as_ref().expect("a Craig-Bampton basis").coordinates;
     let all = coordinates.names.iter().enumerate();
     all.filter(|(_, name)| name.starts_with("fixed-interface mode "))
         .map(|(i, _)| coordinates.stiffness[(i, i)])

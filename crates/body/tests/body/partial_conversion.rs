@@ -16,7 +16,7 @@ const MODES: usize = 6;
 
 fn settings() -> ConvertSettings {
     let modes = ModeSettings { wanted: Wanted::Lowest(MODES), ..ModeSettings::default() };
-    ConvertSettings { modes, frame: BodyFrame::Principal, ..ConvertSettings::default() }
+    ConvertSettings { modes, frame: BodyFrame::Principal.into(), ..ConvertSettings::default() }
 }
 
 fn fixture(name: &str) -> FeModel {

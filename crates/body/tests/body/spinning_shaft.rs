@@ -44,7 +44,7 @@ fn rayleigh(width: f64, spin: f64, [mut low, mut high]: [f64; 2]) -> f64 {
 fn body(parts: usize, width: f64) -> FlexBody {
     let model = FeModel::from_raw(shaft(parts, width)).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(6), ..ModeSettings::default() };
-    let settings = ConvertSettings { modes, frame: BodyFrame::Com, ..ConvertSettings::default() };
+    let settings = ConvertSettings { modes, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
     convert(&model, &settings, SILENT).expect("converts").body
 }
 

@@ -21,7 +21,7 @@ fn settings(accuracy: Accuracy, count: usize, frame: BodyFrame) -> ConvertSettin
         method: Method::Auto,
         ..ModeSettings::default()
     };
-    ConvertSettings { modes, frame, ..ConvertSettings::default() }
+    ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() }
 }
 
 fn model(kind: Kind, cells: [i32; 3], rule: MassRule) -> FeModel {

@@ -171,7 +171,7 @@ fn invariants_follow_the_frame() {
     for name in FIXTURES {
         let model = FeModel::from_raw(raw(name)).expect("a body").model;
         let [own, other] = [BodyFrame::Principal, BodyFrame::Model].map(|frame| {
-            let settings = ConvertSettings { frame, ..settings(6, Method::Auto) };
+            let settings = ConvertSettings { frame: frame.into(), ..settings(6, Method::Auto) };
             convert(&model, &settings, SILENT).expect("converts").body
         });
         let frame = own.frame();

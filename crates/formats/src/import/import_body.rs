@@ -13,7 +13,7 @@ use flexbody_body::flex_body::{
     Parts, ReferenceConditions, Source, Storage, TermDecision, diagonal_eigenvalues, reduced_residuals,
     rigid_motions,
 };
-use flexbody_body::invariants::{BodyFrame, Invariants, identities, symmetric_part};
+use flexbody_body::invariants::{BodyFrame, FrameChoice, Invariants, identities, symmetric_part};
 use flexbody_linalg::larger;
 use flexbody_model::Nodes;
 use std::collections::HashSet;
@@ -31,19 +31,11 @@ pub struct Imported {
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Body frame of a body that is read from a file of another program.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub enum ImportFrame {
-    /// The frame of the file, tied to the body as its modes tie it: a model that holds the frame keeps its meaning.
-    #[default]
-    Kept,
-    /// Mean axes: rigid motion is taken out of the modes.
-    Mean(BodyFrame),
-    /// The frame stands on the interface, or on the node with rotations, of this name.
-    Interface(String),
-}
-
 /// Makes a body of `file`, which was read from `source`; `units` count if the file states none.
+///
+/// Without a `frame` the body keeps that of the file, tied to it as its modes tie it: a model that holds the frame keeps
+/// its meaning. In mean axes rigid motion is taken out of the modes. A frame may stand on an interface, or on a node with
+/// rotations, by its name.
 ///
 /// Modes that are mass-normalised with a diagonal stiffness to 1e-9 are taken as they are, to the last bit, if the
 /// frame is kept or they are free of rigid motion. Others are made so by the small eigenproblem, with the products
@@ -59,7 +51,7 @@ pub fn import_body(
     file: &ImportedFile,
     source: SourceFile,
     units: UnitSystem,
-    frame: &ImportFrame,
+    frame: Option<&FrameChoice>,
 ) -> Result<Imported> {
     refuse_unsound(file)?;
     let given = &file.body;
@@ -78,9 +70,9 @@ pub fn import_body(
     let (body, warning) = with_own_rounding(body)?;
     diagnostics.extend(warning);
     let body = match frame {
-        ImportFrame::Kept => body,
-        ImportFrame::Mean(at) => body.in_mean_axes_at(*at)?,
-        ImportFrame::Interface(name) => with_interface(body, name)?.on_interface(name)?,
+        None => body,
+        Some(FrameChoice::Mean(at)) => body.in_mean_axes_at(*at)?,
+        Some(FrameChoice::Interface(name)) => with_interface(body, name)?.on_interface(name)?,
     };
     Ok(Imported { body, diagnostics })
 }

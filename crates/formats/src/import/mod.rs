@@ -21,4 +21,4 @@ pub use audit::{Audit, audit};
 pub use body::{ImportedBody, ImportedFrame};
 pub use check::AuditCheck;
 pub use format::{ImportFormat, ImportedFile};
-pub use import_body::{ImportFrame, Imported, import_body};
+pub use import_body::{Imported, import_body};

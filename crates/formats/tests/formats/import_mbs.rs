@@ -9,7 +9,7 @@ use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
 use flexbody_formats::export::ExportOptions;
-use flexbody_formats::import::{ImportFrame, ImportedFile, audit, import_body};
+use flexbody_formats::import::{ImportedFile, audit, import_body};
 use flexbody_formats::{export, find_format};
 use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::FeModel;
@@ -216,8 +216,7 @@ fn what_mbdyn_skips_is_a_finding() {
     assert!(found.contains(&surplus) && unsound.len() > 3, "{found:?} {unsound:?}");
     let imported = read(text.replacen("REV0 18 3", "REV0 18 2", 1).as_bytes(), "mbdyn").expect("readable");
     let source = SourceFile::new("body", Path::new("body.fem"), "0".repeat(64));
-    let error =
-        import_body(&imported, source, UnitSystem::default(), &ImportFrame::Kept).expect_err("another body");
+    let error = import_body(&imported, source, UnitSystem::default(), None).expect_err("another body");
     assert!(error.has(Code::ForeignUnsound), "{error}");
 }
 
@@ -497,7 +496,7 @@ proptest! {
                 prop_assert!(found.body.frames.iter().all(|frame| frame.translation.ncols() == found.body.n_modes()));
                 let _ = audit(&found, 1e-6);
                 let source = SourceFile::new("body", &path, "0".repeat(64));
-                let _ = import_body(&found, source, UnitSystem::default(), &ImportFrame::Kept);
+                let _ = import_body(&found, source, UnitSystem::default(), None);
             }
             Err(error) => {
                 let about = [Code::ForeignUnreadable, Code::ForeignIncomplete, Code::FileUnreadable];
@@ -533,7 +532,7 @@ fn a_clamped_public_body_keeps_its_frame() {
     let notes = audit(&given, 1e-6).notes.join("\n");
     assert!(notes.contains("the frame stands on 2 nodes that move in no mode, 1 to 21"), "{notes}");
     let source = SourceFile::new("body", &shared, "0".repeat(64));
-    let taken = import_body(&given, source, UnitSystem::default(), &ImportFrame::Kept).expect("a body");
+    let taken = import_body(&given, source, UnitSystem::default(), None).expect("a body");
     // Surface lines are kept, stresses are reported as lost.
     assert!(taken.body.mesh().is_some_and(|mesh| mesh.edges().len() == 20));
     assert!(taken.diagnostics.iter().any(|d| d.message().contains("nodal stress matrix")));

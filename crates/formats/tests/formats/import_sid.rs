@@ -8,7 +8,7 @@ use flexbody_base::text::InputFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_formats::export::{ExportOptions, Points};
-use flexbody_formats::import::{ImportFormat, ImportFrame, ImportedFile, audit, import_body};
+use flexbody_formats::import::{ImportFormat, ImportedFile, audit, import_body};
 use flexbody_formats::{export, find_format};
 use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::LoadKind;
@@ -440,8 +440,7 @@ fn axes_that_are_no_rotation_are_refused() {
         let imported = read(&edited(file("fembs"), change));
         assert_eq!(findings(&imported), ["FB748 ap_is_a_rotation"]);
         let source = SourceFile::new("body", Path::new("body.SID_FEM"), "0".repeat(64));
-        let error =
-            import_body(&imported, source, UnitSystem::default(), &ImportFrame::Kept).expect_err(words);
+        let error = import_body(&imported, source, UnitSystem::default(), None).expect_err(words);
         assert!(error.has(Code::ForeignUnsound) && error.to_string().contains(words), "{error}");
     }
 }

@@ -7,7 +7,7 @@ use flexbody_base::text::InputFile;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{BodyFrame, Invariants, primary_differences};
 use flexbody_formats::export::{ExportFormat, ExportOptions, Points};
-use flexbody_formats::import::{ImportFormat, ImportFrame, Imported, ImportedFile, audit, import_body};
+use flexbody_formats::import::{ImportFormat, Imported, ImportedFile, audit, import_body};
 use flexbody_formats::{FORMATS, export};
 use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::{LoadKind, UnitLoad};
@@ -59,8 +59,7 @@ fn written(body: &FlexBody, format: &dyn ExportFormat, dialect: Option<&str>, fo
 
 fn taken(imported: &ImportedFile) -> Imported {
     let source = SourceFile::new("body", Path::new("body.file"), "0".repeat(64));
-    import_body(imported, source, flexbody_base::units::UnitSystem::default(), &ImportFrame::Kept)
-        .expect("a body")
+    import_body(imported, source, flexbody_base::units::UnitSystem::default(), None).expect("a body")
 }
 
 /// What no format of other programs tells of a general mass: W0 beyond C1.

@@ -2,7 +2,7 @@
 //! scipy, anndata, MATLAB and PETSc (`docs/input.md`).
 
 use super::super::assemble::{
-    ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, assembled, check_size, push,
+    ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_size, push,
     refuse_beyond_memory, undeclared_triangle,
 };
 use super::members::{Members, POINTERS};
@@ -32,32 +32,32 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
         },
     };
     let sides = parsed.sides;
-    let storage = match declared {
+    let stored = match declared {
         Declared::Triangle if sides == (Sides { lower: true, upper: true }) => {
             let message = format!(
                 "group `{name}` declares one triangle, but has entries on both sides of the diagonal"
             );
             return Err(vec![Diagnostic::new(Code::MatrixTriangles, message)]);
         }
-        Declared::Triangle | Declared::Symmetric if sides.lower != sides.upper => Storage::Triangle,
+        Declared::Triangle | Declared::Symmetric if sides.lower != sides.upper => StoredEntries::Triangle,
         Declared::No => {
             let help = |stored: &str| {
                 format!("store both triangles, or set the attribute symmetric = \"{stored}\" of group {name}")
             };
             match undeclared_triangle(sides, help) {
                 Some(diagnostic) => return Err(vec![diagnostic]),
-                None => Storage::Full,
+                None => StoredEntries::Full,
             }
         }
-        _ => Storage::Full,
+        _ => StoredEntries::Full,
     };
-    let made = match (parsed.entries, storage) {
+    let made = match (parsed.entries, stored) {
         (Entries::Kept(matrix), _) => assembled(matrix, 17, file.path()),
-        (Entries::Columns(columns), Storage::Full) => assemble_columns(columns, 17, file.path()),
-        (Entries::Columns(columns), Storage::Triangle) => {
-            assemble(parsed.n, columns.into_entries(), storage, 17, file.path())
+        (Entries::Columns(columns), StoredEntries::Full) => assemble_columns(columns, 17, file.path()),
+        (Entries::Columns(columns), StoredEntries::Triangle) => {
+            assemble(parsed.n, columns.into_entries(), stored, 17, file.path())
         }
-        (Entries::Listed(pieces), _) => assemble(parsed.n, pieces, storage, 17, file.path()),
+        (Entries::Listed(pieces), _) => assemble(parsed.n, pieces, stored, 17, file.path()),
     };
     let mut raw = made.map_err(|d| vec![d])?;
     if parsed.single_precision {

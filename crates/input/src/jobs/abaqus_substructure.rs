@@ -4,7 +4,7 @@
 
 use super::deck::{Card, Deck, fields};
 use super::{Found, both, missing};
-use crate::assemble::{Entry, Storage, assemble, check_size};
+use crate::assemble::{Entry, StoredEntries, assemble, check_size};
 use crate::coordinates::{excerpt, line_aligned, lines, real};
 use crate::digits::{COUNTED, written_digits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -58,9 +58,10 @@ impl Substructure {
         };
         let file = SubstructureFile { deck: &deck, element, path };
         let labels = file.labels().map_err(|diagnostic| vec![diagnostic])?;
-        let storage = if element.parameter("UNSYM").is_some() { Storage::Full } else { Storage::Triangle };
-        let stiffness = file.matrix("STIFFNESS", labels.len(), storage);
-        let (stiffness, mass) = both(stiffness, file.matrix("MASS", labels.len(), Storage::Triangle))?;
+        let stored =
+            if element.parameter("UNSYM").is_some() { StoredEntries::Full } else { StoredEntries::Triangle };
+        let stiffness = file.matrix("STIFFNESS", labels.len(), stored);
+        let (stiffness, mass) = both(stiffness, file.matrix("MASS", labels.len(), StoredEntries::Triangle))?;
         let (_, seen) = deck.seen()?.swap_remove(0);
         Ok(Self { labels, stiffness, mass, seen })
     }
@@ -147,7 +148,7 @@ impl SubstructureFile<'_> {
     }
 
     /// The matrix of a type with `n` rows.
-    fn matrix(&self, kind: &str, n: usize, storage: Storage) -> Found<RawMatrix> {
+    fn matrix(&self, kind: &str, n: usize, stored: StoredEntries) -> Found<RawMatrix> {
         let is_meant =
             |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|own| own == kind);
         let Some(card) = self.deck.cards().iter().find(is_meant) else {
@@ -156,9 +157,9 @@ impl SubstructureFile<'_> {
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(self.path)];
         let pieces = self.values(card)?;
         let count: usize = pieces.iter().map(|piece| piece.values.len()).sum();
-        let expected = match storage {
-            Storage::Full => n * n,
-            Storage::Triangle => n * (n + 1) / 2,
+        let expected = match stored {
+            StoredEntries::Full => n * n,
+            StoredEntries::Triangle => n * (n + 1) / 2,
         };
         if count != expected {
             let message =
@@ -177,8 +178,8 @@ impl SubstructureFile<'_> {
             })
             .collect();
         let entries = pieces.into_par_iter().zip(starts);
-        let entries = entries.map(|(piece, start)| in_rows(&piece.values, start, n, storage)).collect();
-        assemble(n, entries, storage, written, self.path).map_err(|diagnostic| vec![diagnostic])
+        let entries = entries.map(|(piece, start)| in_rows(&piece.values, start, n, stored)).collect();
+        assemble(n, entries, stored, written, self.path).map_err(|diagnostic| vec![diagnostic])
     }
 
     /// The numbers below a card.
@@ -233,8 +234,8 @@ impl Piece {
 }
 
 /// Values of which the first is the one of place `start`, counted row by row.
-fn in_rows(values: &[f64], start: usize, n: usize, storage: Storage) -> Vec<Entry> {
-    let length = |row: usize| if storage == Storage::Full { n } else { row + 1 };
+fn in_rows(values: &[f64], start: usize, n: usize, stored: StoredEntries) -> Vec<Entry> {
+    let length = |row: usize| if stored == StoredEntries::Full { n } else { row + 1 };
     let (mut row, mut col) = (0, start);
     while col >= length(row) {
         col -= length(row);

@@ -1,7 +1,7 @@
 //! Matrices as lines `row column value` without a header, as CalculiX and Abaqus write them.
 
 use super::{Found, FromFile};
-use crate::assemble::{Entry, Sides, Storage, assemble, check_size};
+use crate::assemble::{Entry, Sides, StoredEntries, assemble, check_size};
 use crate::coordinates::{Blocks, Coordinates, Limits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::compression::Compression;
@@ -68,7 +68,7 @@ impl CoordinateFile {
         let path = &self.seen.path;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];
         check_size(n as u64, n as u64, self.count).map_err(in_file)?;
-        let raw = assemble(n, self.pieces, Storage::of(self.sides), self.written, path);
+        let raw = assemble(n, self.pieces, StoredEntries::of(self.sides), self.written, path);
         Ok((raw.map_err(|diagnostic| vec![diagnostic])?, self.seen))
     }
 }

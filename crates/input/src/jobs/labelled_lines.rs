@@ -3,7 +3,7 @@
 
 use super::deck::fields;
 use super::{Found, FromFile, both};
-use crate::assemble::{Entry, Sides, Storage, assemble, check_size};
+use crate::assemble::{Entry, Sides, StoredEntries, assemble, check_size};
 use crate::coordinates::{Blocks, excerpt, line_aligned, lines, most_entries, real};
 use crate::digits::{COUNTED, written_digits};
 use crate::recent::Recent;
@@ -83,7 +83,7 @@ impl LabelledLines {
             lower: some(|entry| entry.row > entry.col && entry.value != 0.0),
             upper: some(|entry| entry.row < entry.col && entry.value != 0.0),
         };
-        assemble(labels.len(), numbered, Storage::of(sides), written, path)
+        assemble(labels.len(), numbered, StoredEntries::of(sides), written, path)
             .map_err(|diagnostic| vec![diagnostic])
     }
 }

@@ -139,7 +139,7 @@ impl ManifestWalk<'_, '_> {
             DeValue::String(name) => name.as_ref(),
             _ => "",
         };
-        let coupling = Coupling::ALL.into_iter().find(|coupling| coupling.name() == name);
+        let coupling = Coupling::from_name(name);
         if coupling.is_none() {
             let expected = Coupling::ALL.map(|coupling| format!("`{}`", coupling.name())).join(", ");
             let message = format!("`coupling` is none of {expected}");

@@ -1,6 +1,6 @@
 //! What text and binary files have in common: headers, strings of values, and where they go.
 
-use crate::assemble::{ColumnEntries, Entry, Sides, Storage, assemble, assemble_columns, push};
+use crate::assemble::{ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, push};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::memory::or_go_without;
 use flexbody_model::RawMatrix;
@@ -254,7 +254,7 @@ impl Columns {
         for ((col, row), value) in columns.zip(self.rows).zip(self.values) {
             push(&mut pieces, Entry { row, col, value });
         }
-        assemble(n, pieces, Storage::Full, self.written, path)
+        assemble(n, pieces, StoredEntries::Full, self.written, path)
     }
 }
 

@@ -245,7 +245,7 @@ fn converted(name: &str, modes: usize) -> Conversion {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let settings = ConvertSettings {
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
-        frame: BodyFrame::Com,
+        frame: BodyFrame::Com.into(),
         ..ConvertSettings::default()
     };
     convert(&model, &settings, &|_| {}).expect("converts")

@@ -23,7 +23,7 @@ const STEP: f64 = 1e-4;
 fn converted(raw: RawModel, modes: usize, frame: BodyFrame) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    let settings = ConvertSettings { modes, frame, ..ConvertSettings::default() };
+    let settings = ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() };
     let body = convert(&model, &settings, SILENT).expect("converts").body;
     (model, body)
 }
@@ -515,7 +515,8 @@ fn a_cantilever_with_an_offset_mass_has_the_closed_form() {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(2), ..ModeSettings::default() };
     let basis = BasisChoice::CraigBampton(CraigBampton);
-    let settings = ConvertSettings { modes, basis, frame: BodyFrame::Model, ..ConvertSettings::default() };
+    let settings =
+        ConvertSettings { modes, basis, frame: BodyFrame::Model.into(), ..ConvertSettings::default() };
     let body = convert(&model, &settings, SILENT).expect("converts").body;
     let carried = body.carried(&Carrier::Interface("root".to_owned())).expect("carried");
 

@@ -103,7 +103,7 @@ fn a_steady_spin_has_centripetal_accelerations() {
 fn whole(raw: RawModel) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(10_000), ..ModeSettings::default() };
-    let settings = ConvertSettings { modes, frame: BodyFrame::Com, ..ConvertSettings::default() };
+    let settings = ConvertSettings { modes, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
     let body = convert(&model, &settings, SILENT).expect("converts").body;
     (model, body)
 }

@@ -16,7 +16,7 @@ fn model(raw: RawModel) -> FeModel {
 
 fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
     let modes = lowest(count);
-    let settings = ConvertSettings { modes, basis, frame, ..ConvertSettings::default() };
+    let settings = ConvertSettings { modes, basis, frame: frame.into(), ..ConvertSettings::default() };
     convert(model, &settings, SILENT).expect("a body")
 }
 
@@ -34,7 +34,7 @@ fn lowest(count: usize) -> ModeSettings {
 
 /// Eigenvalues of the fixed-interface modes.
 fn fixed(basis: &ModalBasis) -> Vec<f64> {
-    let coordinates = basis.coordinates.as_ref().expect("a Craig-Bampton basis");
+    let coordinates = &basis.coordinates.as_ref().expect("a Craig-Bampton basis").coordinates;
     let all = coordinates.names.iter().enumerate();
     all.filter(|(_, name)| name.starts_with("fixed-interface mode "))
         .map(|(i, _)| coordinates.stiffness[(i, i)])

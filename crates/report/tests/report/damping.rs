@@ -23,7 +23,8 @@ fn damped(damping: Damping<RawMatrix>) -> RawModel {
 
 fn run(raw: RawModel, frame: BodyFrame) -> Result<Conversion> {
     let checked = FeModel::from_raw(raw)?;
-    let mut settings = ConvertSettings { frame, lumped: Vec::new(), ..ConvertSettings::default() };
+    let mut settings =
+        ConvertSettings { frame: frame.into(), lumped: Vec::new(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(12);
     let mut done = convert(&checked.model, &settings, SILENT)?;
     done.diagnostics.splice(0..0, checked.diagnostics);

@@ -111,7 +111,8 @@ fn given(kind: LoadKind, component: usize, matrix: CscMatrix) -> GeometricStiffn
 
 fn run(raw: RawModel, frame: BodyFrame, basis: BasisChoice) -> Result<Conversion> {
     let checked = FeModel::from_raw(raw)?;
-    let mut settings = ConvertSettings { frame, basis, lumped: Vec::new(), ..ConvertSettings::default() };
+    let mut settings =
+        ConvertSettings { frame: frame.into(), basis, lumped: Vec::new(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(10);
     let mut done = convert(&checked.model, &settings, SILENT)?;
     done.diagnostics.splice(0..0, checked.diagnostics);

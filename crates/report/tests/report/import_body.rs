@@ -5,10 +5,9 @@ use flexbody_base::diagnostic::Code;
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{FlexBody, LoadKind, ReferenceConditions, UnitLoad};
-use flexbody_body::invariants::{BodyFrame, Invariants, condense, primary_differences};
+use flexbody_body::invariants::{BodyFrame, FrameChoice, Invariants, condense, primary_differences};
 use flexbody_formats::import::{
-    Audit, ImportFrame, Imported, ImportedBody, ImportedFile, ImportedFrame, accept_imported, audit,
-    import_body,
+    Audit, Imported, ImportedBody, ImportedFile, ImportedFrame, accept_imported, audit, import_body,
 };
 use flexbody_model::{FeModel, GeometricStiffness};
 use flexbody_report::{Tolerances, compare};
@@ -59,10 +58,13 @@ fn file_with(body: &FlexBody, shape: &Mat<f64>, invariants: &Invariants) -> Impo
 }
 
 fn imported(file: &ImportedFile) -> Result<Imported, flexbody_base::error::Error> {
-    imported_in(file, &ImportFrame::Kept)
+    imported_in(file, None)
 }
 
-fn imported_in(file: &ImportedFile, frame: &ImportFrame) -> Result<Imported, flexbody_base::error::Error> {
+fn imported_in(
+    file: &ImportedFile,
+    frame: Option<&FrameChoice>,
+) -> Result<Imported, flexbody_base::error::Error> {
     let source = SourceFile::new("body", Path::new("block.file"), "0".repeat(64));
     import_body(file, source, UnitSystem::default(), frame)
 }
@@ -123,7 +125,7 @@ fn modes_of_any_frame_and_basis_give_the_same_body() {
     told.body.modal_damping = Some(mix.transpose() * &damping * &mix);
 
     let Imported { body: taken, diagnostics } =
-        imported_in(&told, &ImportFrame::Mean(BodyFrame::Model)).expect("a body");
+        imported_in(&told, Some(&BodyFrame::Model.into())).expect("a body");
     assert_eq!(diagnostics.iter().map(|d| d.code()).collect::<Vec<_>>(), [Code::ForeignChanged]);
     assert_eq!(*taken.conditions(), ReferenceConditions::MeanAxes);
     let failed: Vec<_> = taken.identities(BodyFrame::Model).into_iter().filter(|c| !c.passed).collect();
@@ -208,7 +210,7 @@ fn a_frame_that_the_modes_tie_to_the_body_is_kept() {
         "C1",
     );
     // Mean axes need the geometric stiffness of the rigid motions, which the file does not have.
-    let refused = imported_in(&told, &ImportFrame::Mean(BodyFrame::Com)).expect_err("geometric stiffness");
+    let refused = imported_in(&told, Some(&BodyFrame::Com.into())).expect_err("geometric stiffness");
     assert!(refused.has(Code::CarrierImpossible), "{refused}");
 }
 

@@ -18,4 +18,4 @@ pub use nodal::{Allowed, NodalIntegration, NodalReference};
 pub use row::{Failed, InCase, Measured, Row, Timed};
 pub use settings::{Settings, reserved};
 pub use source::Source;
-pub use study::{ReferenceKind, Trade, TradeCase, trade};
+pub use study::{ReferenceChoice, ReferenceKind, Trade, TradeCase, trade};

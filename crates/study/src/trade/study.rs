@@ -17,7 +17,35 @@ use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The motion that errors are measured against.
+/// The motion that the errors of a study are asked to be measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ReferenceChoice {
+    /// The motion of the body with everything that it has.
+    #[default]
+    Full,
+    /// The motion of a body that is enriched until what it lacks of the motion of all nodes is estimated at no more than
+    /// a hundredth of the tolerances: what can be had of large models and long scenes. Where that is not reached a
+    /// warning says so.
+    Fine,
+    /// The motion of all nodes of the model.
+    Nodal,
+}
+
+impl ReferenceChoice {
+    /// Every choice, in the order of the documentation.
+    pub const ALL: [Self; 3] = [Self::Full, Self::Fine, Self::Nodal];
+
+    /// Name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Fine => "fine",
+            Self::Nodal => "nodal",
+        }
+    }
+}
+
+/// The motion that the errors of a study are measured against: of a body, be it a fine one, or of all nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReferenceKind {
@@ -25,16 +53,6 @@ pub enum ReferenceKind {
     Full,
     /// The unreduced equations of all nodes.
     Nodal,
-}
-
-impl ReferenceKind {
-    /// Name on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Full => "full",
-            Self::Nodal => "nodal",
-        }
-    }
 }
 
 /// A finished study.

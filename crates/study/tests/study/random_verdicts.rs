@@ -206,7 +206,7 @@ fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<C
 /// Loads along body axes are along the principal ones.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
-        frame: BodyFrame::Principal,
+        frame: BodyFrame::Principal.into(),
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
         lumped: Vec::new(),
         ..ConvertSettings::default()

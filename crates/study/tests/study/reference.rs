@@ -60,7 +60,7 @@ fn raw_rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: 
 /// Loads and spins of the scenes are along the axes of the body, which are principal.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
-        frame: BodyFrame::Principal,
+        frame: BodyFrame::Principal.into(),
         modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
         lumped: Vec::new(),
         ..ConvertSettings::default()

@@ -1,0 +1,87 @@
+//! Options whose values are called by their names: what the help says of each.
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use flexbody_body::basis::BasisKind;
+use flexbody_body::flex_body::Storage;
+use flexbody_cluster::Solver;
+use flexbody_eigen::{Accuracy, FactorChoice, Precision};
+use flexbody_study::trade::ReferenceChoice;
+
+/// A parser of the names of `all`; the help shows them with what `about` says of each.
+fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    all: [T; N],
+    name: fn(T) -> &'static str,
+    about: fn(T) -> &'static str,
+) -> impl TypedValueParser<Value = T> {
+    let shown = all.map(|one| PossibleValue::new(name(one)).help(about(one)));
+    let called = move |text: String| all.into_iter().find(|one| name(*one) == text);
+    PossibleValuesParser::new(shown).map(move |text| called(text).expect("one of the possible values"))
+}
+
+/// Kinds of bases.
+pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
+    one_of(BasisKind::ALL, BasisKind::name, |kind| match kind {
+        BasisKind::Free => "Free-surface modes, computed here",
+        BasisKind::CraigBampton => {
+            "Modes with the interfaces of the manifest held (--modes counts them), and static shapes for unit motions of the interfaces"
+        }
+        BasisKind::CraigChang => {
+            "Free-surface modes (--modes counts them), and static responses to unit loads at the interfaces"
+        }
+        BasisKind::Imported => {
+            "Shapes that were computed elsewhere: eigenvectors, static shapes, any mixture of them"
+        }
+        BasisKind::Scene => {
+            "The fewest shapes that the motion of --scene is made of; another motion may need others"
+        }
+    })
+}
+
+/// Promises about the modes.
+pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
+    one_of(Accuracy::ALL, Accuracy::name, |accuracy| match accuracy {
+        Accuracy::Fast => "Residual 1e-6, completeness may be not proved",
+        Accuracy::Standard => "Residual 1e-9 or the rounding floor, completeness proved",
+        Accuracy::Certified => {
+            "Residual 1e-12 or the rounding floor, completeness proved from both sides, guaranteed bounds of every eigenvalue and digits of every invariant"
+        }
+    })
+}
+
+/// Precisions of the factor.
+pub(super) fn factor() -> impl TypedValueParser<Value = FactorChoice> {
+    one_of(FactorChoice::ALL, FactorChoice::name, |factor| match factor {
+        FactorChoice::Auto => "Whichever fits and is faster",
+        FactorChoice::Always(Precision::Double) => "Double precision",
+        FactorChoice::Always(Precision::Single) => "Single precision, corrected in double",
+    })
+}
+
+/// Precisions of the file.
+pub(super) fn storage() -> impl TypedValueParser<Value = Storage> {
+    one_of(Storage::ALL, Storage::name, |storage| match storage {
+        Storage::F64 => "64-bit floats",
+        Storage::F32 => "32-bit floats",
+    })
+}
+
+/// Solvers of SLEPc.
+pub(super) fn solver() -> impl TypedValueParser<Value = Solver> {
+    one_of(Solver::ALL, Solver::name, |solver| match solver {
+        Solver::Mumps => "Krylov-Schur, shift-invert, on one factor of MUMPS",
+        Solver::Slices => "Spectrum slicing, one factor for each part of the spectrum: hundreds of modes",
+        Solver::Gamg => "Krylov-Schur on conjugate gradients with algebraic multigrid: no factor, no count",
+        Solver::Lobpcg => "LOBPCG with algebraic multigrid: no factor, no count",
+    })
+}
+
+/// What errors are measured against.
+pub(super) fn reference() -> impl TypedValueParser<Value = ReferenceChoice> {
+    one_of(ReferenceChoice::ALL, ReferenceChoice::name, |reference| match reference {
+        ReferenceChoice::Full => "The largest body",
+        ReferenceChoice::Fine => {
+            "A body that is enriched until it lacks no more than a hundredth of the tolerances of the motion of all nodes, by the estimate"
+        }
+        ReferenceChoice::Nodal => "The unreduced equations of all nodes",
+    })
+}
