@@ -9,7 +9,7 @@ use flexbody_linalg::progress::Watch;
 use flexbody_report::{TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    self, Allowed, ReferenceKind, Settings, Source, WantedBodies, conversions_for_cases,
+    self, Allowed, ReferenceKind, Source, TradeSettings, WantedBodies, conversions_for_cases,
 };
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
@@ -103,7 +103,7 @@ impl Model {
             let nodal = (options.reference == Against::Nodes).then_some(&self.checked);
             let reserved = trade::reserved(&made.lacks, nodal.is_some());
             let settings =
-                Settings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
+                TradeSettings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
             let study = trade::trade_for_cases(&made.sources, &scenes, nodal, &settings, watch)?;
             let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
             Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
@@ -138,7 +138,7 @@ impl FlexBody {
         }
         let scenes: Vec<_> = cases.iter().map(|case| case.0.clone()).collect();
         let sources = vec![Source::new("file", self.0.clone(), None)?];
-        let settings = Settings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
+        let settings = TradeSettings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
         let measure = |watch: Watch<'_>| trade::trade_for_cases(&sources, &scenes, None, &settings, watch);
         let study = heard(listener, measure)?;
         let diagnostics = study.diagnostics.clone();

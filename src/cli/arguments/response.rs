@@ -2,7 +2,7 @@
 
 use super::{BasisName, JobArguments, Printing, positive};
 use clap::Args;
-use flexbody_study::response::{Band, Settings as ResponseSettings};
+use flexbody_study::response::{Band, ResponseSettings};
 use std::path::PathBuf;
 
 /// Arguments of `response`.

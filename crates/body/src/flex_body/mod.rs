@@ -21,7 +21,7 @@ mod storage;
 mod terms;
 mod validate;
 
-pub use crate::invariants::{Frame, Group, Groups};
+pub use crate::invariants::{Frame, TermGroup, TermGroups};
 pub use body::FlexBody;
 pub use carried::Carrier;
 pub use fixed_interface::FixedInterface;

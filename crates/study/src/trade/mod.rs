@@ -11,11 +11,11 @@ mod source;
 mod study;
 mod timing;
 
-pub use candidate::{Candidate, Kind, LumpedMass};
+pub use candidate::{Candidate, CandidateKind, LumpedMass};
 pub use conversions::{Conversions, WantedBodies, conversions, conversions_for_cases};
 pub use front::{Recommendation, front};
 pub use nodal::{Allowed, NodalIntegration, NodalReference};
-pub use row::{Failed, InCase, Measured, Row, Timed};
-pub use settings::{Settings, reserved};
+pub use row::{Failed, InCase, Measured, Timed, TradeRow};
+pub use settings::{TradeSettings, reserved};
 pub use source::Source;
 pub use study::{ReferenceKind, Trade, TradeCase, trade, trade_for_cases};
