@@ -1,7 +1,8 @@
 //! Models, and their conversion.
 
 use crate::arrays::rows_of_three;
-use crate::body::Body;
+use crate::body_class::Body;
+use crate::choice::one_of;
 use crate::errors::{diagnostics, exception, warn};
 use crate::scene::cases_of;
 use crate::trade::{Trade, options as trade_options};
@@ -53,14 +54,6 @@ pub fn coupling(name: Option<&str>) -> PyResult<Option<Coupling>> {
     let all = [Coupling::Rigid, Coupling::Averaging, Coupling::Free];
     let Some(name) = name else { return Ok(None) };
     one_of("coupling", name, all.map(|coupling| (coupling.name(), coupling))).map(Some)
-}
-
-/// The choice that is called `name`.
-pub fn one_of<T, const N: usize>(what: &str, name: &str, choices: [(&str, T); N]) -> PyResult<T> {
-    let known = choices.iter().map(|(known, _)| *known).collect::<Vec<_>>().join(", ");
-    let found = choices.into_iter().find(|(known, _)| *known == name);
-    let unknown = || PyValueError::new_err(format!("{what} is `{name}`, expected one of {known}"));
-    found.map(|(_, choice)| choice).ok_or_else(unknown)
 }
 
 /// Damping as `flexbody.model` hands it on.

@@ -1,6 +1,6 @@
 //! Reports in the forms that Python asks for.
 
-use crate::model::one_of;
+use crate::choice::one_of;
 use flexbody::ReportFormat;
 use pyo3::prelude::*;
 

@@ -1,8 +1,8 @@
 //! What accuracy costs in a scene.
 
-use crate::body::Body;
+use crate::body_class::Body;
+use crate::choice::one_of;
 use crate::errors::{diagnostics, exception, warn};
-use crate::model::one_of;
 use crate::report::report;
 use flexbody::TradeOptions;
 use pyo3::prelude::*;
