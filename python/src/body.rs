@@ -1,59 +1,19 @@
-//! Flexible bodies.
+//! Methods of flexible bodies, and functions that read and list them.
 
-use crate::arrays::{Kept, by_node, matrix, matrix3, triples, vector};
+use crate::arrays::{by_node, matrix, matrix3, triples, vector};
+use crate::body_class::Body;
 use crate::equations::EquationsOfMotion;
 use crate::errors::{diagnostics, warn};
 use crate::report::{loads, report};
 use crate::scene::{Motion, Scene, Selection};
 use crate::trade::{Trade, options as trade_options};
 use crate::work::{alone, brief, run};
-use flexbody::{Diagnostic, FlexBody, Matrix};
+use flexbody::{FlexBody, Matrix};
 use numpy::PyArray1;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// A flexible body with n nodes and nf modes: modes, and the constant invariants that the equations of motion
-/// of its floating frame are made of. Vectors are along the axes of the body frame, about its origin, in the
-/// units of the model. Arrays are read-only and made once: copy what you change.
-///
-/// `flexbody.convert` makes one, `flexbody.read` reads one.
-#[pyclass(frozen, eq, module = "flexbody")]
-pub struct Body {
-    inner: Arc<FlexBody>,
-    diagnostics: Vec<Diagnostic>,
-    kept: Kept,
-}
-
-impl PartialEq for Body {
-    fn eq(&self, other: &Self) -> bool {
-        self.inner == other.inner
-    }
-}
-
-impl Body {
-    pub fn new(inner: FlexBody, diagnostics: Vec<Diagnostic>) -> Self {
-        Self { inner: Arc::new(inner), diagnostics, kept: Kept::default() }
-    }
-
-    fn numbers<'py>(&self, py: Python<'py>, name: &'static str, of: &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, name, || Ok(vector(py, of)))
-    }
-
-    /// A matrix, or None where the body has none of that name.
-    fn matrix<'py>(
-        &self,
-        py: Python<'py>,
-        name: &'static str,
-        of: impl FnOnce(&FlexBody) -> Option<Matrix>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        self.kept.get(py, name, || match of(&self.inner) {
-            Some(own) => matrix(py, &own),
-            None => Ok(py.None().into_bound(py)),
-        })
-    }
-}
 
 #[pymethods]
 impl Body {

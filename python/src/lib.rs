@@ -3,6 +3,8 @@
 
 mod arrays;
 mod body;
+mod body_class;
+mod choice;
 mod command;
 mod equations;
 mod errors;
@@ -17,7 +19,9 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _flexbody {
     #[pymodule_export]
-    use crate::body::{Body, export_formats, read};
+    use crate::body::{export_formats, read};
+    #[pymodule_export]
+    use crate::body_class::Body;
     #[pymodule_export]
     use crate::command::run_command;
     #[pymodule_export]

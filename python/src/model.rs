@@ -1,7 +1,8 @@
 //! Models, and their conversion.
 
 use crate::arrays::rows_of_three;
-use crate::body::Body;
+use crate::body_class::Body;
+use crate::choice::called;
 use crate::errors::{diagnostics, exception, warn};
 use crate::scene::Scene;
 use crate::trade::{Trade, options as trade_options};
@@ -53,28 +54,6 @@ type GivenInterface = (String, Vec<i64>, Option<String>, Option<[f64; 3]>);
 /// The coupling of that name.
 pub fn coupling(name: Option<&str>) -> PyResult<Option<Coupling>> {
     name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
-}
-
-/// The one of `all` that is called `name`.
-pub fn called<T: Copy>(
-    what: &str,
-    name: &str,
-    all: impl IntoIterator<Item = T>,
-    name_of: fn(T) -> &'static str,
-) -> PyResult<T> {
-    one_of(what, name, all.into_iter().map(|one| (name_of(one), one)))
-}
-
-/// The choice that is called `name`.
-pub fn one_of<T: Copy>(
-    what: &str,
-    name: &str,
-    choices: impl IntoIterator<Item = (&'static str, T)>,
-) -> PyResult<T> {
-    let (names, choices): (Vec<&str>, Vec<T>) = choices.into_iter().unzip();
-    let unknown =
-        || PyValueError::new_err(format!("{what} is `{name}`, expected one of {}", names.join(", ")));
-    names.iter().position(|known| *known == name).map(|at| choices[at]).ok_or_else(unknown)
 }
 
 /// Damping as `flexbody.model` hands it on.

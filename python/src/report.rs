@@ -1,6 +1,6 @@
 //! Reports in the forms that Python asks for.
 
-use crate::model::one_of;
+use crate::choice::called;
 use flexbody::ReportFormat;
 use pyo3::prelude::*;
 
@@ -16,7 +16,7 @@ pub fn report<'py>(
         ("text", ReportFormat::Text),
         ("html", ReportFormat::Html),
     ];
-    let text = render(one_of("form", form, forms)?);
+    let text = render(called("form", form, forms, |(name, _)| name)?.1);
     if form == "dict" {
         return loads(py, &text);
     }

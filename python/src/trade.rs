@@ -1,8 +1,8 @@
 //! What accuracy costs in a scene.
 
-use crate::body::Body;
+use crate::body_class::Body;
+use crate::choice::called;
 use crate::errors::{diagnostics, exception, warn};
-use crate::model::called;
 use crate::report::report;
 use flexbody::{ReferenceChoice, TradeOptions};
 use pyo3::prelude::*;

@@ -9,7 +9,7 @@ use flexbody_linalg::progress::Watch;
 use flexbody_report::{TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    self, Allowed, ReferenceChoice, ReferenceKind, Settings, Source, WantedBodies, conversions,
+    self, Allowed, ReferenceChoice, ReferenceKind, Source, TradeSettings, WantedBodies, conversions,
 };
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
@@ -73,7 +73,7 @@ impl Model {
             let nodal = (options.reference == ReferenceChoice::Nodal).then_some(&self.checked);
             let reserved = trade::reserved(&made.lacks, nodal.is_some());
             let settings =
-                Settings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
+                TradeSettings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
             let study = trade::trade(&made.sources, &scene.0, nodal, &settings, watch)?;
             let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
             Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
@@ -95,7 +95,7 @@ impl FlexBody {
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let sources = vec![Source::new("file", self.0.clone(), None)?];
-        let settings = Settings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
+        let settings = TradeSettings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
         let measure = |watch: Watch<'_>| trade::trade(&sources, &scene.0, None, &settings, watch);
         let study = heard(listener, measure)?;
         let diagnostics = study.diagnostics.clone();

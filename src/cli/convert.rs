@@ -5,7 +5,7 @@ use super::elsewhere::Elsewhere;
 use super::import;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
-use super::places::{Places, Reserved, format_of, refuse_replacing, refuse_replacing_read};
+use super::places::{BodyOutputs, Reserved, format_of, refuse_replacing, refuse_replacing_read};
 use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
 use super::terminal::body_text;
 use super::unjudged::refuse_unjudged;
@@ -55,7 +55,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, cases));
     refuse_contradictions(arguments, &loads)?;
     // How many bodies there are is known after reading; that outputs can be written, before.
-    let places = Places::of(arguments, arguments.split.then_some(1));
+    let places = BodyOutputs::of(arguments, arguments.split.then_some(1));
     refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, cases)?;
     let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
@@ -83,9 +83,9 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     }
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
-    all.extend((2..=bodies.len()).map(|number| Places::of(arguments, Some(number))));
+    all.extend((2..=bodies.len()).map(|number| BodyOutputs::of(arguments, Some(number))));
     refuse_overwriting(arguments, &all, &files, &schemes, &loads, cases)?;
-    refuse_replacing_read(all.iter().flat_map(Places::all))?;
+    refuse_replacing_read(all.iter().flat_map(BodyOutputs::all))?;
     let mut slots = vec![reserved];
     for places in &all[1..] {
         slots.push(places.reserve()?);
@@ -143,7 +143,7 @@ impl Job<'_> {
     fn convert(
         &self,
         checked: CheckedModel,
-        places: &Places,
+        places: &BodyOutputs,
         reserved: Reserved,
         watcher: &Watcher,
     ) -> Result<Done> {
@@ -165,7 +165,7 @@ impl Job<'_> {
         &self,
         model: &FeModel,
         mut diagnostics: Vec<Diagnostic>,
-        places: &Places,
+        places: &BodyOutputs,
         reserved: Reserved,
         watcher: &Watcher,
     ) -> Result<Done> {
@@ -436,7 +436,7 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
 /// No output may replace an input or another output.
 fn refuse_overwriting(
     arguments: &ConvertArguments,
-    outputs: &[Places],
+    outputs: &[BodyOutputs],
     files: &ModelFiles,
     schemes: &[Scheme],
     loads: &[LoadSource],
@@ -455,7 +455,7 @@ fn refuse_overwriting(
         .flat_map(|cases| cases.iter())
         .flat_map(|scene| &scene.series)
         .map(|file| &file.path);
-    refuse_replacing(inputs.chain(series), outputs.iter().flat_map(Places::all))
+    refuse_replacing(inputs.chain(series), outputs.iter().flat_map(BodyOutputs::all))
 }
 
 pub(super) fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted {

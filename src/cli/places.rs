@@ -10,7 +10,7 @@ use flexbody_study::checkpoint::CheckpointFile;
 use std::path::{Path, PathBuf};
 
 /// Output files of one body.
-pub(super) struct Places {
+pub(super) struct BodyOutputs {
     pub body: PathBuf,
     pub reports: Vec<PathBuf>,
     pub checkpoint: Option<PathBuf>,
@@ -23,7 +23,7 @@ pub(super) struct Reserved {
     pub checkpoint: Option<CheckpointFile>,
 }
 
-impl Places {
+impl BodyOutputs {
     /// What the command line names, with a number in every name for one of several bodies.
     pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
         let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| marked(path, number));

@@ -19,7 +19,7 @@ use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Point, Scene};
 use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
-use flexbody_study::response::{Band, Place, Settings, respond};
+use flexbody_study::response::{Band, Place, ResponseSettings, respond};
 use flexbody_study::tailoring::computed_basis;
 use std::path::PathBuf;
 
@@ -131,13 +131,17 @@ fn model_and_body(
 }
 
 /// What the command line says, and what the scene says where it says nothing.
-fn settings(arguments: &ResponseArguments, scene: Option<&Scene>, body: &FlexBody) -> Result<Settings> {
+fn settings(
+    arguments: &ResponseArguments,
+    scene: Option<&Scene>,
+    body: &FlexBody,
+) -> Result<ResponseSettings> {
     let of_scene = scene.and_then(|scene| Band::new(0.0, scene.requirements.band? * body.units().hertz()));
     let band = arguments.band.or(of_scene).ok_or_else(|| {
         Diagnostic::new(Code::Usage, "nothing says which frequencies are looked at")
             .with_help("give --band 0..2000, or a --scene with a [band]")
     })?;
-    Ok(Settings {
+    Ok(ResponseSettings {
         band,
         points: arguments.points as usize,
         solves: arguments.solves as usize,

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
-    let places = Places::of(arguments, None);
+    let places = SimulationOutputs::of(arguments, None);
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all())?;
     // Which load cases there are is known after reading; that outputs can be written, before.
     let reserved = places.reserve()?;
@@ -24,15 +24,16 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
 
     let watcher = Watcher::new(arguments.printing.quiet || arguments.printing.json, "reading");
     let cases = LoadCases::read(&arguments.scene, arguments.case.as_deref())?;
-    let of_case = |scene: &Scene| Places::of(arguments, scene.case_name());
-    let all: Vec<Places> = if cases.len() == 1 { vec![places] } else { cases.iter().map(of_case).collect() };
+    let of_case = |scene: &Scene| SimulationOutputs::of(arguments, scene.case_name());
+    let all: Vec<SimulationOutputs> =
+        if cases.len() == 1 { vec![places] } else { cases.iter().map(of_case).collect() };
     let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.path);
     let inputs = [&arguments.body, &arguments.scene].into_iter().chain(series);
-    refuse_replacing(inputs, all.iter().flat_map(Places::all))?;
-    refuse_replacing_read(all.iter().flat_map(Places::all))?;
+    refuse_replacing(inputs, all.iter().flat_map(SimulationOutputs::all))?;
+    refuse_replacing_read(all.iter().flat_map(SimulationOutputs::all))?;
     let slots = match &all[..] {
         [_] => vec![reserved],
-        all => all.iter().map(Places::reserve).collect::<Result<Vec<_>>>()?,
+        all => all.iter().map(SimulationOutputs::reserve).collect::<Result<Vec<_>>>()?,
     };
     let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
     let job =
@@ -120,7 +121,7 @@ impl Job<'_> {
 }
 
 /// Output files of one simulation.
-struct Places {
+struct SimulationOutputs {
     motion: Option<PathBuf>,
     table: Option<PathBuf>,
     reports: Vec<PathBuf>,
@@ -133,7 +134,7 @@ struct Slots {
     reports: Vec<OutputSlot>,
 }
 
-impl Places {
+impl SimulationOutputs {
     /// What the command line names, with the name of the load case in every name for one of several.
     fn of(arguments: &SimulateArguments, case: Option<&str>) -> Self {
         let place = |path: &PathBuf| case.map_or_else(|| path.clone(), |case| marked(path, case));

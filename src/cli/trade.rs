@@ -15,7 +15,8 @@ use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    Allowed, ReferenceChoice, Row, Settings, Source, Trade, WantedBodies, conversions, reserved, trade,
+    Allowed, ReferenceChoice, Source, Trade, TradeRow, TradeSettings, WantedBodies, conversions, reserved,
+    trade,
 };
 use std::path::{Path, PathBuf};
 
@@ -54,7 +55,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
     let reserved = reserved(&lacks, nodal.is_some());
-    let settings = Settings {
+    let settings = TradeSettings {
         repeat: arguments.repeat.into(),
         memory: memory_left(None),
         reserved: &reserved,
@@ -100,7 +101,7 @@ fn candidate_bodies(
 ) -> Result<Vec<OutputSlot>> {
     let measured = study.rows.iter().enumerate().filter(|(_, row)| row.outcome.is_ok());
     let named = measured.map(|(at, row)| (folder.join(format!("candidate_{:03}.flex.h5", at + 1)), row));
-    let named: Vec<(PathBuf, &Row)> = named.collect();
+    let named: Vec<(PathBuf, &TradeRow)> = named.collect();
     refuse_replacing(taken.iter().copied(), named.iter().map(|(path, _)| path))?;
     let written = named.into_iter().map(|(path, row)| {
         let slot = flexbody_file::prepare_output(path)?;

@@ -5,7 +5,7 @@ use crate::stress::of_spin;
 use flexbody_model::{Coupling, Damping, NodeSet, RawModel, Reference};
 use nalgebra::Vector3;
 use oracle::beams::{BeamMass, elbow, star};
-use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, grid};
 use oracle::plane::rectangle;
@@ -29,7 +29,7 @@ pub fn body(kind: usize, random: &mut Random) -> RawModel {
     let raw = match kind {
         0 => graded_block(random, MassRule::Consistent),
         1 => graded_block(random, MassRule::Reduced),
-        2 => block(Element::Hex8).raw,
+        2 => block(ElementKind::Hex8).raw,
         3 => star(if one_in(random, 2) { BeamMass::Rotary } else { BeamMass::Consistent }),
         4 => star(BeamMass::Lumped),
         5 => elbow(3),
@@ -57,7 +57,7 @@ fn graded_block(random: &mut Random, rule: MassRule) -> RawModel {
     let cells = [3, across, 1];
     let size = [between(random, 0.3, 0.7), between(random, 0.2, 0.5), between(random, 0.1, 0.4)];
     let [skew, taper] = [between(random, 0.02, 0.2), between(random, -0.1, 0.1)];
-    let mesh = Mesh::from_cells(Element::Hex8, &grid(cells), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid(cells), |[x, y, z]| {
         [size[0] * x + skew * y, size[1] * y * (1.0 - taper * x), size[2] * z * (1.0 + taper * y)]
     });
     let border = 0.5 * size[0];

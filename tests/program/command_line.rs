@@ -5,7 +5,7 @@
 #[path = "../../examples/from_memory.rs"]
 mod from_memory;
 
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{DofOrder, Numbering, Triangle, reordered, write_model};
 use oracle::members;
 use oracle::mesh::{Assembly, Mesh};
@@ -59,7 +59,8 @@ fn fixture(name: &str) -> PathBuf {
 }
 
 fn block() -> Assembly {
-    Mesh::block(Kind::Hex8, [4, 2, 2], [0.4, 0.15, 0.1]).assemble(&Material::STEEL, MassRule::Consistent)
+    Mesh::block(ElementKind::Hex8, [4, 2, 2], [0.4, 0.15, 0.1])
+        .assemble(&Material::STEEL, MassRule::Consistent)
 }
 
 /// A folder with a small steel block: `model.toml`, `K.mtx`, `M.mtx`, `nodes.csv`.
@@ -315,7 +316,7 @@ fn compare_agrees_on_a_model_in_another_order_and_differs_beyond_tolerance() {
     // A cube: repeated eigenvalues, and nodes of equal displacement, so that order decides about signs and
     // bases.
     let cube = |material: &Material| {
-        Mesh::block(Kind::Hex8, [5; 3], [0.2; 3]).assemble(material, MassRule::Consistent).raw_model()
+        Mesh::block(ElementKind::Hex8, [5; 3], [0.2; 3]).assemble(material, MassRule::Consistent).raw_model()
     };
     let folders = [(); 3].map(|()| tempfile::tempdir().unwrap());
     let shuffled = reordered(&cube(&Material::STEEL), DofOrder::Shuffled(5), Numbering::Consecutive);
@@ -377,7 +378,7 @@ fn check_allows_for_what_rounding_takes_from_a_slender_body() {
     // The stiffest element is 1e9 times as stiff as the first bending mode: so many digits of psi' K psi are
     // lost.
     let folder = tempfile::tempdir().unwrap();
-    let beam = Mesh::block(Kind::Hex20, [40, 1, 1], [4.0, 0.03, 0.02]);
+    let beam = Mesh::block(ElementKind::Hex20, [40, 1, 1], [4.0, 0.03, 0.02]);
     let raw = beam.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     write_model(folder.path(), &raw, Triangle::Lower);
     done(folder.path(), "convert model.toml -o b.h5 --quiet");
@@ -393,7 +394,7 @@ fn check_finds_a_model_that_changed() {
     let folder = model();
     done(folder.path(), "convert model.toml -o b.h5 --quiet");
     let stiffer = Material { youngs: Material::STEEL.youngs * (1.0 + 1e-9), ..Material::STEEL };
-    let mesh = Mesh::block(Kind::Hex8, [4, 2, 2], [0.4, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 2], [0.4, 0.15, 0.1]);
     let changed = mesh.assemble(&stiffer, MassRule::Consistent).raw_model();
     write_model(folder.path(), &changed, Triangle::Lower);
     let run = flexbody(folder.path(), "check b.h5 --against model.toml");
@@ -413,7 +414,7 @@ fn check_finds_a_model_that_changed() {
     assert!(json.code == 1 && names.contains(&"stiffness_recomputed".into()), "{names:?}");
     assert!(!names.contains(&"invariants_recomputed".into()), "{names:?}");
 
-    let smaller = Mesh::block(Kind::Hex8, [3, 2, 2], [0.4, 0.15, 0.1]);
+    let smaller = Mesh::block(ElementKind::Hex8, [3, 2, 2], [0.4, 0.15, 0.1]);
     write_model(
         folder.path(),
         &smaller.assemble(&Material::STEEL, MassRule::Consistent).raw_model(),

@@ -4,7 +4,7 @@
 #![cfg(unix)]
 
 use flexbody_base::error::ExitCode;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, write_model};
 use oracle::mesh::Mesh;
 use oracle::{fixtures, members};
@@ -49,7 +49,8 @@ fn unfinished(folder: &Path) -> usize {
 fn long_model(folder: &Path) -> PathBuf {
     let place = folder.join("model");
     std::fs::create_dir(&place).expect("a folder");
-    let block = Mesh::block(Kind::Hex8, [18; 3], [1.0; 3]).assemble(&Material::STEEL, MassRule::Consistent);
+    let block =
+        Mesh::block(ElementKind::Hex8, [18; 3], [1.0; 3]).assemble(&Material::STEEL, MassRule::Consistent);
     write_model(&place, &block.raw_model(), Triangle::Lower)
 }
 

@@ -2,7 +2,7 @@
 #![cfg(unix)]
 
 use flexbody_base::error::ExitCode;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, write_model};
 use oracle::members;
 use oracle::mesh::Mesh;
@@ -28,7 +28,7 @@ fn a_signal_during_convert_leaves_the_folder_as_it_was() {
     let (model, out) = (folder.path().join("model"), folder.path().join("out"));
     std::fs::create_dir(&model).expect("a folder");
     std::fs::create_dir(&out).expect("a folder");
-    let raw = Mesh::block(Kind::Hex8, [18; 3], [1.0; 3])
+    let raw = Mesh::block(ElementKind::Hex8, [18; 3], [1.0; 3])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();
     let manifest = write_model(&model, &raw, Triangle::Lower);
@@ -71,7 +71,7 @@ fn signals_that_are_ignored_from_the_start_stay_ignored() {
     let (model, out) = (folder.path().join("model"), folder.path().join("out"));
     std::fs::create_dir(&model).expect("a folder");
     std::fs::create_dir(&out).expect("a folder");
-    let raw = Mesh::block(Kind::Hex8, [12; 3], [1.0; 3])
+    let raw = Mesh::block(ElementKind::Hex8, [12; 3], [1.0; 3])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();
     let manifest = write_model(&model, &raw, Triangle::Lower);
@@ -101,7 +101,7 @@ fn an_interrupted_convert_goes_on_from_its_checkpoint() {
     let (model, out) = (folder.path().join("model"), folder.path().join("out"));
     std::fs::create_dir(&model).expect("a folder");
     std::fs::create_dir(&out).expect("a folder");
-    let raw = Mesh::block(Kind::Hex8, [16; 3], [1.0, 0.9, 0.8])
+    let raw = Mesh::block(ElementKind::Hex8, [16; 3], [1.0, 0.9, 0.8])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();
     let manifest = write_model(&model, &raw, Triangle::Lower);
@@ -134,7 +134,7 @@ fn programs_that_it_waits_for_end_with_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let place = folder.path();
     std::fs::create_dir(place.join("model")).expect("a folder");
-    let raw = Mesh::block(Kind::Hex8, [18; 3], [1.0; 3])
+    let raw = Mesh::block(ElementKind::Hex8, [18; 3], [1.0; 3])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();
     write_model(&place.join("model"), &raw, Triangle::Lower);

@@ -4,7 +4,7 @@
 use crate::program::flexbody;
 use flexbody::program::Arguments;
 use jsonschema::{Retrieve, Uri};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, write_model};
 use oracle::mesh::Mesh;
 use serde_json::Value;
@@ -38,7 +38,7 @@ fn schema() -> jsonschema::Validator {
 /// A block with a lumped mass, which is worth a warning, its body and a scene.
 fn folder() -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    let mesh = Mesh::block(Kind::Hex8, [3, 2, 1], [0.4, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.4, 0.15, 0.1]);
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).with_lumped_mass().raw_model();
     write_model(folder.path(), &raw, Triangle::Lower);
     fs::write(folder.path().join("scene.toml"), SCENE).expect("written");

@@ -79,6 +79,26 @@ fn every_exception_to_the_ban_of_unsafe_code_is_named() {
     assert_eq!(quoted(paragraph), found);
 }
 
+/// Takes away files that use no file that is left, until nothing is left, or files in a circle.
+#[test]
+fn the_extension_module_has_no_circle_of_files() {
+    let mut uses: BTreeMap<String, String> = rust_files("python/src")
+        .into_iter()
+        .map(|file| {
+            (file.file_stem().expect("a name").to_str().expect("our own names").to_owned(), read(&file))
+        })
+        .collect();
+    loop {
+        let left: Vec<String> = uses.keys().map(|name| format!("crate::{name}::")).collect();
+        let count = uses.len();
+        uses.retain(|_, text| left.iter().any(|used| text.contains(used)));
+        if uses.len() == count {
+            break;
+        }
+    }
+    assert!(uses.is_empty(), "{:?}", uses.keys());
+}
+
 #[test]
 fn files_stay_short() {
     let folders = ["src", "crates", "tests", "benches", "examples"];

@@ -68,7 +68,7 @@ struct Part {
 
 /// Modes that a cluster found, and how.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct ClusterModes {
     /// The modes, in the rows of the model.
     pub modes: SolvedModes,
     /// How they were found, in words.
@@ -86,7 +86,7 @@ pub struct Found {
 /// [`ClusterUnfinished`](Code::ClusterUnfinished) where there is no result,
 /// [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable),
 /// [`ClusterInaccurate`](Code::ClusterInaccurate) where its products of condensation are not those of M.
-pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bool) -> Result<Found> {
+pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bool) -> Result<ClusterModes> {
     let order = RowOrder::of(model);
     let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
     if matrices != prepared.matrices {
@@ -134,7 +134,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         prove,
         source: SourceFile::new("modes", Path::new(MODES), result.modes_sha256),
     };
-    Ok(Found { modes, told, seconds: result.seconds, factor: result.factor })
+    Ok(ClusterModes { modes, told, seconds: result.seconds, factor: result.factor })
 }
 
 /// Says how far the cluster came.

@@ -24,7 +24,7 @@ mod sealed;
 
 pub use batch_list::{BatchBody, BatchList, read_batch_list};
 pub use engine::{Engine, Solver};
-pub use found::{Found, read_found};
+pub use found::{ClusterModes, read_found};
 pub use ledger::{DoneBody, Ledger, inputs_fingerprint};
 pub use prepare::{Preparation, PrepareSettings, prepare};
 pub use prepared::{ModelReference, Prepared, WantedModes, read_prepared};

@@ -62,7 +62,7 @@ const DIGITS_PART: f64 = 1e-3;
 const WIDE: f64 = 1e-3;
 
 /// How a search ended.
-pub(super) enum Search<'a> {
+pub(super) enum LanczosOutcome<'a> {
     /// With the modes.
     Found {
         /// The wanted modes and those that complete the cluster of the last one.
@@ -180,7 +180,7 @@ pub(super) fn lowest_modes<'a>(
     start: Option<&Snapshot>,
     watch: Watch<'a>,
     counters: &mut Counters,
-) -> Result<Search<'a>, EigenFailure> {
+) -> Result<LanczosOutcome<'a>, EigenFailure> {
     Iteration::begin(problem, factor, goal, start, watch, counters).run(factor, counters)
 }
 
@@ -336,14 +336,14 @@ impl<'a> Iteration<'a> {
         mut self,
         factor: &dyn Solve,
         counters: &mut Counters,
-    ) -> Result<Search<'a>, EigenFailure> {
+    ) -> Result<LanczosOutcome<'a>, EigenFailure> {
         loop {
             self.expand(factor, counters);
             if let Some(shift) = self.better_shift(factor, counters)? {
-                return Ok(Search::ShiftTooLarge(shift));
+                return Ok(LanczosOutcome::ShiftTooLarge(shift));
             }
             if self.is_midway() {
-                return Ok(Search::Midway(Box::new(self)));
+                return Ok(LanczosOutcome::Midway(Box::new(self)));
             }
             if !self.is_test_due() {
                 continue;
@@ -354,7 +354,7 @@ impl<'a> Iteration<'a> {
                 return Ok(found);
             }
             if let Some(shift) = self.restart(&ritz, counters)? {
-                return Ok(Search::ShiftTooLarge(shift));
+                return Ok(LanczosOutcome::ShiftTooLarge(shift));
             }
         }
     }
@@ -477,7 +477,7 @@ impl<'a> Iteration<'a> {
         &mut self,
         ritz: &Ritz,
         counters: &mut Counters,
-    ) -> Result<Option<Search<'a>>, EigenFailure> {
+    ) -> Result<Option<LanczosOutcome<'a>>, EigenFailure> {
         if !ritz.all_there() {
             return Ok(None);
         }
@@ -485,7 +485,7 @@ impl<'a> Iteration<'a> {
         if self.goal.rough && !self.complete {
             // Half as many again: what the corrections would have to find of the next modes is then there.
             let vectors = self.vectors(ritz, (last + last / 2 + 2 * self.goal.block).min(size));
-            return Ok(Some(Search::Rough { vectors, wanted: last }));
+            return Ok(Some(LanczosOutcome::Rough { vectors, wanted: last }));
         }
         if self.asks_below_noise(ritz, counters) {
             return Ok(None);
@@ -497,7 +497,7 @@ impl<'a> Iteration<'a> {
         if excess <= 1.0 || self.complete || gains_nothing {
             let is_known = |i: &usize| self.complete || ritz.is_good(*i, 1e-2);
             let next = (last..size).take_while(is_known).map(|i| ritz.lambda(i)).collect();
-            return Ok(Some(Search::Found { modes, next }));
+            return Ok(Some(LanczosOutcome::Found { modes, next }));
         }
         self.least_excess = excess;
         self.asked /= 1.2 * excess;

@@ -20,6 +20,15 @@ pub(super) struct Refined {
     pub floors: Vec<f64>,
 }
 
+/// Modes that a search has found.
+pub(super) struct FoundModes {
+    pub refined: Refined,
+    /// Eigenvalues beyond the modes.
+    pub next: Vec<f64>,
+    /// The shift of the search.
+    pub tau: f64,
+}
+
 /// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the
 /// basis. With `correct`, one step of iterative refinement follows, which brings the residual of the solve to
 /// its rounding floor.

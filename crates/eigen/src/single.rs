@@ -13,9 +13,9 @@ use super::corrector::{Corrector, Pair};
 use super::counters::Counters;
 use super::factorise::{Attempt, with_suited_shift};
 use super::failure::EigenFailure;
-use super::lanczos::{self, Goal, Search};
+use super::lanczos::{self, Goal, LanczosOutcome};
 use super::problem::EigenProblem;
-use super::refine::{Refined, residuals};
+use super::refine::{FoundModes, Refined, residuals};
 use super::resume::Snapshot;
 use super::search_space::SearchSpace;
 use super::start::fitting_start;
@@ -51,15 +51,14 @@ const PATIENCE: usize = 6;
 const JUDGED_AFTER: usize = 4;
 const LEAST_GAIN: f64 = 7.0;
 
-/// The lowest modes, eigenvalues beyond them, and the shift; or the reason why single precision does not find
-/// them.
+/// Searches the lowest modes, or returns the reason why single precision does not find them.
 pub(super) fn search(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
+) -> Result<FoundModes, EigenFailure> {
     let rough = Goal { tolerance: HANDED_OVER, block: BLOCK, rough: true, second_shift: false, ..*goal };
     let start = fitting_start(problem, goal.attempt).filter(|start| start.converged >= goal.wanted);
     let search = |factor: Cholesky<'_, f32>, start: Option<&Snapshot>, counters: &mut Counters| {
@@ -69,18 +68,18 @@ pub(super) fn search(
                 (start.basis.as_ref().subcols(0, start.eigenvalues.len()).to_owned(), goal.wanted)
             }
             None => match lanczos::lowest_modes(problem, &factor, &rough, None, watch, counters)? {
-                Search::ShiftTooLarge(shift) => return Ok(Attempt::Anew(shift)),
-                Search::Midway(_) => unreachable!("not asked for"),
-                Search::Found { modes, next } => return Ok(Attempt::Done((modes, next))),
-                Search::Rough { vectors, wanted } => (vectors, wanted),
+                LanczosOutcome::ShiftTooLarge(shift) => return Ok(Attempt::Anew(shift)),
+                LanczosOutcome::Midway(_) => unreachable!("not asked for"),
+                LanczosOutcome::Found { modes, next } => return Ok(Attempt::Done((modes, next))),
+                LanczosOutcome::Rough { vectors, wanted } => (vectors, wanted),
             },
         };
         let corrected =
             Correction::begin(problem, Corrector::Factor(&factor), goal, vectors, wanted, watch, counters)?;
         corrected.run(counters).map(Attempt::Done)
     };
-    let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
-    Ok((modes, next, tau))
+    let ((refined, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
+    Ok(FoundModes { refined, next, tau })
 }
 
 /// A span of vectors that is corrected until its lowest Ritz pairs keep the tolerance, and the end of their

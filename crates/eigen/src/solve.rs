@@ -7,10 +7,10 @@ use super::counters::Counters;
 use super::dense;
 use super::factorise::{Attempt, factorise, with_suited_shift};
 use super::failure::EigenFailure;
-use super::lanczos::{self, Goal, columns_per_step};
+use super::lanczos::{self, Goal, LanczosOutcome, columns_per_step};
 use super::plan::{CountPlan, Multigrid, Plan, gigabytes};
 use super::problem::EigenProblem;
-use super::refine::{Refined, refine};
+use super::refine::{FoundModes, Refined, refine};
 use super::resume::Snapshot;
 use super::second_shift::SecondShift;
 use super::settings::{Accuracy, EigenSettings, FactorChoice, Method, Precision, Wanted, keeps};
@@ -154,11 +154,11 @@ fn is_dense(problem: &EigenProblem<'_>, settings: &EigenSettings, wanted: usize)
 /// for as many modes as there are.
 fn complete(
     sparse: &mut Sparse<'_>,
-    mut search: Search,
+    mut search: FoundModes,
     wanted: usize,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<(Search, Completeness), EigenFailure> {
+) -> Result<(FoundModes, Completeness), EigenFailure> {
     let rigid = sparse.problem.rigid.ncols();
     let mut completeness = prove(sparse, &search, watch, counters)?;
     let missed = completeness.counted(rigid).saturating_sub(completeness.modes_below);
@@ -176,7 +176,7 @@ fn complete(
 /// Guaranteed bounds of the eigenvalues that were counted, where they are asked for.
 fn bounds(
     sparse: &Sparse<'_>,
-    search: &Search,
+    search: &FoundModes,
     completeness: &Completeness,
     watch: Watch<'_>,
     counters: &mut Counters,
@@ -193,20 +193,13 @@ fn bounds(
         .map(Some)
 }
 
-/// Modes as a method found them.
-struct Search {
-    refined: Refined,
-    next: Vec<f64>,
-    tau: f64,
-}
-
 fn search_densely(
     problem: &EigenProblem<'_>,
     wanted: usize,
     tolerance: f64,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<(Search, usize), EigenFailure> {
+) -> Result<(FoundModes, usize), EigenFailure> {
     watch(Event::Phase("dense eigenproblem"));
     let pencil = &problem.pencil;
     let finite = dense::finite_eigenvalues(pencil).ok_or(EigenFailure::MassIndefinite)?;
@@ -240,7 +233,7 @@ fn search_densely(
         converged: last,
     });
     let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
-    Ok((Search { refined, next, tau }, flexible))
+    Ok((FoundModes { refined, next, tau }, flexible))
 }
 
 /// The iterative search and what it goes by.
@@ -260,7 +253,7 @@ impl Sparse<'_> {
         attempt: u64,
         watch: Watch<'_>,
         counters: &mut Counters,
-    ) -> Result<Search, EigenFailure> {
+    ) -> Result<FoundModes, EigenFailure> {
         let Self { problem, analysis, .. } = *self;
         let tolerance = SEARCHED * self.settings.accuracy.residual();
         // The shift of the count is in the middle of the gap; a fifth more, since the gap is not known yet.
@@ -282,14 +275,14 @@ impl Sparse<'_> {
         if found.is_none() {
             found = self.search_in_single(&goal, watch, counters)?;
         }
-        let (refined, next, tau) = match found {
+        let FoundModes { refined, next, tau } = match found {
             Some(found) => found,
             None => search_in_double(problem, analysis, &goal, watch, counters)?,
         };
         counters.factor_bytes = self.plan.factor_bytes;
         let refined = refined.sharpened(problem, tolerance, counters);
         check_zero_energy(problem, &refined)?;
-        Ok(Search { refined, next, tau })
+        Ok(FoundModes { refined, next, tau })
     }
 
     /// `None` where the plan has a factor, as it has after a search without one that failed.
@@ -298,7 +291,7 @@ impl Sparse<'_> {
         goal: &Goal,
         watch: Watch<'_>,
         counters: &mut Counters,
-    ) -> Result<Option<Found>, EigenFailure> {
+    ) -> Result<Option<FoundModes>, EigenFailure> {
         if self.plan.multigrid != Multigrid::Used {
             return Ok(None);
         }
@@ -317,7 +310,7 @@ impl Sparse<'_> {
         goal: &Goal,
         watch: Watch<'_>,
         counters: &mut Counters,
-    ) -> Result<Option<Found>, EigenFailure> {
+    ) -> Result<Option<FoundModes>, EigenFailure> {
         let Self { problem, settings, analysis, plan } = self;
         if plan.precision == Precision::Double {
             return Ok(None);
@@ -336,36 +329,33 @@ impl Sparse<'_> {
     }
 }
 
-/// Modes, eigenvalues beyond them, and the shift.
-type Found = (Refined, Vec<f64>, f64);
-
 fn search_in_double(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<Found, EigenFailure> {
+) -> Result<FoundModes, EigenFailure> {
     let start = fitting_start(problem, goal.attempt);
     let may_change = Cell::new(goal.second_shift);
     let search = |factor: Cholesky<'_, f64>, start: Option<&Snapshot>, counters: &mut Counters| {
         let goal = &Goal { second_shift: may_change.get(), ..*goal };
         match lanczos::lowest_modes(problem, &factor, goal, start, watch, counters)? {
-            lanczos::Search::Found { modes, next } => {
+            LanczosOutcome::Found { modes, next } => {
                 Ok(Attempt::Done((refine(problem, &factor, modes, goal.tolerance, counters)?, next)))
             }
-            lanczos::Search::Midway(iteration) => {
+            LanczosOutcome::Midway(iteration) => {
                 may_change.set(false);
                 let tau = factor.shift();
                 let found = with_second_shift(problem, analysis, *iteration, (factor, goal), counters);
                 Ok(found.map_or(Attempt::Anew(tau), Attempt::Done))
             }
-            lanczos::Search::ShiftTooLarge(shift) => Ok(Attempt::Anew(shift)),
-            lanczos::Search::Rough { .. } => unreachable!("not asked for"),
+            LanczosOutcome::ShiftTooLarge(shift) => Ok(Attempt::Anew(shift)),
+            LanczosOutcome::Rough { .. } => unreachable!("not asked for"),
         }
     };
-    let ((modes, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
-    Ok((modes, next, tau))
+    let ((refined, next), tau) = with_suited_shift(problem, analysis, start, watch, counters, search)?;
+    Ok(FoundModes { refined, next, tau })
 }
 
 /// Goes on with a second shift, whose factor takes the place of `first`; `None` where that does not find modes that keep
@@ -388,7 +378,7 @@ fn with_second_shift(
         }
         None => iteration.run(&again(counters)?, counters),
     };
-    let lanczos::Search::Found { mut modes, next } = found.ok()? else { return None };
+    let LanczosOutcome::Found { mut modes, next } = found.ok()? else { return None };
     if modes.excess(goal.tolerance) > 1.0 {
         modes = refine(problem, &again(counters)?, modes, goal.tolerance, counters).ok()?;
     }
@@ -398,7 +388,7 @@ fn with_second_shift(
 /// The inertia count in the gap above the last mode.
 fn prove(
     sparse: &Sparse<'_>,
-    search: &Search,
+    search: &FoundModes,
     watch: Watch<'_>,
     counters: &mut Counters,
 ) -> Result<Completeness, EigenFailure> {
@@ -453,7 +443,7 @@ fn is_near(problem: &EigenProblem<'_>, found: &Refined, shift: f64) -> bool {
 /// Canonical form, the wanted number of modes, residuals of what is handed out.
 fn finish(
     problem: &EigenProblem<'_>,
-    search: Search,
+    search: FoundModes,
     (completeness, mut bounds): (Completeness, Option<EigenvalueBounds>),
     (wanted, tolerance): (usize, f64),
     (plan, finite_modes): (Option<Plan>, Option<usize>),

@@ -7,7 +7,7 @@ use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::lanczos::Goal;
 use super::problem::EigenProblem;
-use super::refine::Refined;
+use super::refine::FoundModes;
 use super::single::Correction;
 use super::start::first_shift;
 use flexbody_linalg::multigrid::levels;
@@ -19,13 +19,13 @@ pub(super) fn guards(wanted: usize) -> usize {
     8 + 2 * wanted / 5
 }
 
-/// The lowest modes, eigenvalues beyond them, and the shift; or the reason why cycles do not find them.
+/// Searches the lowest modes, or returns the reason why cycles do not find them.
 pub(super) fn search(
     problem: &EigenProblem<'_>,
     goal: &Goal,
     watch: Watch<'_>,
     counters: &mut Counters,
-) -> Result<(Refined, Vec<f64>, f64), EigenFailure> {
+) -> Result<FoundModes, EigenFailure> {
     watch(Event::Phase("multigrid"));
     let pencil = &problem.pencil;
     let tau = first_shift(problem, None);
@@ -39,6 +39,6 @@ pub(super) fn search(
     }
     let corrector = Corrector::Levels(&*levels);
     let correction = Correction::begin(problem, corrector, goal, rough, goal.wanted, watch, counters)?;
-    let (modes, next) = correction.run(counters)?;
-    Ok((modes, next, tau))
+    let (refined, next) = correction.run(counters)?;
+    Ok(FoundModes { refined, next, tau })
 }

@@ -6,9 +6,9 @@ use super::value::Value;
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    Certificate, FixedInterface, Frame, GeometricStiffness, Group, Groups, Guarantee, Interface,
-    InterfaceCoordinates, InternalRows, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source,
-    SurfaceMesh, TermDecision, UnitLoad,
+    Certificate, FixedInterface, Frame, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates,
+    InternalRows, LumpedBody, MassStructure, Modes, Parts, ReferenceConditions, Source, SurfaceMesh,
+    TermDecision, TermGroup, TermGroups, UnitLoad,
 };
 use flexbody_body::invariants::{
     DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, ibar_of_c2, s_of_modal_mass,
@@ -269,7 +269,7 @@ impl Take<'_> {
         Some(InternalRows { dofs, shape: self.matrix(values, nf) })
     }
 
-    fn invariants(&mut self, place: &str, nf: usize, plane: bool, groups: Groups) -> Invariants {
+    fn invariants(&mut self, place: &str, nf: usize, plane: bool, groups: TermGroups) -> Invariants {
         let path = |name: &str| format!("{place}/{name}");
         let block = |k: usize, l: usize| 3 * k + l;
         let w0 = path("W0");
@@ -350,10 +350,10 @@ impl Take<'_> {
 
     /// What was decided about each group, where it was.
     fn terms(&mut self) -> Vec<TermDecision> {
-        Group::ALL.into_iter().filter_map(|group| self.term(group)).collect()
+        TermGroup::ALL.into_iter().filter_map(|group| self.term(group)).collect()
     }
 
-    fn term(&mut self, group: Group) -> Option<TermDecision> {
+    fn term(&mut self, group: TermGroup) -> Option<TermDecision> {
         let path = |name: &str| format!("/terms@{}_{name}", group.name());
         let [reason, tier, bound, limit] = ["reason", "tier", "bound", "limit"].map(path);
         let there = |path: &String| self.scan.values.contains_key(path);
@@ -383,7 +383,7 @@ impl Take<'_> {
         })
     }
 
-    fn lumped(&mut self, nf: usize, plane: bool, groups: Groups) -> Vec<LumpedBody> {
+    fn lumped(&mut self, nf: usize, plane: bool, groups: TermGroups) -> Vec<LumpedBody> {
         let mut out = Vec::new();
         for (scheme, link) in self.scan.instances("/lumped") {
             let place = format!("/lumped/{link}");

@@ -1,7 +1,7 @@
 //! Entries that follow from others: what the file says against what the body gives.
 
 use super::extents::index;
-use super::item::{DERIVED_TOLERANCE, Group, Origin, Per, SHORT_TOLERANCE};
+use super::item::{DERIVED_TOLERANCE, Origin, Per, SHORT_TOLERANCE, SchemaGroup};
 use super::names::place;
 use super::scan::{Scan, key};
 use super::schema::TABLE;
@@ -23,7 +23,7 @@ pub(super) fn check_derived(scan: &mut Scan, body: &Parts) {
     }
 }
 
-fn check_group(scan: &mut Scan, group: &Group, path: &str, view: &View<'_>) {
+fn check_group(scan: &mut Scan, group: &SchemaGroup, path: &str, view: &View<'_>) {
     for item in group.entries() {
         let Origin::Derived(get, scale) = item.origin else { continue };
         let name = key(path, item);

@@ -90,19 +90,19 @@ pub(super) fn digests_of(
     numbers: &mut Numbers,
     stored: &mut Stored,
 ) -> Result<Digests, String> {
-    let mut walk = Walk { numbers, stored, found: Digests::new() };
+    let mut walk = DigestWalk { numbers, stored, found: Digests::new() };
     let root = file.as_group().map_err(|e| format!("/: {e}"))?;
     walk.group(&root, "/", 0)?;
     Ok(walk.found)
 }
 
-struct Walk<'a> {
+struct DigestWalk<'a> {
     numbers: &'a mut Numbers,
     stored: &'a mut Stored,
     found: Digests,
 }
 
-impl Walk<'_> {
+impl DigestWalk<'_> {
     fn group(&mut self, group: &hdf5::Group, path: &str, depth: usize) -> Result<(), String> {
         self.object(group, path, Fingerprint::default())?;
         let links = group.links(IndexType::Name, IterationOrder::Native);

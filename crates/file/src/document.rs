@@ -1,10 +1,10 @@
 //! The table as documentation: `docs/format.md` and `schemas/flexbody-file.schema.json` are generated here.
 
-use super::item::{DERIVED_TOLERANCE, Extent, Group, Item, Kind, Origin};
+use super::item::{DERIVED_TOLERANCE, Extent, Item, ItemKind, Origin, SchemaGroup};
 use super::schema::terms::KEPT;
 use super::schema::{FORMAT, MAJOR, MINOR, TABLE};
 use super::value::Units;
-use flexbody_body::flex_body::Group as TermGroup;
+use flexbody_body::flex_body::TermGroup;
 use serde_json::{Map, Value, json};
 use std::fmt::Write;
 
@@ -157,11 +157,11 @@ fn content(item: &Item) -> String {
 
 fn kind(item: &Item) -> &'static str {
     match item.kind {
-        Kind::Floats(_) if item.large => "float64 or float32",
-        Kind::Floats(_) | Kind::Float | Kind::Named => "float64",
-        Kind::Ints(_) | Kind::Int => "int64",
-        Kind::Indices(_) => "int32",
-        Kind::Text => "text",
+        ItemKind::Floats(_) if item.large => "float64 or float32",
+        ItemKind::Floats(_) | ItemKind::Float | ItemKind::Named => "float64",
+        ItemKind::Ints(_) | ItemKind::Int => "int64",
+        ItemKind::Indices(_) => "int32",
+        ItemKind::Text => "text",
     }
 }
 
@@ -220,7 +220,7 @@ fn of_group(held: TermGroup) -> Value {
     };
     let groups = || TABLE.iter().filter(|group| group.entries().any(|item| item.of == Some(held)));
     let all = |inner: &dyn Fn(&[&str]) -> Value| -> Value {
-        let schema = |group: &Group| {
+        let schema = |group: &SchemaGroup| {
             let items = group.entries().filter(|item| item.of == Some(held));
             within(group.path, "datasets", inner(&items.map(|item| item.name).collect::<Vec<_>>()))
         };
@@ -265,18 +265,18 @@ fn require(schema: &mut Map<String, Value>, key: &str) {
     }
 }
 
-fn fill(target: &mut Value, group: &Group) {
+fn fill(target: &mut Value, group: &SchemaGroup) {
     let schema = target.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));
     schema.insert("description".to_owned(), json!(group.description));
     for (section, of_datasets) in [("attributes", false), ("datasets", true)] {
         let items = || group.entries().filter(move |i| i.shape().is_some() == of_datasets);
         let mut part = json!({ "type": "object" });
-        let named = items().find(|i| i.kind == Kind::Named);
+        let named = items().find(|i| i.kind == ItemKind::Named);
         if let Some(item) = named {
             part["additionalProperties"] = json!({ "type": "number", "description": item.description });
         }
-        let listed = || items().filter(|i| i.kind != Kind::Named);
+        let listed = || items().filter(|i| i.kind != ItemKind::Named);
         let required: Vec<_> = listed().filter(|i| i.required && i.of.is_none()).map(|i| i.name).collect();
         if !required.is_empty() {
             part["required"] = json!(required);
@@ -293,10 +293,10 @@ fn fill(target: &mut Value, group: &Group) {
 
 fn entry(item: &Item) -> Value {
     let mut schema = match item.kind {
-        Kind::Text => json!({ "type": "string" }),
-        Kind::Int => json!({ "type": "integer" }),
-        Kind::Float | Kind::Named => json!({ "type": "number" }),
-        Kind::Floats(extents) | Kind::Ints(extents) | Kind::Indices(extents) => {
+        ItemKind::Text => json!({ "type": "string" }),
+        ItemKind::Int => json!({ "type": "integer" }),
+        ItemKind::Float | ItemKind::Named => json!({ "type": "number" }),
+        ItemKind::Floats(extents) | ItemKind::Ints(extents) | ItemKind::Indices(extents) => {
             let sizes = extents.iter().map(|extent| match extent {
                 Extent::Fixed(size) => json!({ "const": size }),
                 Extent::ThreeModes => json!({ "type": "integer", "minimum": 3, "multipleOf": 3 }),

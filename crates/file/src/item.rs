@@ -3,7 +3,7 @@
 use super::value::{Units, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
-use flexbody_body::flex_body::{Group as TermGroup, Interface, LumpedBody, Parts};
+use flexbody_body::flex_body::{Interface, LumpedBody, Parts, TermGroup};
 
 /// One extent of a dataset's shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,7 +30,7 @@ use Extent::{Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, Modes, Nod
 
 /// How an entry is stored.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Kind {
+pub(super) enum ItemKind {
     /// Dataset of 64-bit floats.
     Floats(&'static [Extent]),
     /// Dataset of 64-bit signed integers.
@@ -46,7 +46,7 @@ pub(super) enum Kind {
     /// Attributes, 64-bit floats, whose names are data.
     Named,
 }
-use Kind::{Float, Floats, Indices, Int, Ints, Named, Text};
+use ItemKind::{Float, Floats, Indices, Int, Ints, Named, Text};
 
 /// Takes the value of an entry from a body; `None` only for entries that are not required.
 pub(super) type Get = fn(&View<'_>) -> Option<Value>;
@@ -88,7 +88,7 @@ pub(super) enum Per {
 /// A dataset or attribute.
 pub(super) struct Item {
     pub name: &'static str,
-    pub kind: Kind,
+    pub kind: ItemKind,
     pub units: Units,
     pub symbol: &'static str,
     pub description: &'static str,
@@ -104,7 +104,7 @@ pub(super) struct Item {
 }
 
 /// A group with its entries. `<scheme>` and `<name>` stand for names that are data.
-pub(super) struct Group {
+pub(super) struct SchemaGroup {
     pub path: &'static str,
     pub per: Per,
     pub description: &'static str,
@@ -189,7 +189,7 @@ impl Item {
     }
 }
 
-impl Group {
+impl SchemaGroup {
     /// All entries, in the order of the table.
     pub(crate) fn entries(&self) -> impl Iterator<Item = &'static Item> + use<> {
         self.items.iter().flat_map(|part| part.iter())

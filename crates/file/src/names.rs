@@ -1,9 +1,9 @@
 //! Names that are data, as HDF5 link names: `/` separates groups there, `.` is a group itself.
 
-use super::item::Group;
+use super::item::SchemaGroup;
 
 /// Path of a group instance: the template's placeholder replaced by a link name.
-pub(super) fn place(group: &Group, link: Option<&str>) -> String {
+pub(super) fn place(group: &SchemaGroup, link: Option<&str>) -> String {
     match link {
         Some(link) => format!("{}/{link}", group.parent()),
         None => group.path.to_owned(),

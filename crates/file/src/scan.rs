@@ -3,7 +3,7 @@
 
 use super::digest::{self, Numbers, digests_of, of_numbers};
 use super::extents::{Sizes, dataset, index};
-use super::item::{Group, Item, Kind, Origin, Per};
+use super::item::{Item, ItemKind, Origin, Per, SchemaGroup};
 use super::names;
 use super::names::place;
 use super::schema::terms::{DROPPED, KEPT};
@@ -13,7 +13,7 @@ use super::value::Value;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::hdf5_file::{self as hdf5_file, Array, Stored};
 use flexbody_base::units::UnitSystem;
-use flexbody_body::flex_body::{Group as TermGroup, Groups, Storage};
+use flexbody_body::flex_body::{Storage, TermGroup, TermGroups};
 use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
@@ -115,7 +115,7 @@ impl Scan {
 
     /// Looks up the instances of a group that occurs several times; groups of the same kind have the same
     /// ones.
-    fn list(&mut self, file: &hdf5::File, group: &Group) {
+    fn list(&mut self, file: &hdf5::File, group: &SchemaGroup) {
         let parent = group.parent();
         let links = match hdf5_file::open_group(file, parent).and_then(|g| hdf5_file::members(&g)) {
             Ok(links) => links,
@@ -137,7 +137,7 @@ impl Scan {
         }
     }
 
-    fn group(&mut self, file: &hdf5::File, group: &Group, link: Option<&str>) {
+    fn group(&mut self, file: &hdf5::File, group: &SchemaGroup, link: Option<&str>) {
         let path = place(group, link);
         let opened = match hdf5_file::open_group(file, &path) {
             Ok(opened) => opened,
@@ -181,7 +181,7 @@ impl Scan {
         sizes: &mut Sizes,
     ) -> Result<Option<Value>, String> {
         match item.kind {
-            Kind::Floats(shape) => {
+            ItemKind::Floats(shape) => {
                 let stored = &mut self.stored;
                 let values = match item.is_short(self.storage) {
                     false => dataset::<f64>(place, item.name, shape, sizes, stored)?
@@ -198,23 +198,23 @@ impl Scan {
                     None => Ok(Some(Value::Floats(values))),
                 }
             }
-            Kind::Ints(shape) => {
+            ItemKind::Ints(shape) => {
                 let values = dataset::<i64>(place, item.name, shape, sizes, &mut self.stored)?
                     .inspect(|read| self.hash(name, read));
                 Ok(values.map(|(values, _)| Value::Ints(values)))
             }
-            Kind::Indices(shape) => {
+            ItemKind::Indices(shape) => {
                 let values = dataset::<i32>(place, item.name, shape, sizes, &mut self.stored)?
                     .inspect(|read| self.hash(name, read));
                 Ok(values.map(|(values, _)| Value::Indices(values)))
             }
-            Kind::Text => Ok(hdf5_file::text(place, item.name)?.map(Value::Text)),
-            Kind::Int => Ok(hdf5_file::int(place, item.name)?.map(Value::Int)),
-            Kind::Float => match hdf5_file::float(place, item.name)? {
+            ItemKind::Text => Ok(hdf5_file::text(place, item.name)?.map(Value::Text)),
+            ItemKind::Int => Ok(hdf5_file::int(place, item.name)?.map(Value::Int)),
+            ItemKind::Float => match hdf5_file::float(place, item.name)? {
                 Some(v) if !v.is_finite() => Err(format!("expected a finite number, found {v}")),
                 v => Ok(v.map(Value::Float)),
             },
-            Kind::Named => {
+            ItemKind::Named => {
                 let mut values = Vec::new();
                 for name in hdf5_file::attribute_names(place)? {
                     match hdf5_file::float(place, &name) {
@@ -285,7 +285,7 @@ impl Scan {
 
     /// The groups of the kinetic energy that the file says the body holds; `None` when it says something
     /// else.
-    pub(crate) fn held(&mut self) -> Option<Groups> {
+    pub(crate) fn held(&mut self) -> Option<TermGroups> {
         let mut says = |group: TermGroup| match self.values.get(&format!("/terms@{}", group.name())) {
             Some(Value::Text(text)) if text == KEPT => Some(true),
             Some(Value::Text(text)) if text == DROPPED => Some(false),
@@ -299,7 +299,7 @@ impl Scan {
             _ => Some(true),
         };
         let [w1, w2, w3] = TermGroup::ALL.map(&mut says);
-        Some(Groups { w1: w1?, w2: w2?, w3: w3? })
+        Some(TermGroups { w1: w1?, w2: w2?, w3: w3? })
     }
 
     fn constant(&mut self, name: &str, item: &Item, value: &Value) {
@@ -371,11 +371,11 @@ impl Scan {
 
 fn kind(item: &Item) -> &'static str {
     match item.kind {
-        Kind::Floats(_) => "a dataset of 64-bit floats",
-        Kind::Ints(_) => "a dataset of 64-bit integers",
-        Kind::Indices(_) => "a dataset of 32-bit integers",
-        Kind::Text => "a text attribute",
-        Kind::Int => "an integer attribute",
-        Kind::Float | Kind::Named => "a float attribute",
+        ItemKind::Floats(_) => "a dataset of 64-bit floats",
+        ItemKind::Ints(_) => "a dataset of 64-bit integers",
+        ItemKind::Indices(_) => "a dataset of 32-bit integers",
+        ItemKind::Text => "a text attribute",
+        ItemKind::Int => "an integer attribute",
+        ItemKind::Float | ItemKind::Named => "a float attribute",
     }
 }

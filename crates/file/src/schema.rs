@@ -2,13 +2,13 @@
 //! it.
 
 use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, ThreeModes, Triangles};
-use super::item::Kind::{Floats, Indices, Int, Ints, Named, Text};
+use super::item::ItemKind::{Floats, Indices, Int, Ints, Named, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
-use super::item::{Get, Group, Item, Kind, Origin, Per};
+use super::item::{Get, Item, ItemKind, Origin, Per, SchemaGroup};
 use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
 use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
 use flexbody_base::provenance;
-use flexbody_body::flex_body::{Group as TermGroup, Parts, Storage};
+use flexbody_body::flex_body::{Parts, Storage, TermGroup};
 use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
 use interfaces::{COORDINATES, INTERFACES};
 use terms::TERMS;
@@ -54,7 +54,7 @@ const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 /// A required dataset of version 1.0.
 const fn dataset(
     name: &'static str,
-    kind: Kind,
+    kind: ItemKind,
     units: Units,
     symbol: &'static str,
     description: &'static str,
@@ -77,7 +77,7 @@ const fn dataset(
 /// A required attribute of version 1.0.
 const fn attribute(
     name: &'static str,
-    kind: Kind,
+    kind: ItemKind,
     units: Units,
     description: &'static str,
     get: Get,
@@ -86,7 +86,7 @@ const fn attribute(
 }
 
 /// A required attribute of version 1.0 with one value for every file.
-const fn constant(name: &'static str, kind: Kind, origin: Origin, description: &'static str) -> Item {
+const fn constant(name: &'static str, kind: ItemKind, origin: Origin, description: &'static str) -> Item {
     Item {
         name,
         kind,
@@ -532,72 +532,77 @@ const COMPARISON: &[Item] =
     })];
 
 /// The groups, in the order in which they are written.
-pub(super) const TABLE: &[Group] = &[
-    Group { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
-    Group { path: "/source", per: Per::Body, description: "Where the body came from.", items: &[SOURCE] },
-    Group { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
-    Group { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
-    Group {
+pub(super) const TABLE: &[SchemaGroup] = &[
+    SchemaGroup { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
+    SchemaGroup {
+        path: "/source",
+        per: Per::Body,
+        description: "Where the body came from.",
+        items: &[SOURCE],
+    },
+    SchemaGroup { path: "/frame", per: Per::Body, description: "The body frame.", items: &[FRAME] },
+    SchemaGroup { path: "/nodes", per: Per::Body, description: "Nodes of the body.", items: &[NODES] },
+    SchemaGroup {
         path: "/mesh",
         per: Per::Body,
         description: "The surface of the part on some of its nodes, to draw it by. Nothing is computed from it. Absent: not known. Since 1.5; a file without it is one of 1.4.",
         items: &[MESH],
     },
-    Group {
+    SchemaGroup {
         path: "/modes",
         per: Per::Body,
         description: "Mode shapes and what is known of each mode.",
         items: &[MODES],
     },
-    Group {
+    SchemaGroup {
         path: "/invariants",
         per: Per::Body,
         description: "Exact invariants from the consistent mass, about the frame origin, in body axes.",
         items: &[INVARIANTS, DAMPING],
     },
-    Group {
+    SchemaGroup {
         path: "/lumped/<scheme>",
         per: Per::LumpingScheme,
         description: "The same invariants from lumped masses, with the same modes.",
         items: &[LUMPED, INVARIANTS],
     },
-    Group {
+    SchemaGroup {
         path: "/comparison/<scheme>",
         per: Per::LumpingScheme,
         description: "Errors of the lumped invariants against the exact ones.",
         items: &[COMPARISON],
     },
-    Group {
+    SchemaGroup {
         path: "/certificate",
         per: Per::Body,
         description: "What was proved about the modes, and the digits of the input.",
         items: &[CERTIFICATE, INVARIANT_DIGITS],
     },
-    Group {
+    SchemaGroup {
         path: "/terms",
         per: Per::Body,
         description: "Which groups of the kinetic energy the body holds, and why. A solver leaves out what is dropped, in all places.",
         items: &[TERMS],
     },
-    Group {
+    SchemaGroup {
         path: "/interfaces/<name>",
         per: Per::Interface,
         description: "Named node sets, what they are coupled to, and the modes there.",
         items: &[INTERFACES],
     },
-    Group {
+    SchemaGroup {
         path: "/geometric_stiffness/<load>",
         per: Per::UnitLoad,
         description: "Stiffness that the stress under a unit load adds. Named `kind_axis`, `kind_axis_interface` or `load_name`; loads along body axes, accelerations and spin about the frame origin. Absent: zero, or not known.",
         items: &[GEOMETRIC_STIFFNESS],
     },
-    Group {
+    SchemaGroup {
         path: "/inertia_stiffness/<load>",
         per: Per::InertiaLoad,
         description: "Stiffness that the inertia of turning nodes adds: terms of the kinetic energy of second order in the rotations of nodes that carry rotational inertia or an eccentric mass. Signs and loads are those of `/geometric_stiffness`, to which a solver adds it: `acceleration_x` to `_z`, `angular_acceleration_x` to `_z`, `spin_xx` to `_xz`, all of them; in the plane `acceleration_x`, `_y`, `angular_acceleration_z`, `spin_zz`. Absent: zero; in files before 1.6 of mass structure `general`: not known. Since 1.6; a file without it is one of 1.5.",
         items: &[INERTIA_STIFFNESS],
     },
-    Group {
+    SchemaGroup {
         path: "/interface_coordinates",
         per: Per::Body,
         description: "Stiffness and mass in the motions of the interfaces and the amplitudes of the fixed-interface modes (Craig-Bampton), six coordinates for every reference point, as reduced-order blocks of multibody packages take them. Only of the basis `craig-bampton`.",

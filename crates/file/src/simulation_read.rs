@@ -16,18 +16,18 @@ use std::path::Path;
 pub fn read_simulation(path: impl AsRef<Path>) -> Result<RecordedMotion> {
     let path = path.as_ref();
     let (file, bytes) = open_sound(path, "motion", Code::MotionUnreadable)?;
-    let mut reading = Reading { file, stored: Stored::new(bytes) };
+    let mut reading = RecordingReader { file, stored: Stored::new(bytes) };
     reading
         .motion()
         .map_err(|problem| Error::from(Diagnostic::new(Code::MotionUnreadable, problem).in_file(path)))
 }
 
-struct Reading {
+struct RecordingReader {
     file: hdf5::File,
     stored: Stored,
 }
 
-impl Reading {
+impl RecordingReader {
     fn motion(&mut self) -> std::result::Result<RecordedMotion, String> {
         let root = self.file.as_group().map_err(|e| e.to_string())?;
         match hdf5_file::text(&root, "format")? {

@@ -1,7 +1,7 @@
 //! Writes a body as the table says.
 
 use super::digest::{Number, Numbers, digests_of, of_numbers, sealed};
-use super::item::{Item, Kind, Per};
+use super::item::{Item, ItemKind, Per};
 use super::names;
 use super::names::place;
 use super::scan::key;
@@ -102,19 +102,21 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
 /// Writes an entry; of a dataset, gives the fingerprint of its numbers.
 fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<Option<Fingerprint>> {
     match (item.kind, value) {
-        (Kind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
+        (ItemKind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
             let short: Vec<f32> = values.into_iter().map(nearest_f32).collect();
             return put_numbers(place, item, view, &short).map(Some);
         }
-        (Kind::Floats(_), Value::Floats(values)) => return put_numbers(place, item, view, &values).map(Some),
-        (Kind::Ints(_), Value::Ints(values)) => return put_numbers(place, item, view, &values).map(Some),
-        (Kind::Indices(_), Value::Indices(values)) => {
+        (ItemKind::Floats(_), Value::Floats(values)) => {
             return put_numbers(place, item, view, &values).map(Some);
         }
-        (Kind::Text, Value::Text(text)) => put_text(place, item.name, &text)?,
-        (Kind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v)?,
-        (Kind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v)?,
-        (Kind::Named, Value::Named(values)) => values
+        (ItemKind::Ints(_), Value::Ints(values)) => return put_numbers(place, item, view, &values).map(Some),
+        (ItemKind::Indices(_), Value::Indices(values)) => {
+            return put_numbers(place, item, view, &values).map(Some);
+        }
+        (ItemKind::Text, Value::Text(text)) => put_text(place, item.name, &text)?,
+        (ItemKind::Int, Value::Int(v)) => place.new_attr::<i64>().create(item.name)?.write_scalar(&v)?,
+        (ItemKind::Float, Value::Float(v)) => place.new_attr::<f64>().create(item.name)?.write_scalar(&v)?,
+        (ItemKind::Named, Value::Named(values)) => values
             .iter()
             .try_for_each(|(n, v)| place.new_attr::<f64>().create(n.as_str())?.write_scalar(v))?,
         (kind, value) => unreachable!("table entry {}: {kind:?} for {value:?}", item.name),

@@ -184,7 +184,7 @@ pub(super) fn read_deck(
 ) -> Result<Vec<SeenFile>, Diagnostic> {
     let file = InputFile::open(path)?;
     let has_control = Lines::of(file.bytes(), 0).any(|(_, range)| is_control(&file.bytes()[range]));
-    let mut reading = Reading::new(!has_control, take);
+    let mut reading = BulkReader::new(!has_control, take);
     reading.file(path, &file, 0)?;
     reading.flush()?;
     Ok(reading.files)
@@ -205,7 +205,7 @@ pub(super) fn read_cards(
         Item::Card(card, _) => take(card),
         _ => Ok(()),
     };
-    let mut reading = Reading::new(true, &mut each);
+    let mut reading = BulkReader::new(true, &mut each);
     for (number, range) in Lines::of(text, 0) {
         reading.line(&text[range], &Place { path, line: above + number })?;
     }
@@ -239,7 +239,7 @@ impl Iterator for Lines<'_> {
 }
 
 /// A deck while it is read.
-struct Reading<'t> {
+struct BulkReader<'t> {
     files: Vec<SeenFile>,
     in_bulk: bool,
     /// ENDDATA has come.
@@ -256,7 +256,7 @@ struct Reading<'t> {
     take: &'t mut dyn FnMut(Item<'_>) -> Taken,
 }
 
-impl<'t> Reading<'t> {
+impl<'t> BulkReader<'t> {
     fn new(in_bulk: bool, take: &'t mut dyn FnMut(Item<'_>) -> Taken) -> Self {
         let (files, card, card_path) = (Vec::new(), Card::default(), PathBuf::new());
         let (apart, replication) = (Apart::default(), Replication::default());

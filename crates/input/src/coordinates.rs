@@ -105,7 +105,7 @@ impl Coordinates {
 
     fn parse(&mut self, block: &[u8]) {
         let pieces: Vec<&[u8]> = line_aligned(block).collect();
-        let parsed: Vec<line::Piece> =
+        let parsed: Vec<line::EntryLines> =
             pieces.into_par_iter().map(|piece| line::parse(piece, self.limits)).collect();
         for piece in parsed {
             let before = self.lines;

@@ -4,7 +4,7 @@ use super::jobs::JobFile;
 use super::model_files::{MatrixLocation, ModelFiles, ModelSource, TableFiles, stem};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::text::walk::{Table, Value, Walk, integer, read_toml, real};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, read_toml, real};
 use flexbody_base::units::UnitSystem;
 use std::ops::Range;
 use std::ops::{Deref, DerefMut};
@@ -50,7 +50,7 @@ impl DerefMut for ManifestWalk<'_, '_> {
 
 impl ManifestWalk<'_, '_> {
     /// `None` only with something in `found`.
-    fn model(&mut self, top: &Table) -> Option<ModelFiles> {
+    fn model(&mut self, top: &TomlTable) -> Option<ModelFiles> {
         self.known_keys(top, "the manifest", TOP);
         let model = self.table(top, "model");
         let model_keys = model.map(|(table, _)| table);
@@ -97,7 +97,7 @@ impl ManifestWalk<'_, '_> {
     }
 
     /// Where the matrices come from: a file each, or a job.
-    fn source(&mut self, files: &Table, span: Range<usize>) -> Option<ModelSource> {
+    fn source(&mut self, files: &TomlTable, span: Range<usize>) -> Option<ModelSource> {
         self.known_keys(files, "[files]", FILES);
         let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
         if files.contains_key("job") {
@@ -132,7 +132,7 @@ impl ManifestWalk<'_, '_> {
     }
 
     /// The names of stiffness and mass matrix among those of a job.
-    fn matrix_names(&mut self, files: &Table) -> Option<[String; 2]> {
+    fn matrix_names(&mut self, files: &TomlTable) -> Option<[String; 2]> {
         let value = files.get("matrices")?;
         let names = value.get_ref().as_array().map(|all| {
             all.iter().filter_map(|name| name.get_ref().as_str().map(str::to_owned)).collect::<Vec<_>>()
@@ -145,7 +145,7 @@ impl ManifestWalk<'_, '_> {
         names
     }
 
-    fn dimension(&mut self, table: &Table) -> Option<u8> {
+    fn dimension(&mut self, table: &TomlTable) -> Option<u8> {
         let value = table.get("dimension")?;
         match integer(value) {
             Some(2) => Some(2),
@@ -162,7 +162,7 @@ impl ManifestWalk<'_, '_> {
         }
     }
 
-    fn allow_implausible(&mut self, table: &Table) -> Option<bool> {
+    fn allow_implausible(&mut self, table: &TomlTable) -> Option<bool> {
         let value = table.get("allow_implausible")?;
         match value.get_ref() {
             DeValue::Boolean(allowed) => Some(*allowed),
@@ -173,7 +173,7 @@ impl ManifestWalk<'_, '_> {
         }
     }
 
-    fn units(&mut self, table: &Table, span: Range<usize>) -> Option<UnitSystem> {
+    fn units(&mut self, table: &TomlTable, span: Range<usize>) -> Option<UnitSystem> {
         self.known_keys(table, "[model.units]", UNITS);
         let names: Vec<Option<String>> =
             UNITS.iter().map(|key| self.unit(table, key, span.clone())).collect();
@@ -184,7 +184,7 @@ impl ManifestWalk<'_, '_> {
     }
 
     /// The name of one unit, or its factor to SI as it is written.
-    fn unit(&mut self, table: &Table, key: &str, span: Range<usize>) -> Option<String> {
+    fn unit(&mut self, table: &TomlTable, key: &str, span: Range<usize>) -> Option<String> {
         let Some(value) = table.get(key) else {
             let message = format!("key `{key}` is missing in [model.units]");
             let diagnostic = self.at(Code::ManifestSyntax, span, message);

@@ -11,7 +11,7 @@ mod elements;
 mod variable;
 
 use elements::{Found, Order};
-use variable::{Kind, Variable};
+use variable::{Variable, VariableKind};
 
 /// The reader of MAT-files.
 pub(super) struct Mat5;
@@ -110,8 +110,8 @@ fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Found<&'v Variabl
 /// The only sparse matrix, or the only one named after its role; in a file without sparse matrices the same of
 /// square full ones.
 fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Found<&'v Variable<'a>> {
-    let sparse: Vec<&Variable<'a>> = variables.iter().filter(|v| v.kind == Kind::Sparse).collect();
-    let is_full = |v: &&Variable<'a>| v.kind == Kind::Full && v.rows == v.columns && v.rows > 1;
+    let sparse: Vec<&Variable<'a>> = variables.iter().filter(|v| v.kind == VariableKind::Sparse).collect();
+    let is_full = |v: &&Variable<'a>| v.kind == VariableKind::Full && v.rows == v.columns && v.rows > 1;
     let candidates = if sparse.is_empty() { variables.iter().filter(is_full).collect() } else { sparse };
     if candidates.is_empty() {
         let message = "file holds no sparse matrix and no square one";

@@ -88,7 +88,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Some(GeometricStiffness { load, matrix })
     });
     let geometric_stiffness = geometric.collect();
-    let places = Places::of(matrices.as_ref(), files.dimension);
+    let places = NodeLookup::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
         .interfaces
         .iter()
@@ -300,13 +300,13 @@ impl Parsed {
 }
 
 /// Where the nodes of a model lie, and its sets, for interfaces that name these.
-struct Places<'m> {
+struct NodeLookup<'m> {
     matrices: Option<&'m ModelMatrices>,
     /// Nodes with stiffness or mass, where rows are known.
     moving: Option<HashSet<i64>>,
 }
 
-impl<'m> Places<'m> {
+impl<'m> NodeLookup<'m> {
     fn of(matrices: Option<&'m ModelMatrices>, dimension: u8) -> Self {
         Self { matrices, moving: matrices.and_then(|matrices| matrices.moving(dimension)) }
     }

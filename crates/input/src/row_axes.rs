@@ -8,7 +8,7 @@ use flexbody_model::{DofLabel, NodeAxes as Block, RawMatrix};
 use std::collections::HashMap;
 
 /// Three rows that are turned together, or one that is not.
-struct Group {
+struct RowTriple {
     rows: [u32; 3],
     /// Unit vectors along the rows; `None` where they stand.
     axes: Option<Block>,
@@ -16,7 +16,7 @@ struct Group {
 
 /// Which rows are turned.
 pub(super) struct Turn {
-    groups: Vec<Group>,
+    groups: Vec<RowTriple>,
     /// Group of each row, and which of its rows it is.
     group_of: Vec<(u32, u8)>,
 }
@@ -40,7 +40,7 @@ impl Turn {
             let number = groups.len() as u32;
             let Some(own) = axes.get(&label.node) else {
                 group_of[row] = (number, 0);
-                groups.push(Group { rows: [row as u32; 3], axes: None });
+                groups.push(RowTriple { rows: [row as u32; 3], axes: None });
                 continue;
             };
             let rows = triples[&(label.node, label.direction > 3)];
@@ -51,7 +51,7 @@ impl Turn {
             for (k, &row) in rows.iter().enumerate() {
                 *group_of.get_mut(row as usize).ok_or(label.node)? = (number, k as u8);
             }
-            groups.push(Group { rows, axes: Some(*own) });
+            groups.push(RowTriple { rows, axes: Some(*own) });
         }
         Ok(Self { groups, group_of })
     }
@@ -93,7 +93,7 @@ impl Turn {
     pub(super) fn axes(&self) -> CscMatrix {
         let mut entries = Vec::new();
         for (row, &(group, k)) in (0u32..).zip(&self.group_of) {
-            let Group { rows, axes } = &self.groups[group as usize];
+            let RowTriple { rows, axes } = &self.groups[group as usize];
             match axes {
                 None => entries.push((row, row, 1.0)),
                 Some(axes) => {
@@ -106,14 +106,14 @@ impl Turn {
     }
 }
 
-impl Group {
+impl RowTriple {
     fn count(&self) -> usize {
         if self.axes.is_some() { 3 } else { 1 }
     }
 }
 
 /// A B C' with the axes of the rows and of the columns in the columns of A and C.
-fn turned_block(block: Block, rows: &Group, columns: &Group) -> Block {
+fn turned_block(block: Block, rows: &RowTriple, columns: &RowTriple) -> Block {
     let is_multiple = (0..3).all(|j| (0..3).all(|k| block[j][k] == if j == k { block[0][0] } else { 0.0 }));
     if rows.axes == columns.axes && (is_multiple || rows.axes.is_none()) {
         return block;

@@ -14,7 +14,7 @@ pub struct Elimination {
     free: Vec<u32>,
     dependents: Vec<Dependents>,
     /// Of each row: its place in y, or where it stands among the dependent ones.
-    kinds: Vec<Kind>,
+    kinds: Vec<RowRole>,
 }
 
 /// Rows that depend on the same others: u\[rows\] = W u\[on\].
@@ -29,7 +29,7 @@ pub struct Dependents {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum RowRole {
     Zero,
     Free(u32),
     Dependent(u32, u32),
@@ -61,24 +61,25 @@ impl Elimination {
     /// # Panics
     /// When a row is given twice, or a row depends on one that is not free.
     pub fn new(n: usize, zero: &[usize], dependents: Vec<Dependents>) -> Self {
-        let mut kinds = vec![Kind::Free(0); n];
-        let mut set = |row: usize, kind: Kind| {
-            assert_eq!(kinds[row], Kind::Free(0), "row {row} is eliminated twice");
+        let mut kinds = vec![RowRole::Free(0); n];
+        let mut set = |row: usize, kind: RowRole| {
+            assert_eq!(kinds[row], RowRole::Free(0), "row {row} is eliminated twice");
             kinds[row] = kind;
         };
-        zero.iter().for_each(|&row| set(row, Kind::Zero));
+        zero.iter().for_each(|&row| set(row, RowRole::Zero));
         for (group, dependent) in dependents.iter().enumerate() {
             let rows = dependent.rows.iter().enumerate();
-            rows.for_each(|(place, &row)| set(row, Kind::Dependent(group as u32, place as u32)));
+            rows.for_each(|(place, &row)| set(row, RowRole::Dependent(group as u32, place as u32)));
         }
         let mut free = Vec::new();
         for (row, kind) in kinds.iter_mut().enumerate() {
-            if let Kind::Free(place) = kind {
+            if let RowRole::Free(place) = kind {
                 *place = free.len() as u32;
                 free.push(row as u32);
             }
         }
-        let on_free = dependents.iter().flat_map(|d| &d.on).all(|&row| matches!(kinds[row], Kind::Free(_)));
+        let on_free =
+            dependents.iter().flat_map(|d| &d.on).all(|&row| matches!(kinds[row], RowRole::Free(_)));
         assert!(on_free, "a row depends on one that is not free");
         Self { n, free, dependents, kinds }
     }
@@ -139,13 +140,13 @@ impl Elimination {
         assert_eq!(pencil.n(), self.n, "rows of the pencil");
         let block = pencil.block();
         let whole = self.kinds.chunks(block).all(|node| {
-            node.iter().all(|kind| matches!(kind, Kind::Free(_)))
-                || node.iter().all(|kind| *kind == Kind::Zero)
+            node.iter().all(|kind| matches!(kind, RowRole::Free(_)))
+                || node.iter().all(|kind| *kind == RowRole::Zero)
         });
         let stiffness = self.congruence(pencil.stiffness(), 1);
         if whole {
             let zero: Vec<usize> =
-                (0..self.n / block).filter(|node| self.kinds[node * block] == Kind::Zero).collect();
+                (0..self.n / block).filter(|node| self.kinds[node * block] == RowRole::Zero).collect();
             let nodes = Self::new(self.n / block, &zero, Vec::new());
             ReducedPencil { stiffness, mass: nodes.congruence(pencil.mass(), 1), block }
         } else {
@@ -166,7 +167,7 @@ impl Elimination {
             }
         }
         let chunk = |first: usize| {
-            let mut column = Column { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
+            let mut column = ColumnSums { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
             let (mut lengths, mut row_idx, mut values) = (Vec::new(), Vec::new(), Vec::new());
             let last = (first + COLUMNS).min(m);
             for (&own, others) in self.free[first..last].iter().zip(&taken[first..last]) {
@@ -203,11 +204,11 @@ impl Elimination {
     }
 
     /// Adds T' of `value` in one row.
-    fn add(&self, column: &mut Column, row: usize, value: f64) {
+    fn add(&self, column: &mut ColumnSums, row: usize, value: f64) {
         match self.kinds[row] {
-            Kind::Zero => {}
-            Kind::Free(place) => column.add(place, value),
-            Kind::Dependent(group, i) => {
+            RowRole::Zero => {}
+            RowRole::Free(place) => column.add(place, value),
+            RowRole::Dependent(group, i) => {
                 let Dependents { on, weights, .. } = &self.dependents[group as usize];
                 for (j, &free) in on.iter().enumerate() {
                     column.add(self.place(free) as u32, weights[(i as usize, j)] * value);
@@ -218,20 +219,20 @@ impl Elimination {
 
     fn place(&self, row: usize) -> usize {
         match self.kinds[row] {
-            Kind::Free(place) => place as usize,
+            RowRole::Free(place) => place as usize,
             _ => unreachable!("checked at construction: row {row} is free"),
         }
     }
 }
 
 /// Sums of one column in the making.
-struct Column {
+struct ColumnSums {
     sums: Vec<f64>,
     met: Vec<bool>,
     rows: Vec<u32>,
 }
 
-impl Column {
+impl ColumnSums {
     fn add(&mut self, row: u32, value: f64) {
         let i = row as usize;
         if !self.met[i] {

@@ -5,7 +5,7 @@ use super::assembly_tree::{AssemblyTree, Graph};
 use super::front::{self, Real, Trapezoid, extend_add};
 use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
-use super::tree_walk::{Needs, Walk};
+use super::tree_walk::{Needs, TreeWalk};
 use super::{Pencil, SymmetricMatrix};
 use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
@@ -49,7 +49,7 @@ impl CoupledRows {
 #[derive(Debug)]
 pub struct Analysis {
     pub(super) tree: Arc<AssemblyTree>,
-    pub(super) walk: Walk,
+    pub(super) walk: TreeWalk,
     /// Rows per vertex of the tree.
     pub(super) block: usize,
     flops: f64,
@@ -64,7 +64,7 @@ impl Analysis {
 
     fn with_tree(tree: Arc<AssemblyTree>, block: usize) -> Self {
         let work: Vec<f64> = (0..tree.len()).map(|s| elimination_flops(tree.front(s, block))).collect();
-        let walk = Walk::new(&tree, &work);
+        let walk = TreeWalk::new(&tree, &work);
         let pivots = |(width, rest)| Trapezoid::<f64>::stored(width + rest, width);
         let len = (0..tree.len()).map(|s| pivots(tree.front(s, block))).sum();
         Self { walk, block, flops: work.iter().sum(), len, tree }
@@ -156,7 +156,7 @@ impl Scaled<'_> {
     pub(super) fn assemble<T: Real>(&self, s: usize, front: &mut Trapezoid<T>) {
         let columns = self.analysis.tree.columns(s);
         for column in columns.clone() {
-            let mut places = Places { tree: &self.analysis.tree, s, column, known: Vec::new() };
+            let mut places = FrontPlaces { tree: &self.analysis.tree, s, column, known: Vec::new() };
             let local = (column - columns.start) * self.analysis.block;
             self.assemble_stiffness(local, &mut places, front);
             self.assemble_mass(local, &mut places, front);
@@ -164,7 +164,12 @@ impl Scaled<'_> {
     }
 
     /// Adds the columns of K that a vertex has, the first of which is `local` in the front.
-    fn assemble_stiffness<T: Real>(&self, local: usize, places: &mut Places<'_>, front: &mut Trapezoid<T>) {
+    fn assemble_stiffness<T: Real>(
+        &self,
+        local: usize,
+        places: &mut FrontPlaces<'_>,
+        front: &mut Trapezoid<T>,
+    ) {
         let block = self.analysis.block;
         let vertex = places.vertex();
         for b in 0..block {
@@ -183,7 +188,7 @@ impl Scaled<'_> {
     }
 
     /// Adds the same columns of -sigma M: of the rows of Ms that a vertex has, each is for as many rows of M.
-    fn assemble_mass<T: Real>(&self, local: usize, places: &mut Places<'_>, front: &mut Trapezoid<T>) {
+    fn assemble_mass<T: Real>(&self, local: usize, places: &mut FrontPlaces<'_>, front: &mut Trapezoid<T>) {
         let block = self.analysis.block;
         let vertex = places.vertex();
         let (copies, heavy) = (self.pencil.block(), block / self.pencil.block());
@@ -208,7 +213,7 @@ impl Scaled<'_> {
 
 /// Places of vertices in the front of a supernode, for the entries of one of its columns of vertices: looked up
 /// once for all rows of the vertex.
-struct Places<'a> {
+struct FrontPlaces<'a> {
     tree: &'a AssemblyTree,
     s: usize,
     column: usize,
@@ -216,7 +221,7 @@ struct Places<'a> {
     known: Vec<(usize, Option<usize>)>,
 }
 
-impl Places<'_> {
+impl FrontPlaces<'_> {
     /// The vertex of the column.
     fn vertex(&self) -> usize {
         self.tree.order()[self.column] as usize

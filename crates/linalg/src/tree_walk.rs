@@ -32,11 +32,11 @@ pub(crate) struct Needs {
 
 /// How walks cut the tree.
 #[derive(Debug)]
-pub(crate) struct Walk {
+pub(crate) struct TreeWalk {
     trees: Segment,
 }
 
-impl Walk {
+impl TreeWalk {
     /// Cuts the tree by the work at each supernode.
     pub(crate) fn new(tree: &AssemblyTree, work: &[f64]) -> Self {
         let mut below = work.to_vec();

@@ -1,6 +1,6 @@
 //! Small bodies with interfaces: a bracket of hexahedra and a plane strip held at two ends, and a soft block on a foot.
 
-use crate::elements::{Kind, MassRule, Material};
+use crate::elements::{ElementKind, MassRule, Material};
 use crate::mesh::{Mesh, grid};
 use crate::plane::rectangle;
 use crate::random::Random;
@@ -10,7 +10,7 @@ const CELL: f64 = 0.05;
 
 /// A bracket with its two ends as interfaces, the second about a point far from its nodes, turned and moved.
 pub fn bracket(couplings: [Coupling; 2]) -> RawModel {
-    let mesh = Mesh::bracket(Kind::Hex8, 4, 2, CELL);
+    let mesh = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL);
     let end = |axis: usize| -> Vec<i64> {
         let kept = mesh.nodes.iter().enumerate().filter(|(_, x)| (x[axis] - 4.0 * CELL).abs() < 1e-9);
         kept.map(|(i, _)| i as i64 + 1).collect()
@@ -51,7 +51,7 @@ pub fn strip(couplings: [Coupling; 2]) -> RawModel {
 /// A rubber-like block without any symmetry, turned and far from the model's origin, with an interface.
 pub fn footed_block() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([4, 2, 2]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 2, 2]), |[x, y, z]| {
         [0.3 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
     });
     let ids: Vec<i64> =

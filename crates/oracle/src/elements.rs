@@ -29,7 +29,7 @@ pub enum MassRule {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum ElementKind {
     Tet4,
     Tet10,
     Hex8,
@@ -42,26 +42,26 @@ pub const TET_EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 
 /// A quadrature point: reference coordinates and weight.
 type Point = ([f64; 3], f64);
 
-impl Kind {
+impl ElementKind {
     /// Reference coordinates -1, 0, 1 of a hexahedron's nodes: corners first, then mid-edge nodes.
     pub fn hex_signs(self) -> Vec<[i32; 3]> {
         let all = (0..27).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
         let with_zeros =
             |n: usize| all.clone().filter(move |s: &[i32; 3]| s.iter().filter(|v| **v == 0).count() == n);
         match self {
-            Kind::Hex8 => with_zeros(0).collect(),
-            Kind::Hex20 => with_zeros(0).chain(with_zeros(1)).collect(),
-            Kind::Tet4 | Kind::Tet10 => panic!("not a hexahedron"),
+            ElementKind::Hex8 => with_zeros(0).collect(),
+            ElementKind::Hex20 => with_zeros(0).chain(with_zeros(1)).collect(),
+            ElementKind::Tet4 | ElementKind::Tet10 => panic!("not a hexahedron"),
         }
     }
 
     /// Shape functions and their gradients in reference coordinates.
     pub fn shape(self, xi: [f64; 3]) -> (Vec<f64>, Vec<[f64; 3]>) {
         match self {
-            Kind::Tet4 | Kind::Tet10 => {
+            ElementKind::Tet4 | ElementKind::Tet10 => {
                 let l = [1.0 - xi[0] - xi[1] - xi[2], xi[0], xi[1], xi[2]];
                 let g = [[-1.0, -1.0, -1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-                if self == Kind::Tet4 {
+                if self == ElementKind::Tet4 {
                     return (l.to_vec(), g.to_vec());
                 }
                 let corners =
@@ -72,7 +72,9 @@ impl Kind {
                 });
                 corners.chain(middles).unzip()
             }
-            Kind::Hex8 | Kind::Hex20 => self.hex_signs().iter().map(|s| self.hex_shape(*s, xi)).unzip(),
+            ElementKind::Hex8 | ElementKind::Hex20 => {
+                self.hex_signs().iter().map(|s| self.hex_shape(*s, xi)).unzip()
+            }
         }
     }
 
@@ -86,7 +88,7 @@ impl Kind {
         });
         let product = f[0].0 * f[1].0 * f[2].0;
         let gradient = [f[0].1 * f[1].0 * f[2].0, f[0].0 * f[1].1 * f[2].0, f[0].0 * f[1].0 * f[2].1];
-        if self == Kind::Hex20 && !sign.contains(&0) {
+        if self == ElementKind::Hex20 && !sign.contains(&0) {
             let sum = s[0] * xi[0] + s[1] * xi[1] + s[2] * xi[2] - 2.0;
             (product * sum, std::array::from_fn(|k| gradient[k] * sum + product * s[k]))
         } else {
@@ -97,27 +99,27 @@ impl Kind {
     /// Points of the stiffness matrix.
     fn stiffness_rule(self) -> Vec<Point> {
         match self {
-            Kind::Tet4 => tet_rule(1),
-            Kind::Tet10 => tet_rule(3),
-            Kind::Hex8 => hex_rule(2),
-            Kind::Hex20 => hex_rule(3),
+            ElementKind::Tet4 => tet_rule(1),
+            ElementKind::Tet10 => tet_rule(3),
+            ElementKind::Hex8 => hex_rule(2),
+            ElementKind::Hex20 => hex_rule(3),
         }
     }
 
     /// Points of the mass matrix.
     fn mass_rule(self, rule: MassRule) -> Vec<Point> {
         match (self, rule) {
-            (Kind::Tet4, MassRule::Consistent) => tet_rule(3),
-            (Kind::Tet10, MassRule::Consistent) => tet_rule(4),
-            (Kind::Hex8, MassRule::Consistent) => hex_rule(2),
-            (Kind::Hex20, MassRule::Consistent) => hex_rule(3),
-            (Kind::Tet10, MassRule::Reduced) => {
+            (ElementKind::Tet4, MassRule::Consistent) => tet_rule(3),
+            (ElementKind::Tet10, MassRule::Consistent) => tet_rule(4),
+            (ElementKind::Hex8, MassRule::Consistent) => hex_rule(2),
+            (ElementKind::Hex20, MassRule::Consistent) => hex_rule(3),
+            (ElementKind::Tet10, MassRule::Reduced) => {
                 let (a, b) = ((5.0 + 3.0 * 5f64.sqrt()) / 20.0, (5.0 - 5f64.sqrt()) / 20.0);
                 [[b, b, b], [a, b, b], [b, a, b], [b, b, a]].map(|p| (p, 1.0 / 24.0)).to_vec()
             }
-            (Kind::Tet4, MassRule::Reduced) => tet_rule(1),
-            (Kind::Hex8, MassRule::Reduced) => hex_rule(1),
-            (Kind::Hex20, MassRule::Reduced) => hex_rule(2),
+            (ElementKind::Tet4, MassRule::Reduced) => tet_rule(1),
+            (ElementKind::Hex8, MassRule::Reduced) => hex_rule(1),
+            (ElementKind::Hex20, MassRule::Reduced) => hex_rule(2),
         }
     }
 
@@ -162,7 +164,7 @@ impl Kind {
     }
 }
 
-impl Kind {
+impl ElementKind {
     /// Scalar geometric stiffness (m x m, row-major): sum over the points of grad N_a' sigma grad N_b, with
     /// the stress that the displacements `moved` of the nodes cause. The element's K_geo is that kron I3.
     pub fn geometric_stiffness(

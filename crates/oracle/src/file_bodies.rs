@@ -9,7 +9,9 @@ use flexbody_body::flex_body::{
     InterfaceCoordinates, InternalRows, LoadKind, LumpedBody, MassStructure, Modes, Parts,
     ReferenceConditions, Source, Storage, SurfaceMesh, Truncation, UnitLoad,
 };
-use flexbody_body::invariants::{DIGITS, GeneralTerms, Groups, InertiaStiffness, Invariants, PrimaryData};
+use flexbody_body::invariants::{
+    DIGITS, GeneralTerms, InertiaStiffness, Invariants, PrimaryData, TermGroups,
+};
 use flexbody_model::{BodyNumber, Coupling, NodeMoments, Nodes};
 use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
@@ -82,7 +84,7 @@ impl Random {
             s: [(); 3].map(|()| [(); 3].map(|()| self.matrix(nf, nf))),
             modal_stiffness: self.matrix(nf, nf),
             general: None,
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         })
     }
 

@@ -1,6 +1,6 @@
 //! Flexible bodies for tests of their equations of motion, and the oracles that belong to them.
 
-use super::elements::{Kind, MassRule, Material};
+use super::elements::{ElementKind, MassRule, Material};
 use super::equations::{ReducedBody, State};
 use super::general::{GeneralBody, dense, quasi_velocities};
 use super::mesh::{Mesh, grid};
@@ -13,7 +13,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::{
     Certificate, FlexBody, Frame, MassStructure, Modes, Parts, ReferenceConditions, Source, Storage,
 };
-use flexbody_body::invariants::{BodyFrame, GeneralTerms, Groups, Invariants, PrimaryData};
+use flexbody_body::invariants::{BodyFrame, GeneralTerms, Invariants, PrimaryData, TermGroups};
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::progress::SILENT;
@@ -39,7 +39,7 @@ pub fn fixture(name: &str, modes: usize, frame: BodyFrame) -> FlexBody {
 /// A rubber-like block without any symmetry: W1, W2 and W3 all count.
 pub fn soft_block(modes: usize) -> FlexBody {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
         [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
     });
     body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), modes, BodyFrame::Principal)
@@ -86,7 +86,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
             modal_mass: faer(&reduced.modal_mass),
             plane: false,
         }),
-        groups: Groups::ALL,
+        groups: TermGroups::ALL,
     })
 }
 

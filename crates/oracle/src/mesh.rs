@@ -3,7 +3,7 @@
 //! A mesh is a set of unit cells and a map from lattice coordinates to space. Nodes sit on the half-integer
 //! lattice, so that mid-edge nodes are shared without searching; cells that touch are connected.
 
-use super::elements::{Kind, MassRule, Material, TET_EDGES};
+use super::elements::{ElementKind, MassRule, Material, TET_EDGES};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{Nodes, RawModel};
 use nalgebra::{Matrix3, Vector3};
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone)]
 pub struct Mesh {
     pub nodes: Vec<[f64; 3]>,
-    pub elements: Vec<(Kind, Vec<usize>)>,
+    pub elements: Vec<(ElementKind, Vec<usize>)>,
 }
 
 /// Matrices of a mesh, node-major x, y, z.
@@ -31,7 +31,7 @@ impl Mesh {
     /// space.
     ///
     /// Tetrahedra stay straight under any map: their mid-edge nodes lie half way between the mapped corners.
-    pub fn from_cells(kind: Kind, cells: &[[i32; 3]], map: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
+    pub fn from_cells(kind: ElementKind, cells: &[[i32; 3]], map: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         let elements: Vec<Vec<[i32; 3]>> =
             cells.iter().flat_map(|c| cell_elements(kind, c.map(|v| 2 * v))).collect();
         // The map orders nodes by z, then y, then x: thin meshes along x keep neighbours close.
@@ -42,20 +42,20 @@ impl Mesh {
             numbers.keys().map(|&[z, y, x]| map([x, y, z].map(|v| 0.5 * f64::from(v)))).collect();
         let number = |p: &[i32; 3]| numbers[&[p[2], p[1], p[0]]];
         let elements: Vec<_> = elements.iter().map(|e| (kind, e.iter().map(number).collect())).collect();
-        if kind == Kind::Tet10 {
+        if kind == ElementKind::Tet10 {
             straighten(&mut nodes, &elements);
         }
         Self { nodes, elements }
     }
 
     /// A block of `cells` with one corner at the origin.
-    pub fn block(kind: Kind, cells: [i32; 3], size: [f64; 3]) -> Self {
+    pub fn block(kind: ElementKind, cells: [i32; 3], size: [f64; 3]) -> Self {
         let map = |p: [f64; 3]| std::array::from_fn(|k| size[k] * p[k] / f64::from(cells[k]));
         Self::from_cells(kind, &grid(cells), map)
     }
 
     /// A ball about the origin of 2n x 2n x 2n hexahedra: the mesh has the symmetry of the cube.
-    pub fn ball(kind: Kind, n: i32, radius: f64) -> Self {
+    pub fn ball(kind: ElementKind, n: i32, radius: f64) -> Self {
         Self::from_cells(kind, &grid([2 * n; 3]), |p| {
             let [x, y, z] = p.map(|v| v / f64::from(n) - 1.0);
             let (xx, yy, zz) = (x * x, y * y, z * z);
@@ -70,7 +70,7 @@ impl Mesh {
 
     /// A cylinder about the z axis, of 2n x 2n hexahedra over the section and `layers` along it; four-fold
     /// symmetric.
-    pub fn cylinder(kind: Kind, n: i32, layers: i32, radius: f64, length: f64) -> Self {
+    pub fn cylinder(kind: ElementKind, n: i32, layers: i32, radius: f64, length: f64) -> Self {
         Self::from_cells(kind, &grid([2 * n, 2 * n, layers]), |p| {
             let (x, y) = (p[0] / f64::from(n) - 1.0, p[1] / f64::from(n) - 1.0);
             [
@@ -82,7 +82,7 @@ impl Mesh {
     }
 
     /// A ring about the z axis of `around` hexahedra, of square section with the given side.
-    pub fn ring(kind: Kind, around: i32, radius: f64, side: f64) -> Self {
+    pub fn ring(kind: ElementKind, around: i32, radius: f64, side: f64) -> Self {
         let mesh = Self::from_cells(kind, &grid([1, around, 1]), |[r, t, z]| {
             let angle = std::f64::consts::TAU * t / f64::from(around);
             let radius = radius + side * (r - 0.5);
@@ -107,20 +107,20 @@ impl Mesh {
     }
 
     /// An L-shaped bracket of cubes: `arm` cells along x and along z, `width` along y, two cells thick.
-    pub fn bracket(kind: Kind, arm: i32, width: i32, cell: f64) -> Self {
+    pub fn bracket(kind: ElementKind, arm: i32, width: i32, cell: f64) -> Self {
         let cells: Vec<_> = grid([arm, width, arm]).into_iter().filter(|c| c[0] < 2 || c[2] < 2).collect();
         Self::from_cells(kind, &cells, |p| p.map(|v| cell * v))
     }
 
     /// Two blocks of n x n x n unit cells that share the nodes of one edge only: a hinge.
-    pub fn hinge(kind: Kind, n: i32) -> Self {
+    pub fn hinge(kind: ElementKind, n: i32) -> Self {
         let mut cells = grid([n; 3]);
         cells.extend(grid([n; 3]).iter().map(|c| [c[0] + n, c[1] + n, c[2]]));
         Self::from_cells(kind, &cells, |p| p)
     }
 
     /// Two blocks of n x n x n unit cells with a gap between them.
-    pub fn two_bodies(kind: Kind, n: i32) -> Self {
+    pub fn two_bodies(kind: ElementKind, n: i32) -> Self {
         let mut cells = grid([n; 3]);
         cells.extend(grid([n; 3]).iter().map(|c| [c[0] + n + 1, c[1], c[2]]));
         Self::from_cells(kind, &cells, |p| p)
@@ -248,37 +248,41 @@ pub fn grid(cells: [i32; 3]) -> Vec<[i32; 3]> {
 }
 
 /// Nodes of the elements of one cell, on the half-integer lattice (coordinates doubled).
-fn cell_elements(kind: Kind, corner: [i32; 3]) -> Vec<Vec<[i32; 3]>> {
+fn cell_elements(kind: ElementKind, corner: [i32; 3]) -> Vec<Vec<[i32; 3]>> {
     let at = |offset: [i32; 3]| -> [i32; 3] { std::array::from_fn(|k| corner[k] + offset[k]) };
     match kind {
-        Kind::Hex8 | Kind::Hex20 => vec![kind.hex_signs().iter().map(|s| at(s.map(|v| v + 1))).collect()],
+        ElementKind::Hex8 | ElementKind::Hex20 => {
+            vec![kind.hex_signs().iter().map(|s| at(s.map(|v| v + 1))).collect()]
+        }
         // Kuhn's six tetrahedra around the main diagonal: one per order of the axes, the same in every cell.
-        Kind::Tet4 | Kind::Tet10 => [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]]
-            .iter()
-            .enumerate()
-            .map(|(i, axes)| {
-                let mut corners = vec![[0; 3]];
-                for &axis in axes {
-                    let mut next = corners[corners.len() - 1];
-                    next[axis] = 2;
-                    corners.push(next);
-                }
-                if i >= 3 {
-                    corners.swap(1, 2); // odd orders of the axes give mirrored tetrahedra
-                }
-                let middle = |&(a, b): &(usize, usize)| -> [i32; 3] {
-                    std::array::from_fn(|k| (corners[a][k] + corners[b][k]) / 2)
-                };
-                let middles: Vec<_> = TET_EDGES.iter().map(middle).collect();
-                let n_middles = if kind == Kind::Tet10 { 6 } else { 0 };
-                corners.iter().chain(&middles[..n_middles]).map(|p| at(*p)).collect()
-            })
-            .collect(),
+        ElementKind::Tet4 | ElementKind::Tet10 => {
+            [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]]
+                .iter()
+                .enumerate()
+                .map(|(i, axes)| {
+                    let mut corners = vec![[0; 3]];
+                    for &axis in axes {
+                        let mut next = corners[corners.len() - 1];
+                        next[axis] = 2;
+                        corners.push(next);
+                    }
+                    if i >= 3 {
+                        corners.swap(1, 2); // odd orders of the axes give mirrored tetrahedra
+                    }
+                    let middle = |&(a, b): &(usize, usize)| -> [i32; 3] {
+                        std::array::from_fn(|k| (corners[a][k] + corners[b][k]) / 2)
+                    };
+                    let middles: Vec<_> = TET_EDGES.iter().map(middle).collect();
+                    let n_middles = if kind == ElementKind::Tet10 { 6 } else { 0 };
+                    corners.iter().chain(&middles[..n_middles]).map(|p| at(*p)).collect()
+                })
+                .collect()
+        }
     }
 }
 
 /// Moves mid-edge nodes of tet10 elements half way between their corners.
-fn straighten(nodes: &mut [[f64; 3]], elements: &[(Kind, Vec<usize>)]) {
+fn straighten(nodes: &mut [[f64; 3]], elements: &[(ElementKind, Vec<usize>)]) {
     for (_, element) in elements {
         for (middle, &(a, b)) in element[4..].iter().zip(&TET_EDGES) {
             let (xa, xb) = (nodes[element[a]], nodes[element[b]]);

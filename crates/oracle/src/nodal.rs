@@ -3,7 +3,7 @@
 use super::equations::{ReducedBody, State};
 use super::random::Random;
 use faer::Mat;
-use flexbody_body::invariants::{Groups, Invariants, PrimaryData};
+use flexbody_body::invariants::{Invariants, PrimaryData, TermGroups};
 use flexbody_linalg::SymmetricMatrix;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
@@ -82,7 +82,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
         }),
         modal_stiffness: Mat::zeros(nf, nf),
         general: None,
-        groups: Groups::ALL,
+        groups: TermGroups::ALL,
     })
 }
 

@@ -1,15 +1,15 @@
 //! Bodies that lack groups of the kinetic energy.
 
-use flexbody_body::flex_body::{FlexBody, Group, Groups, TermDecision};
+use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 
 /// Every combination of groups.
-pub fn combinations() -> impl Iterator<Item = Groups> {
-    (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
+pub fn combinations() -> impl Iterator<Item = TermGroups> {
+    (0..8).map(|bits| TermGroups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
 }
 
 /// Decisions that say so.
-pub fn decisions(groups: Groups) -> Vec<TermDecision> {
-    let decision = |group: Group| TermDecision {
+pub fn decisions(groups: TermGroups) -> Vec<TermDecision> {
+    let decision = |group: TermGroup| TermDecision {
         group,
         kept: groups.has(group),
         tier: 0,
@@ -17,11 +17,11 @@ pub fn decisions(groups: Groups) -> Vec<TermDecision> {
         limit: 1e-3,
         reason: "a test wants it so".to_owned(),
     };
-    Group::ALL.map(decision).to_vec()
+    TermGroup::ALL.map(decision).to_vec()
 }
 
 /// The body with these groups only.
-pub fn with_groups(body: &FlexBody, groups: Groups) -> FlexBody {
+pub fn with_groups(body: &FlexBody, groups: TermGroups) -> FlexBody {
     let all: Vec<usize> = (0..body.n_modes()).collect();
     body.reduced(&all, groups, decisions(groups)).expect("a body")
 }

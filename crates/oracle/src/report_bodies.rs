@@ -13,7 +13,7 @@ use flexbody_body::flex_body::{
     Storage,
 };
 use flexbody_body::invariants::{
-    BodyFrame, ERROR_NORMS, Frame, Groups, Invariants, PrimaryData, choose_frame, condense,
+    BodyFrame, ERROR_NORMS, Frame, Invariants, PrimaryData, TermGroups, choose_frame, condense,
 };
 use flexbody_linalg::SymmetricMatrix;
 use flexbody_model::{Coupling, Nodes};
@@ -43,7 +43,7 @@ pub fn engine_mount() -> FlexBody {
             }),
             modal_stiffness: Mat::from_fn(nf, nf, |p, q| if p == q { eigenvalue(hz[p]) } else { 0.0 }),
             general: None,
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         })
     };
     let lumped = |scheme: &str, negative_masses: usize, factor: f64| LumpedBody {

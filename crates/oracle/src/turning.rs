@@ -1,6 +1,6 @@
 //! Models whose nodes turn and carry mass: a rigid region of a solid, a disc on a shaft, a mass on a rigid arm.
 
-use super::elements::{Kind, MassRule, Material};
+use super::elements::{ElementKind, MassRule, Material};
 use super::mesh::{Mesh, grid};
 use super::reference;
 use flexbody_linalg::CscMatrix;
@@ -38,7 +38,7 @@ pub struct Block {
 }
 
 /// Such a block of elements of this kind.
-pub fn block(kind: Kind) -> Block {
+pub fn block(kind: ElementKind) -> Block {
     let mesh = Mesh::from_cells(kind, &grid([3, 2, 2]), |[x, y, z]| {
         [0.3 * x + 0.04 * y, 0.2 * y * (1.0 - 0.1 * x), 0.15 * z * (1.0 + 0.12 * y) + 0.02 * x]
     });

@@ -1,6 +1,6 @@
 //! Models with all their modes, for tests of the nodal equations.
 
-use super::elements::{Kind, MassRule, Material};
+use super::elements::{ElementKind, MassRule, Material};
 use super::equations::State;
 use super::general::{NodalBody, Row, RowKind, raw_fixture};
 use super::mesh::{Mesh, grid};
@@ -167,7 +167,7 @@ pub fn times(a: &Mat<f64>, x: &DVector<f64>) -> DVector<f64> {
 }
 
 /// A rubber block without any symmetry.
-pub fn soft_block(kind: Kind, cells: [i32; 3]) -> RawModel {
+pub fn soft_block(kind: ElementKind, cells: [i32; 3]) -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(kind, &grid(cells), |[x, y, z]| {
         [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]

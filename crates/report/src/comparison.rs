@@ -9,7 +9,7 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_body::flex_body::{FlexBody, Frame, Group, ReferenceConditions};
+use flexbody_body::flex_body::{FlexBody, Frame, ReferenceConditions, TermGroup};
 use flexbody_body::invariants::{CauchySchwarz, Invariants, compare_invariants};
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
@@ -357,7 +357,7 @@ impl BodyComparison {
 
     /// A group of the kinetic energy that one body lacks is not compared, and not taken for zero.
     fn say_what_is_dropped(&mut self, a: &FlexBody, b: &FlexBody) {
-        for group in Group::ALL {
+        for group in TermGroup::ALL {
             let whose = match (a.groups().has(group), b.groups().has(group)) {
                 (true, true) => continue,
                 (false, true) => "the first body",

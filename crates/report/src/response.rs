@@ -12,7 +12,9 @@ use super::text::{Page, diagnostics_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
-use flexbody_study::response::{At, Complex, Effectivity, Function, Pair, Response, Settings, Spacing};
+use flexbody_study::response::{
+    At, Complex, Effectivity, Function, Pair, Response, ResponseSettings, Spacing,
+};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -179,7 +181,7 @@ fn unit(function: &Function, units: &UnitSystem) -> String {
 
 impl<'a> ResponseFacts<'a> {
     /// Facts of `response`, made with `settings` in `run`.
-    pub fn new(response: &'a Response, settings: &Settings, run: &'a RunData) -> Self {
+    pub fn new(response: &'a Response, settings: &ResponseSettings, run: &'a RunData) -> Self {
         let pairs: Vec<PairFacts> =
             response.pairs.iter().map(|pair| PairFacts::new(pair, &response.units)).collect();
         let passed = response.solved.map(|_| response.holds(settings.tolerance));
@@ -429,7 +431,7 @@ fn curves(
 }
 
 /// What came out, as a sentence without a full stop.
-fn verdict(pairs: &[PairFacts], settings: &Settings, passed: Option<bool>) -> String {
+fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool>) -> String {
     let tolerance = percent(settings.tolerance);
     let how = |pair: &PairFacts| match pair.errors.as_ref().map(|errors| errors.worst == errors.largest) {
         Some(false) => " (estimated)",

@@ -12,7 +12,7 @@ use super::selection_verdict::SelectionVerdict;
 use super::text::{Page, diagnostics_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
-use flexbody_body::flex_body::{Group, TermDecision};
+use flexbody_body::flex_body::{TermDecision, TermGroup};
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
 use serde::Serialize;
@@ -146,7 +146,11 @@ impl<'a> TrialFacts<'a> {
         Self {
             case: trial.case.and_then(|at| cases.get(at)).map(|case| case.name.as_str()),
             by_case: trial.by_case.iter().map(|worst| finite(*worst)).collect(),
-            kept: Group::ALL.into_iter().filter(|group| trial.kept.has(*group)).map(Group::name).collect(),
+            kept: TermGroup::ALL
+                .into_iter()
+                .filter(|group| trial.kept.has(*group))
+                .map(TermGroup::name)
+                .collect(),
             modes: trial.modes,
             multiplications: trial.multiplications,
             tier: trial.tier,

@@ -4,7 +4,7 @@ use super::errors_in_words::errors_in_words;
 use super::lacks::LackFacts;
 use super::markup::{escape, table};
 use super::numbers::significant;
-use flexbody_body::flex_body::Group;
+use flexbody_body::flex_body::TermGroup;
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::CaseSelection;
 use serde::Serialize;
@@ -34,7 +34,7 @@ impl<'a> CaseFacts<'a> {
         let tolerance = &case.tolerance;
         let chosen = case.chosen.as_ref();
         let errors = chosen.and_then(|trial| trial.errors);
-        let groups = case.binds_groups.iter().copied().map(Group::name);
+        let groups = case.binds_groups.iter().copied().map(TermGroup::name);
         Self {
             name: &case.name,
             tolerance: tolerance.errors,

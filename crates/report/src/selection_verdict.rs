@@ -3,7 +3,7 @@
 use super::errors_in_words::{error_in_words, errors_in_words, ranges};
 use super::lacks::LackFacts;
 use super::numbers::{counted, significant};
-use flexbody_body::flex_body::Group;
+use flexbody_body::flex_body::TermGroup;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{Ground, Selection};
 use serde::Serialize;
@@ -42,11 +42,11 @@ impl SelectionVerdict {
 }
 
 /// What a group of terms stands for.
-fn meaning(group: Group) -> &'static str {
+fn meaning(group: TermGroup) -> &'static str {
     match group {
-        Group::W1 => "centrifugal load, and inertia that follows the deflection",
-        Group::W2 => "centrifugal softening, and inertia of second order",
-        Group::W3 => "Coriolis and Euler forces on the modes",
+        TermGroup::W1 => "centrifugal load, and inertia that follows the deflection",
+        TermGroup::W2 => "centrifugal softening, and inertia of second order",
+        TermGroup::W3 => "Coriolis and Euler forces on the modes",
     }
 }
 
@@ -91,7 +91,7 @@ fn take(selection: &Selection) -> String {
         false => format!("of {}: {}", selection.n_modes, ranges(&numbers)),
     };
     let (first, last) = (frequency(selection.modes.first()), frequency(selection.modes.last()));
-    let held: Vec<&str> = held_groups(selection).map(Group::name).collect();
+    let held: Vec<&str> = held_groups(selection).map(TermGroup::name).collect();
     let groups = match held.is_empty() {
         true => "the inertia of the undeformed body alone".to_owned(),
         false => format!("the inertia terms {}", held.join(", ")),
@@ -99,13 +99,13 @@ fn take(selection: &Selection) -> String {
     format!("{} ({which}; {first} to {last} Hz) and {groups}", counted(numbers.len(), "mode"))
 }
 
-fn held_groups(selection: &Selection) -> impl Iterator<Item = Group> {
-    Group::ALL.into_iter().filter(|group| selection.groups.has(*group))
+fn held_groups(selection: &Selection) -> impl Iterator<Item = TermGroup> {
+    TermGroup::ALL.into_iter().filter(|group| selection.groups.has(*group))
 }
 
 /// Groups that rest on the same error stand together.
 fn why(selection: &Selection) -> String {
-    let mut reasons: Vec<(bool, Option<Ground>, Vec<Group>)> = Vec::new();
+    let mut reasons: Vec<(bool, Option<Ground>, Vec<TermGroup>)> = Vec::new();
     for (term, ground) in selection.terms.iter().zip(&selection.grounds) {
         match reasons.iter_mut().find(|one| one.0 == term.kept && one.1 == *ground) {
             Some(known) => known.2.push(term.group),
@@ -120,7 +120,7 @@ fn why(selection: &Selection) -> String {
     parts.collect::<Vec<_>>().join("; ")
 }
 
-fn reason(kept: bool, ground: Option<Ground>, groups: &[Group]) -> String {
+fn reason(kept: bool, ground: Option<Ground>, groups: &[TermGroup]) -> String {
     let names: Vec<String> =
         groups.iter().map(|group| format!("{} ({})", group.name(), meaning(*group))).collect();
     let names = names.join(" and ");

@@ -1,7 +1,7 @@
 //! Which groups of the kinetic energy a body holds, and why.
 
 use super::numbers::{plain, significant};
-use flexbody_body::flex_body::{FlexBody, Group};
+use flexbody_body::flex_body::{FlexBody, TermGroup};
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -26,7 +26,7 @@ pub(super) struct DecisionFacts {
 impl TermFacts {
     /// The facts of every group.
     pub(crate) fn of(body: &FlexBody) -> Vec<Self> {
-        let facts = |group: Group| Self {
+        let facts = |group: TermGroup| Self {
             group: group.name(),
             kept: body.groups().has(group),
             decision: body.terms().iter().find(|term| term.group == group).map(|term| DecisionFacts {
@@ -36,7 +36,7 @@ impl TermFacts {
                 reason: term.reason.clone(),
             }),
         };
-        Group::ALL.map(facts).to_vec()
+        TermGroup::ALL.map(facts).to_vec()
     }
 
     /// `W1 dropped, error without it up to 0.0001 of 0.001 allowed: slow spin`.
@@ -58,6 +58,6 @@ impl TermFacts {
 
 /// A note for every group that `body` lacks: nothing of it is checked.
 pub fn dropped_text(body: &FlexBody) -> String {
-    let note = |group: Group| format!("note: {} was dropped: nothing of it is checked\n", group.name());
+    let note = |group: TermGroup| format!("note: {} was dropped: nothing of it is checked\n", group.name());
     body.groups().dropped().map(note).collect()
 }

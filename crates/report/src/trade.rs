@@ -17,7 +17,9 @@ use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::Storage;
 use flexbody_motion::scene::{OutputErrors, Tolerance};
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::trade::{InCase, Kind, LumpedMass, Measured, ReferenceKind, Row, Trade, TradeCase};
+use flexbody_study::trade::{
+    CandidateKind, InCase, LumpedMass, Measured, ReferenceKind, Trade, TradeCase, TradeRow,
+};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -69,7 +71,7 @@ struct VerdictLine {
 struct RowFacts<'a> {
     number: usize,
     source: &'a str,
-    kind: Kind,
+    kind: CandidateKind,
     modes: usize,
     /// From 1.
     mode_numbers: Vec<usize>,
@@ -140,7 +142,7 @@ impl<'a> MeasuredFacts<'a> {
 }
 
 impl<'a> RowFacts<'a> {
-    fn new(number: usize, row: &'a Row, cases: &'a [TradeCase]) -> Self {
+    fn new(number: usize, row: &'a TradeRow, cases: &'a [TradeCase]) -> Self {
         let candidate = &row.candidate;
         Self {
             number,
@@ -187,7 +189,7 @@ impl<'a> TradeFacts<'a> {
     /// Facts of a study whose reference `lacks` something of the model in each load case, and of the run that
     /// made it.
     pub fn new(trade: &'a Trade, lacks: &[Vec<ReferenceError>], run: &'a RunData) -> Self {
-        let row = |(at, row): (usize, &'a Row)| RowFacts::new(at + 1, row, &trade.cases);
+        let row = |(at, row): (usize, &'a TradeRow)| RowFacts::new(at + 1, row, &trade.cases);
         let rows: Vec<RowFacts<'a>> = trade.rows.iter().enumerate().map(row).collect();
         let rounds = worst_lacks(lacks);
         let mut facts = Self {
@@ -363,7 +365,7 @@ impl<'a> TradeFacts<'a> {
             let measured = self.rows[number - 1].measured.as_ref()?;
             Some((measured.multiplications as f64, measured.worst))
         };
-        let series = |kind: Kind| {
+        let series = |kind: CandidateKind| {
             let rows = self.rows.iter().filter(move |row| row.kind == kind);
             let named = rows.filter_map(|row| {
                 let (cost, error) = point(row.number)?;
@@ -380,7 +382,7 @@ impl<'a> TradeFacts<'a> {
             most: self.allowed_multiplications.map(|most| most as f64),
             floor: NO_ERROR,
         };
-        scatter_chart(&chart, &Kind::ALL.map(series))
+        scatter_chart(&chart, &CandidateKind::ALL.map(series))
     }
 
     fn table(&self, html: &mut String, caption: &str, rows: &[&RowFacts<'a>]) {

@@ -4,7 +4,7 @@ use super::errors_in_words::errors_in_words;
 use super::lacks::LackFacts;
 use super::numbers::{duration, plain, significant};
 use flexbody_study::reference::ReferenceError;
-use flexbody_study::trade::{InCase, Measured, Recommendation, Row, Trade};
+use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
 /// The five lines, with their labels; `names` are those of the rows, `tolerances` what the scene allows, in
 /// words; `lacking`: a reference that lacks too much of its model.
@@ -56,7 +56,7 @@ fn nothing(trade: &Trade) -> String {
     }
 }
 
-fn taken(name: &str, row: &Row) -> String {
+fn taken(name: &str, row: &TradeRow) -> String {
     format!("{} (to {} Hz), of: {}", name, significant(row.last_frequency_hz, 3), row.source)
 }
 

@@ -3,7 +3,7 @@
 use super::{JobArguments, Printing, names, positive};
 use clap::Args;
 use flexbody_body::basis::BasisKind;
-use flexbody_study::response::{Band, Settings as ResponseSettings};
+use flexbody_study::response::{Band, ResponseSettings};
 use std::path::PathBuf;
 
 /// Arguments of `response`.

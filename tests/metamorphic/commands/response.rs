@@ -6,7 +6,7 @@ use crate::subject::Subject;
 use flexbody_base::error::Result;
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::scene::Point;
-use flexbody_study::response::{Band, Complex, Function, Place, Settings, respond};
+use flexbody_study::response::{Band, Complex, Function, Place, ResponseSettings, respond};
 
 /// Damping ratio of a body that has none: responses at resonances are finite.
 const RATIO: f64 = 0.02;
@@ -20,13 +20,13 @@ pub fn response(subject: &Subject) -> Result<Outputs> {
     let (model, body) = (subject.model()?, subject.body()?);
     let hertz = body.frequencies_hz();
     let [first, third] = [hertz[0], hertz[hertz.len().min(3) - 1]];
-    let settings = Settings {
+    let settings = ResponseSettings {
         band: Band::new(0.3 * first, 1.2 * third).expect("a band"),
         points: 40,
         solves: 8,
         damping: Some(RATIO.into()),
         replaces_damping: true,
-        tolerance: Settings::TOLERANCE,
+        tolerance: ResponseSettings::TOLERANCE,
         memory: None,
         longest: None,
     };

@@ -9,7 +9,7 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{Selection, select};
 use flexbody_study::tailoring::{Tailoring, convert_for};
-use flexbody_study::trade::{Kind, Row, Settings, Source, trade};
+use flexbody_study::trade::{CandidateKind, Source, TradeRow, TradeSettings, trade};
 
 /// Errors over their tolerances are compared up to this one.
 const BEYOND: f64 = 2.0;
@@ -77,12 +77,12 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
 /// `trade` of a body beside the motion of all nodes.
 pub fn trading(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let settings = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
+    let settings = TradeSettings { repeat: 1, memory: None, reserved: &[], longest: None };
     let source = Source::new("body", subject.body()?, None)?;
     let study = trade(&[source], &scenes, Some(&model), &settings, SILENT)?;
     // Rounded numbers are others in a body that is turned.
-    let exact = |row: &&Row| row.candidate.kind() != Kind::Single;
-    let rows: Vec<&Row> = study.rows.iter().filter(exact).collect();
+    let exact = |row: &&TradeRow| row.candidate.kind() != CandidateKind::Single;
+    let rows: Vec<&TradeRow> = study.rows.iter().filter(exact).collect();
     let labels: Vec<String> = rows
         .iter()
         .map(|row| format!("{:?} {:?} {}", row.candidate.modes, row.candidate.groups, row.outcome.is_ok()))

@@ -18,7 +18,7 @@ use flexbody_motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Load, Point, Recording, Scene, Spin, VectorHistory, simulate,
 };
 use nalgebra::{DMatrix, Matrix3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Mesh, grid};
 use oracle::reference::dense;
 use oracle::scenes::nothing_happens;
@@ -75,7 +75,7 @@ enum Held {
 
 fn block() -> Block {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
         [0.3 * x + 0.03 * y + 1.0, 0.25 * y * (1.0 - 0.05 * x) - 0.4, 0.2 * z * (1.0 + 0.1 * y)]
     });
     let assembly = mesh.assemble(&rubber, MassRule::Consistent);

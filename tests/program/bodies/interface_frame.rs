@@ -12,7 +12,7 @@ use flexbody_body::verification::{own_identities, verify};
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::fixtures;
 use oracle::general::raw_fixture;
 use oracle::held::HeldModel;
@@ -25,7 +25,7 @@ const ALL: usize = 54;
 
 /// A turned bar with the interfaces `root` and `tip` at its ends.
 fn bar() -> RawModel {
-    let straight = Mesh::block(Kind::Hex8, [4, 1, 1], [1.0, 0.2, 0.16]);
+    let straight = Mesh::block(ElementKind::Hex8, [4, 1, 1], [1.0, 0.2, 0.16]);
     let turned = straight.moved(&Random(7).rotation(), [3.0, -1.0, 0.5]);
     let mut raw = turned.assemble(&SOFT, MassRule::Consistent).raw_model();
     let end = |x: f64| -> Vec<i64> {

@@ -4,7 +4,7 @@
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
-use flexbody_body::flex_body::{FlexBody, Groups, Storage};
+use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
 use flexbody_body::invariants::{BodyFrame, CauchySchwarz, primary_differences};
 use flexbody_body::verification::verify;
 use flexbody_eigen::Wanted;
@@ -172,7 +172,7 @@ fn files_must_be_stored_as_they_say() {
         w2.write_raw(&values).expect("written");
     });
     says(error, "/invariants/W2: found ");
-    let partial = with_groups(&short, Groups { w3: true, ..Groups::NONE });
+    let partial = with_groups(&short, TermGroups { w3: true, ..TermGroups::NONE });
     let bound = CauchySchwarz::of(partial.invariants());
     assert!((bound.mode(0) - 1.0).abs() < 1e-6, "m_ff stays known");
 }

@@ -12,7 +12,7 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_model::{
     CheckedModel, Coupling, ElementShape, Elements, FeModel, NodeSet, RawModel, Reference, skin,
 };
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::fixtures;
 use oracle::mesh::{Mesh, grid};
 use std::fs;
@@ -31,7 +31,7 @@ fn plate() -> (RawModel, Vec<i64>) {
         let radius = RADIUS * (1.0 + r);
         [radius * angle.cos(), radius * angle.sin(), 0.004 * z]
     };
-    let mesh = Mesh::from_cells(Kind::Tet10, &grid([1, AROUND, 2]), map).welded(1e-9);
+    let mesh = Mesh::from_cells(ElementKind::Tet10, &grid([1, AROUND, 2]), map).welded(1e-9);
     let middle = 0.004;
     let bore: Vec<i64> =
         (1..).zip(&mesh.nodes).filter(|(_, x)| x[0].hypot(x[1]) < 1.001 * RADIUS).map(|(id, _)| id).collect();

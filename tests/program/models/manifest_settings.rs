@@ -2,7 +2,7 @@
 //! and the same on the command line.
 
 use flexbody_linalg::CscMatrix;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, matrix_market, write_model};
 use oracle::mesh::Mesh;
 use serde_json::Value;
@@ -34,7 +34,7 @@ fn json(folder: &Path, line: &str) -> Value {
 /// the manifest.
 fn model(more: &str) -> TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    let mesh = Mesh::block(Kind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
     let body = mesh.assemble(&Material::STEEL, MassRule::Consistent);
     let n = body.n_dofs();
     let manifest = write_model(folder.path(), &body.raw_model(), Triangle::Lower);
@@ -171,7 +171,7 @@ fn geometric_stiffness_goes_from_the_manifest_to_the_file_and_is_recomputed() {
 #[test]
 fn each_of_several_bodies_gets_its_own_residual_vectors() {
     let folder = tempfile::tempdir().expect("a folder");
-    let body = Mesh::two_bodies(Kind::Hex8, 2).assemble(&Material::STEEL, MassRule::Consistent);
+    let body = Mesh::two_bodies(ElementKind::Hex8, 2).assemble(&Material::STEEL, MassRule::Consistent);
     let manifest = write_model(folder.path(), &body.raw_model(), Triangle::Lower);
     let text = fs::read_to_string(&manifest).expect("a manifest");
     fs::write(&manifest, format!("{text}[basis]\nresidual_vectors = [\"centrifugal\"]\n")).expect("written");

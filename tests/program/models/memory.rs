@@ -8,7 +8,7 @@ use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use flexbody_linalg::progress::{Event, SILENT};
 use flexbody_model::check;
 use flexbody_report::{Facts, Format, RunData, render};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, write_model};
 use oracle::members;
 use oracle::mesh::{Assembly, Mesh};
@@ -18,7 +18,7 @@ use std::process::{Command, Output};
 use std::sync::Mutex;
 
 fn block(cells: [i32; 3], size: [f64; 3]) -> Assembly {
-    Mesh::block(Kind::Hex8, cells, size).assemble(&Material::STEEL, MassRule::Consistent)
+    Mesh::block(ElementKind::Hex8, cells, size).assemble(&Material::STEEL, MassRule::Consistent)
 }
 
 /// A folder with a cube of 20 577 degrees of freedom, whose factor weighs more than its modes.

@@ -9,7 +9,7 @@ use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::CscMatrix;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{BodyNumber, Damping, DofLabel, FeModel, NodeSet, Nodes, RawMatrix, RawModel};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, write_model};
 use oracle::members;
 use oracle::mesh::{Mesh, entries};
@@ -171,7 +171,7 @@ fn a_damping_matrix_is_taken_apart_too_and_must_not_couple_bodies() {
 
 /// A steel block with an interface at its first nodes.
 fn block(cells: i32) -> RawModel {
-    let mesh = Mesh::block(Kind::Hex8, [cells, 2, 1], [0.1 * f64::from(cells), 0.15, 0.07]);
+    let mesh = Mesh::block(ElementKind::Hex8, [cells, 2, 1], [0.1 * f64::from(cells), 0.15, 0.07]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     raw.name = "pair".to_owned();
     raw.interfaces = vec![NodeSet::new("root", raw.nodes.ids[..3].to_vec())];

@@ -14,7 +14,7 @@ use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{LoadCases, Recording, simulate};
 use flexbody_study::selection::select;
 use nalgebra::{DVector, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::fixtures;
 use oracle::flexible::{body_of, fixture};
 use oracle::held::{HeldModel, dense_matrix};
@@ -29,7 +29,7 @@ const ALL: usize = 54;
 
 /// A bar along x from its interface `root`, of 20 nodes; its other end is `tip`.
 fn bar() -> (Mesh, RawModel) {
-    let mesh = Mesh::block(Kind::Hex8, [4, 1, 1], [LENGTH, 0.2, 0.16]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 1, 1], [LENGTH, 0.2, 0.16]);
     let raw = with_ends(&mesh, mesh.assemble(&SOFT, MassRule::Consistent).raw_model());
     (mesh, raw)
 }

@@ -7,7 +7,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_model::{Coupling, NodeSet, Reference};
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::general::raw_fixture;
 use oracle::integrate;
@@ -172,7 +172,7 @@ const LENGTH: f64 = 1.0;
 
 /// A bar along x about the origin, held at its ends.
 fn bar(youngs: f64) -> FlexBody {
-    let mesh = Mesh::block(Kind::Hex8, [6, 1, 1], [LENGTH, 0.1, 0.08]);
+    let mesh = Mesh::block(ElementKind::Hex8, [6, 1, 1], [LENGTH, 0.1, 0.08]);
     let mesh = mesh.moved(&Matrix3::identity(), [-0.5 * LENGTH, -0.05, -0.04]);
     let end = |name: &str, x: f64| {
         let kept = mesh.nodes.iter().enumerate().filter(|(_, node)| (node[0] - x).abs() < 1e-9);

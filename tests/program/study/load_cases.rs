@@ -1,7 +1,7 @@
 //! Load cases of one scene: each is what a scene of its own would be, and one body serves all of them.
 
 use crate::program::flexbody;
-use flexbody_body::flex_body::{FlexBody, Group};
+use flexbody_body::flex_body::{FlexBody, TermGroup};
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, trace, trace_at};
 use flexbody_study::selection::{Selection, select};
@@ -127,7 +127,7 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     assert_ne!(alone[0].groups, alone[1].groups, "the cases need different terms");
     for (own, case) in alone.iter().zip(cases.iter()) {
         assert!(own.cases.is_empty());
-        for group in Group::ALL {
+        for group in TermGroup::ALL {
             assert!(both.groups.has(group) || !own.groups.has(group), "{group:?} of {:?}", case.case);
         }
         assert!(both.modes.len() >= own.modes.len(), "{:?} {:?}", both.modes, own.modes);
@@ -141,7 +141,7 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
         assert!(worst <= 1.0 && (chosen.worst - worst).abs() <= 0.5, "{}: {worst} {chosen:?}", told.name);
     }
     let fast = &both.cases[1];
-    assert!(fast.binds_groups.contains(&Group::W1) && both.cases[0].binds_groups.is_empty(), "{both:#?}");
+    assert!(fast.binds_groups.contains(&TermGroup::W1) && both.cases[0].binds_groups.is_empty(), "{both:#?}");
     // Threads and repetitions change nothing.
     assert_eq!(both, select(&whole, &[], &cases, None, SILENT).expect("a selection"));
 }

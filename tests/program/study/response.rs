@@ -11,9 +11,9 @@ use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawMatrix, RawModel};
 use flexbody_motion::scene::Point;
-use flexbody_study::response::{Band, Complex, Direction, Pair, Place, Response, Settings, respond};
+use flexbody_study::response::{Band, Complex, Direction, Pair, Place, Response, ResponseSettings, respond};
 use nalgebra::{DMatrix, DVector, Vector3};
-use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::fixtures;
 use oracle::mesh::Mesh;
 use oracle::turning::dense;
@@ -26,7 +26,7 @@ fn block(ratio: Option<f64>) -> FeModel {
 }
 
 fn damped_block(damping: Option<Damping<RawMatrix>>) -> FeModel {
-    let mesh = Mesh::block(Element::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let end = |raw: &RawModel, x: f64| -> Vec<i64> {
         let nodes = raw.nodes.positions.iter().zip(&raw.nodes.ids);
@@ -50,8 +50,8 @@ fn free(model: &FeModel, modes: usize) -> FlexBody {
     body_of(model, modes, BasisChoice::default())
 }
 
-fn over(low: f64, high: f64, solves: usize) -> Settings {
-    Settings {
+fn over(low: f64, high: f64, solves: usize) -> ResponseSettings {
+    ResponseSettings {
         band: Band::new(low, high).expect("a band"),
         points: 60,
         solves,
@@ -67,7 +67,7 @@ fn ends(text: &str) -> Vec<Place> {
     vec![Place::parse(text)]
 }
 
-fn study(model: &FeModel, body: &FlexBody, from: &str, to: &str, settings: &Settings) -> Response {
+fn study(model: &FeModel, body: &FlexBody, from: &str, to: &str, settings: &ResponseSettings) -> Response {
     respond(Some(model), body, &ends(from), &ends(to), settings, SILENT).expect("a response")
 }
 
@@ -148,7 +148,7 @@ fn a_chain_of_rods_has_its_closed_form() {
     let cells = 12;
     let (length, area) = (0.6, 0.02 * 0.02);
     let material = Material { youngs: 2e11, poisson: 0.0, density: 7800.0 };
-    let mesh = Mesh::block(Element::Hex8, [cells, 1, 1], [length, 0.02, 0.02]);
+    let mesh = Mesh::block(ElementKind::Hex8, [cells, 1, 1], [length, 0.02, 0.02]);
     let mut raw = mesh.assemble(&material, MassRule::Consistent).raw_model();
     let positions = raw.nodes.positions.clone();
     for (name, x) in [("left", 0.0), ("right", length)] {
@@ -320,7 +320,7 @@ fn places_that_are_not_there_are_refused() {
     }
     let other = block(Some(0.5));
     assert!(respond(Some(&other), &body, &ends("left"), &ends("left"), &settings, SILENT).is_ok());
-    let mesh = Mesh::block(Element::Hex8, [4, 2, 1], [0.5, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.5, 0.15, 0.1]);
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let longer = FeModel::from_raw(raw).expect("a model").model;
     let error =
@@ -387,7 +387,7 @@ fn the_command_writes_what_its_schema_says() {
 
 /// The same block with the stated coupling of both ends.
 fn coupled_block(coupling: Coupling) -> RawModel {
-    let mesh = Mesh::block(Element::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.4, 0.15, 0.1]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     for (name, x) in [("left", 0.0), ("right", 0.4)] {
         let nodes = raw.nodes.positions.iter().zip(&raw.nodes.ids);

@@ -4,7 +4,7 @@
 use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::ConvertSettings;
-use flexbody_body::flex_body::{Group, Groups};
+use flexbody_body::flex_body::{TermGroup, TermGroups};
 use flexbody_eigen::{Resume, Wanted};
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::progress::SILENT;
@@ -66,9 +66,9 @@ fn a_mild_scene_never_forms_w() {
     )
     .expect("converts");
     assert_eq!(conversion.condensed_columns, 4, "the columns of rigid motion");
-    assert_eq!((selection.groups, conversion.body.groups()), (Groups::NONE, Groups::NONE));
+    assert_eq!((selection.groups, conversion.body.groups()), (TermGroups::NONE, TermGroups::NONE));
     let terms = conversion.body.terms();
-    assert_eq!(terms.iter().map(|term| term.group).collect::<Vec<_>>(), Group::ALL);
+    assert_eq!(terms.iter().map(|term| term.group).collect::<Vec<_>>(), TermGroup::ALL);
     assert!(terms.iter().all(|term| !term.kept && term.tier == 0 && term.bound <= term.limit), "{terms:?}");
     assert!(conversion.body.n_modes() < MODES, "a smooth pull needs few modes");
     assert_eq!(conversion.body.source().files.last(), scene.source.as_ref());
@@ -95,10 +95,10 @@ fn files_hold_what_is_selected_and_say_why() {
         flexbody(folder.path(), &check);
 
         let body = flexbody_file::read(folder.path().join("one.flex.h5")).expect("a body");
-        assert_eq!(body.groups() == Groups::NONE, groups_dropped);
+        assert_eq!(body.groups() == TermGroups::NONE, groups_dropped);
         let invariants = body.invariants();
         let held = [invariants.w1().is_some(), invariants.w2().is_some(), invariants.w3().is_some()];
-        for (group, held) in Group::ALL.into_iter().zip(held) {
+        for (group, held) in TermGroup::ALL.into_iter().zip(held) {
             let term = body.terms().iter().find(|term| term.group == group).expect("every group is decided");
             assert_eq!((term.kept, body.groups().has(group)), (held, held), "{term:?}");
             assert!(!term.reason.is_empty());

@@ -5,7 +5,7 @@ use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
-use flexbody_body::flex_body::{FlexBody, Groups, MassStructure, Storage};
+use flexbody_body::flex_body::{FlexBody, MassStructure, Storage, TermGroups};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::progress::SILENT;
@@ -14,11 +14,11 @@ use flexbody_motion::scene::{Axes, Initial, LoadCases, ModeStart, PerQuantity, S
 use flexbody_study::reference::PART_OF_FINE;
 use flexbody_study::selection::select;
 use flexbody_study::trade::{
-    Allowed, Conversions, Kind, LumpedMass, Measured, Recommendation, ReferenceKind, Row, Settings, Source,
-    Trade, WantedBodies, conversions, front, trade,
+    Allowed, CandidateKind, Conversions, LumpedMass, Measured, Recommendation, ReferenceKind, Source, Trade,
+    TradeRow, TradeSettings, WantedBodies, conversions, front, trade,
 };
 use nalgebra::Vector3;
-use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::fixtures;
 use oracle::flexible::{fixture, soft_block};
 use oracle::mesh::{Mesh, grid};
@@ -26,7 +26,7 @@ use oracle::scenes::nothing_happens;
 use serde_json::Value;
 use std::fs;
 
-const QUICK: Settings<'static> = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
+const QUICK: TradeSettings<'static> = TradeSettings { repeat: 1, memory: None, reserved: &[], longest: None };
 
 /// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns`
 /// turns.
@@ -47,7 +47,7 @@ fn first_rate(body: &FlexBody) -> f64 {
     body.modes().eigenvalue[0].sqrt()
 }
 
-fn recommended(trade: &Trade) -> &Row {
+fn recommended(trade: &Trade) -> &TradeRow {
     &trade.rows[trade.recommended.row().expect("a recommendation")]
 }
 
@@ -61,7 +61,7 @@ fn a_body_that_stays_rigid_needs_one_mode_and_no_group() {
         Scheme::Conserving { order: 4, step: scene.run.duration.map(|duration| duration / 60.0) };
     let found = study(body, &scene);
     let row = recommended(&found);
-    assert_eq!(row.candidate.groups, Groups::NONE, "{row:?}");
+    assert_eq!(row.candidate.groups, TermGroups::NONE, "{row:?}");
     assert_eq!(row.candidate.modes, [0]);
     assert!(matches!(found.recommended, Recommendation::Cheapest(_)));
 }
@@ -72,9 +72,9 @@ fn a_soft_body_that_tumbles_fast_needs_every_group() {
     let mut scene = tumble(0.25 * first_rate(&body), 2.0);
     scene.initial.modes = vec![ModeStart { mode: 1, amplitude: 0.05, rate: 0.0 }];
     let found = study(body, &scene);
-    assert_eq!(recommended(&found).candidate.groups, Groups::ALL);
+    assert_eq!(recommended(&found).candidate.groups, TermGroups::ALL);
     for row in &found.rows {
-        if row.candidate.groups != Groups::ALL {
+        if row.candidate.groups != TermGroups::ALL {
             let worst = row.outcome.as_ref().map_or(f64::INFINITY, |measured| measured.worst());
             assert!(worst > 1.0, "{row:?}");
         }
@@ -86,13 +86,17 @@ fn the_reference_is_no_distance_from_itself_and_everything_else_is_some() {
     let body = soft_block(5);
     let found = study(body.clone(), &tumble(0.1 * first_rate(&body), 1.0));
     assert_eq!(found.reference, ReferenceKind::Full);
-    let worst = |row: &Row| row.outcome.as_ref().expect("a motion").worst();
+    let worst = |row: &TradeRow| row.outcome.as_ref().expect("a motion").worst();
     assert_eq!(worst(&found.rows[0]), 0.0);
     assert!(found.rows[1..].iter().all(|row| worst(row) > 0.0));
     // All eight sets of groups, lumped masses and single precision with all modes.
     let whole = found.rows.iter().filter(|row| row.candidate.modes.len() == 5);
-    let of_kind = |kind: Kind| whole.clone().filter(|row| row.candidate.kind() == kind).count();
-    assert_eq!([Kind::Modes, Kind::Groups, Kind::Lumped, Kind::Single].map(of_kind), [1, 7, 2, 1]);
+    let of_kind = |kind: CandidateKind| whole.clone().filter(|row| row.candidate.kind() == kind).count();
+    assert_eq!(
+        [CandidateKind::Modes, CandidateKind::Groups, CandidateKind::Lumped, CandidateKind::Single]
+            .map(of_kind),
+        [1, 7, 2, 1]
+    );
     let single =
         found.rows.iter().find(|row| row.candidate.storage == Storage::F32).expect("single precision");
     assert!((1e-9..1e-2).contains(&worst(single)), "{}", worst(single));
@@ -146,7 +150,7 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
 fn a_body_of_beams_has_candidates_of_lumped_mass_too() {
     let body = fixture("frame_beams", 4, BodyFrame::Model);
     let found = study(body.clone(), &tumble(0.05 * first_rate(&body), 0.2));
-    let lumped = found.rows.iter().filter(|row| row.candidate.kind() == Kind::Lumped);
+    let lumped = found.rows.iter().filter(|row| row.candidate.kind() == CandidateKind::Lumped);
     let worst: Vec<f64> = lumped.map(|row| row.outcome.as_ref().expect("a motion").worst()).collect();
     assert_eq!(worst.len(), body.lumped().len());
     assert!(!worst.is_empty() && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
@@ -203,7 +207,7 @@ fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
     let body = FlexBody::new(parts).expect("a body");
     let scheme = body.lumped()[0].scheme.clone();
     let found = study(body.clone(), &tumble(0.1 * first_rate(&body), 0.2));
-    let failed: Vec<&Row> = found.rows.iter().filter(|row| row.outcome.is_err()).collect();
+    let failed: Vec<&TradeRow> = found.rows.iter().filter(|row| row.outcome.is_err()).collect();
     assert_eq!(failed.len(), 1);
     assert_eq!(failed[0].candidate.lumped, Some(LumpedMass::Couplings(scheme)));
     assert_eq!(failed[0].outcome.as_ref().err().map(|failed| failed.0.code()), Some(Code::SimulationStopped));
@@ -213,7 +217,7 @@ fn a_candidate_that_cannot_be_simulated_is_a_row_that_says_so() {
 /// A rubber-like block of few nodes, as a model.
 fn model() -> FeModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Element::Hex8, &grid([4, 2, 1]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 2, 1]), |[x, y, z]| {
         [0.3 * x + 0.03 * y, 0.3 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
     });
     FeModel::from_raw(mesh.assemble(&rubber, MassRule::Consistent).raw_model()).expect("a body").model
@@ -257,24 +261,26 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
     let found = trade(&sources, &scene.clone().into(), Some(&model), &QUICK, SILENT).expect("a study");
     assert_eq!(found.reference, ReferenceKind::Nodal);
-    let stress = |row: &Row| {
+    let stress = |row: &TradeRow| {
         let measured = row.outcome.as_ref().expect("a motion");
         measured.deciding().errors.stress.expect("a deformed body")
     };
     // Eight modes with residual vectors are near the truth of a spin that is there at once, one mode is not,
     // and lacking W1 nothing is.
-    let of = |source: &str, groups: Groups| {
+    let of = |source: &str, groups: TermGroups| {
         let row = found.rows.iter().find(|row| {
-            row.source == source && row.candidate.groups == groups && row.candidate.kind() != Kind::Lumped
+            row.source == source
+                && row.candidate.groups == groups
+                && row.candidate.kind() != CandidateKind::Lumped
         });
         stress(row.expect("a row"))
     };
-    let (whole, one) = (of(sources[0].name(), Groups::ALL), of("1 free mode", Groups::ALL));
+    let (whole, one) = (of(sources[0].name(), TermGroups::ALL), of("1 free mode", TermGroups::ALL));
     assert!(whole > 0.0 && whole < 0.1 && one > 0.9, "{whole} {one}");
-    assert!(of(sources[0].name(), Groups::NONE) > 0.5);
+    assert!(of(sources[0].name(), TermGroups::NONE) > 0.5);
     // Residual vectors have what modes lack of the response to spin.
     let (with, without) =
-        (of("4 free modes, residual vectors", Groups::ALL), of("4 free modes", Groups::ALL));
+        (of("4 free modes, residual vectors", TermGroups::ALL), of("4 free modes", TermGroups::ALL));
     assert!(whole < with && with < without && without < one, "{whole} {with} {without} {one}");
     // The same against the largest body: apart by no more than that is from the truth.
     let reduced = trade(&sources, &scene.clone().into(), None, &QUICK, SILENT).expect("a study");
@@ -355,7 +361,7 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     assert!(full.cases[0].nodal.is_none());
     assert_eq!(full.rows[0].outcome.as_ref().expect("a motion").worst(), 0.0);
     // Work that takes too long is refused before any.
-    let hasty = Settings { longest: Some(1e-6), ..QUICK };
+    let hasty = TradeSettings { longest: Some(1e-6), ..QUICK };
     let error = trade(&sources, &scene.clone().into(), Some(&model), &hasty, SILENT).expect_err("refused");
     assert_eq!(error.diagnostics()[0].code(), Code::WorkLong);
 }
@@ -405,7 +411,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     let body = soft_block(6);
     let scenes = two_cases(&body);
     let sources = [Source::new("body", body.clone(), None).expect("a body")];
-    let settings = Settings { reserved: &[0.1], ..QUICK };
+    let settings = TradeSettings { reserved: &[0.1], ..QUICK };
     let cases = LoadCases::new(scenes.to_vec()).expect("two cases");
     let both = trade(&sources, &cases, None, &settings, SILENT).expect("a study");
     let alone = scenes.each_ref().map(|scene| study(body.clone(), scene));
@@ -427,10 +433,10 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     assert!(shared > 30, "{shared}");
 
     // What to take is the cheapest that holds in both, and each case says what it rules out.
-    let measured = |row: &Row| row.outcome.as_ref().expect("a motion").clone();
+    let measured = |row: &TradeRow| row.outcome.as_ref().expect("a motion").clone();
     let taken = measured(recommended(&both));
     assert!(taken.holds());
-    let exact = both.rows.iter().filter(|row| row.candidate.kind() != Kind::Lumped).map(measured);
+    let exact = both.rows.iter().filter(|row| row.candidate.kind() != CandidateKind::Lumped).map(measured);
     let cheaper: Vec<_> = exact.filter(|own| own.multiplications < taken.multiplications).collect();
     assert!(cheaper.len() > 5 && cheaper.iter().all(|own| !own.holds()), "{cheaper:?}");
     for (at, case) in both.cases.iter().enumerate() {

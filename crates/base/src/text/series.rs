@@ -84,7 +84,7 @@ pub fn read_series(
         return Err(bad(1, "file has no rows".to_owned()));
     };
     let places = layout.places(file, std::iter::once(time).chain(wanted))?;
-    let mut reading = Reading::new(file, &layout, places);
+    let mut reading = SeriesReader::new(file, &layout, places);
     for (number, line) in layout.rows(bytes) {
         reading.take(number, line);
     }
@@ -326,7 +326,7 @@ fn before_unit(name: &[u8]) -> &[u8] {
 }
 
 /// Reads row by row.
-struct Reading<'r> {
+struct SeriesReader<'r> {
     file: &'r InputFile,
     layout: &'r Layout<'r>,
     /// Where the time stands, and the columns.
@@ -338,7 +338,7 @@ struct Reading<'r> {
     first_not_shown: Option<usize>,
 }
 
-impl<'r> Reading<'r> {
+impl<'r> SeriesReader<'r> {
     fn new(file: &'r InputFile, layout: &'r Layout<'r>, places: Vec<usize>) -> Self {
         let columns = vec![Vec::new(); places.len() - 1];
         let series = Series { times: Vec::new(), columns, lines: Vec::new() };

@@ -11,7 +11,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 /// A table of a TOML document, with the places of its keys and values.
-pub type Table<'t> = DeTable<'t>;
+pub type TomlTable<'t> = DeTable<'t>;
 /// A value of a TOML document, with its place.
 pub type Value<'t> = Spanned<DeValue<'t>>;
 
@@ -24,7 +24,7 @@ pub fn read_toml<T>(
     path: &Path,
     kind: &str,
     syntax: Code,
-    walk: impl FnOnce(&mut Walk<'_>, &Table<'_>) -> Option<T>,
+    walk: impl FnOnce(&mut Walk<'_>, &TomlTable<'_>) -> Option<T>,
 ) -> Result<T> {
     let file = InputFile::open(path)?;
     let text = std::str::from_utf8(file.bytes()).map_err(|e| {
@@ -114,7 +114,7 @@ impl Walk<'_> {
     }
 
     /// Complains about every key that is not in `known`, naming the nearest that is.
-    pub fn known_keys(&mut self, table: &Table, place: &str, known: &[&str]) {
+    pub fn known_keys(&mut self, table: &TomlTable, place: &str, known: &[&str]) {
         for key in table.keys() {
             let name = key.get_ref().as_ref();
             if known.contains(&name) {
@@ -144,9 +144,9 @@ impl Walk<'_> {
     /// A table and where it stands.
     pub fn table<'t, 'i>(
         &mut self,
-        table: &'t Table<'i>,
+        table: &'t TomlTable<'i>,
         key: &str,
-    ) -> Option<(&'t Table<'i>, Range<usize>)> {
+    ) -> Option<(&'t TomlTable<'i>, Range<usize>)> {
         let value = table.get(key)?;
         match value.get_ref() {
             DeValue::Table(inner) => Some((inner, value.span())),
@@ -158,7 +158,7 @@ impl Walk<'_> {
     }
 
     /// A string that is not empty.
-    pub fn string(&mut self, table: &Table, key: &str) -> Option<String> {
+    pub fn string(&mut self, table: &TomlTable, key: &str) -> Option<String> {
         let value = table.get(key)?;
         match value.get_ref() {
             DeValue::String(text) if text.is_empty() => {
@@ -174,7 +174,7 @@ impl Walk<'_> {
     }
 
     /// A number that must be there; `span` is that of its table.
-    pub fn number(&mut self, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+    pub fn number(&mut self, table: &TomlTable, key: &str, span: &Range<usize>) -> Option<f64> {
         let Some(value) = table.get(key) else {
             self.wrong(span.clone(), format!("key `{key}` is missing"));
             return None;

@@ -1,7 +1,7 @@
 //! The condensation of the mass into invariants, in one or two steps.
 
 use super::ModalModel;
-use crate::flex_body::{Group, Groups, Guarantee, TermDecision};
+use crate::flex_body::{Guarantee, TermDecision, TermGroup, TermGroups};
 use crate::invariants::{Invariants, condense_certified};
 
 /// The mass of a model condensed on its modes: what the invariants are, how sure their digits are, and what
@@ -50,7 +50,8 @@ impl ModalModel<'_> {
     /// first: its digits are about the whole.
     pub fn condense_kept(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
         let dropped = terms.iter().filter(|term| !term.kept);
-        let groups = dropped.fold(Groups::ALL, |groups, term| groups.and(Groups::without(term.group)));
+        let groups =
+            dropped.fold(TermGroups::ALL, |groups, term| groups.and(TermGroups::without(term.group)));
         let is_enough = !groups.w2 && !groups.w3 && self.found.solution.bounds.is_none();
         let condensed = match is_enough {
             true => linear,
@@ -81,7 +82,7 @@ impl ModalModel<'_> {
 }
 
 /// The decision about a group before there is one.
-fn not_computed(group: Group) -> TermDecision {
+fn not_computed(group: TermGroup) -> TermDecision {
     let reason = "not computed yet".to_owned();
     TermDecision { group, kept: false, tier: 0, bound: 0.0, limit: 0.0, reason }
 }

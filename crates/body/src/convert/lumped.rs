@@ -4,7 +4,7 @@
 use super::body_modes::reduced;
 use super::{BodyModes, Lumping, ModalModel};
 use crate::basis::{ModeSettings, free_surface};
-use crate::flex_body::{Groups, LumpedBody};
+use crate::flex_body::{LumpedBody, TermGroups};
 use crate::invariants::{
     Invariants, LumpedMasses, align, condense_lumped, condense_lumped_linear, error_norms,
 };
@@ -91,7 +91,7 @@ fn lumped_invariants(
     masses: &LumpedMasses,
     shapes: MatRef<'_, f64>,
     modal_stiffness: Mat<f64>,
-    groups: Groups,
+    groups: TermGroups,
 ) -> Invariants {
     let only_about_z = modal.model.dimension() == 2 && modal.model.scalar_mass().is_none();
     let condense = if groups.w2 || groups.w3 { condense_lumped } else { condense_lumped_linear };

@@ -2,8 +2,8 @@
 
 use super::validate::problems;
 use super::{
-    Certificate, Groups, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, ReferenceConditions,
-    Source, Storage, TermDecision,
+    Certificate, Interface, InterfaceCoordinates, LumpedBody, Modes, Parts, ReferenceConditions, Source,
+    Storage, TermDecision, TermGroups,
 };
 use crate::basis::BasisKind;
 use crate::invariants::{
@@ -272,7 +272,7 @@ impl FlexBody {
     }
 
     /// The groups of the kinetic energy that the body holds.
-    pub fn groups(&self) -> Groups {
+    pub fn groups(&self) -> TermGroups {
         self.parts.invariants.groups()
     }
 

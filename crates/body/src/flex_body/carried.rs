@@ -12,7 +12,7 @@
 //! (K_ff, m_ff), with m_ff of the new modes.
 
 use super::rigid_motion::{rotations_without, shapes_without, stacked};
-use super::{FlexBody, Groups, LoadKind, ReferenceConditions};
+use super::{FlexBody, LoadKind, ReferenceConditions, TermGroups};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -79,7 +79,7 @@ impl FlexBody {
     /// FB212 for names that the body has not; FB214 where `carrier` has no reference point or no orientation,
     /// and for a body without all groups of the kinetic energy.
     pub fn carried(&self, carrier: &Carrier) -> Result<Self> {
-        if self.groups() != Groups::ALL {
+        if self.groups() != TermGroups::ALL {
             let lacking: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return Err(refused(format!(
                 "the body lacks {}, without which its terms about {carrier} are not known",

@@ -2,7 +2,7 @@
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
 use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, ReferenceConditions};
-use crate::invariants::{BodyFrame, FrameChoice, Groups, Invariants, error_norms, principal_axes};
+use crate::invariants::{BodyFrame, FrameChoice, Invariants, TermGroups, error_norms, principal_axes};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -88,7 +88,7 @@ impl FlexBody {
             let message = format!("{conditions}: for {wanted} {what}");
             Err(Diagnostic::new(Code::CarrierImpossible, message).with_help(help.to_owned()).into())
         };
-        if self.groups() != Groups::ALL {
+        if self.groups() != TermGroups::ALL {
             let dropped: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
             return refuse(
                 &format!("{} would be needed, which the body does not have", dropped.join(", ")),

@@ -21,7 +21,7 @@ mod terms;
 mod validate;
 
 pub use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
-pub use crate::invariants::{Frame, Group, Groups};
+pub use crate::invariants::{Frame, TermGroup, TermGroups};
 pub use body::FlexBody;
 pub use carried::Carrier;
 pub use flexbody_model::{Coupling, GeometricStiffness, LoadKind, SurfaceMesh, UnitLoad};

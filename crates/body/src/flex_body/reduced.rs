@@ -1,8 +1,8 @@
 //! A body with some of its modes, and some groups of its kinetic energy.
 
 use super::{
-    Certificate, FixedInterface, FlexBody, Groups, Guarantee, InternalRows, LumpedBody, Modes, Parts,
-    Storage, TermDecision,
+    Certificate, FixedInterface, FlexBody, Guarantee, InternalRows, LumpedBody, Modes, Parts, Storage,
+    TermDecision, TermGroups,
 };
 use crate::invariants::{InertiaStiffness, error_norms};
 use faer::Mat;
@@ -22,7 +22,7 @@ impl FlexBody {
     /// # Errors
     /// [`Usage`](Code::Usage) when the indices do not ascend or are not below the number of modes; those of
     /// [`FlexBody::new`] when `terms` contradict the groups.
-    pub fn reduced(&self, modes: &[usize], groups: Groups, terms: Vec<TermDecision>) -> Result<Self> {
+    pub fn reduced(&self, modes: &[usize], groups: TermGroups, terms: Vec<TermDecision>) -> Result<Self> {
         let nf = self.n_modes();
         if modes.is_empty() || modes.windows(2).any(|w| w[0] >= w[1]) || modes[modes.len() - 1] >= nf {
             let message = format!("modes {modes:?} of {nf}, expected ascending indices below {nf}");

@@ -1,12 +1,12 @@
 //! Why a body holds the groups of the kinetic energy that it holds.
 
-use super::Group;
+use super::TermGroup;
 
 /// What was decided about one group of the kinetic energy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermDecision {
     /// The group.
-    pub group: Group,
+    pub group: TermGroup,
     /// Whether the body holds it.
     pub kept: bool,
     /// What decided (theory section 7): 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a

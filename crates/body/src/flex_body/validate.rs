@@ -1,6 +1,6 @@
 //! What must hold for the parts of a flexible body, checked once, all violations collected.
 
-use super::{Group, MassStructure, Parts, ReferenceConditions, SurfaceMesh};
+use super::{MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup};
 use crate::invariants::{DIGITS, InertiaStiffness};
 use crate::problems::{LARGEST, Problems};
 use flexbody_base::diagnostic::Diagnostic;
@@ -318,8 +318,8 @@ impl Problems {
                 }
             }
         }
-        let dropped = |group: Group| parts.terms.iter().any(|term| term.group == group && !term.kept);
-        for group in Group::ALL {
+        let dropped = |group: TermGroup| parts.terms.iter().any(|term| term.group == group && !term.kept);
+        for group in TermGroup::ALL {
             let name = group.name();
             match (held.has(group), dropped(group)) {
                 (true, true) => self.add(format!("`terms` drops {name}, but `invariants` holds it")),

@@ -7,7 +7,7 @@
 //! the same to the last bit at any number of threads, and no sum is longer than a chunk, the chunks of a
 //! group or the groups: rounding does not grow with the model.
 
-use super::{Groups, Invariants, PrimaryData};
+use super::{Invariants, PrimaryData, TermGroups};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use flexbody_linalg::SymmetricMatrix;
@@ -138,7 +138,7 @@ pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Inv
         s: array(|k| array(|l| Mat::from_fn(nf, nf, |p, q| gram[(psi(k, p), psi(l, q))]))),
         modal_stiffness,
         general: None,
-        groups: Groups::ALL,
+        groups: TermGroups::ALL,
     })
 }
 

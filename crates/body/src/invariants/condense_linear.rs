@@ -4,7 +4,7 @@
 use super::condense::{
     Aligned, CHUNK, LANE, Lane, MassTimes, NodalMass, SolidColumns, rigid_part, sum_of_groups,
 };
-use super::{Groups, Invariants, LumpedMasses, PrimaryData, s_of_modal_mass};
+use super::{Invariants, LumpedMasses, PrimaryData, TermGroups, s_of_modal_mass};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use flexbody_linalg::{SymmetricMatrix, gram};
@@ -69,7 +69,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
         s: s_of_modal_mass(nf, Some(modal_mass), None),
         modal_stiffness,
         general: None,
-        groups: Groups { w1: true, ..Groups::NONE },
+        groups: TermGroups { w1: true, ..TermGroups::NONE },
     })
 }
 

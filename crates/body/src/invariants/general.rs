@@ -5,7 +5,7 @@
 //! of -psi_j~ at the displacements and zeros at the rotations in B_j, the body-frame velocities of all rows
 //! are (Phi_t, B_x + sum_j q_j B_j, Psi) times (V, omega, qd).
 
-use super::{GeneralTerms, Groups, Invariants, PrimaryData};
+use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::{ColMut, Mat, MatMut, MatRef};
 use flexbody_linalg::{SymmetricMatrix, Tall, gram, multiply};
 use flexbody_model::DirectorMass;
@@ -102,7 +102,7 @@ pub fn condense_general_linear<M: MassProduct + ?Sized>(
 ) -> Invariants {
     let columns = GeneralColumns::new(mass, motion, shapes);
     let whole = columns.products(columns.rigid_gram(mass)).invariants(modal_stiffness);
-    whole.with_groups(Groups { w1: true, ..Groups::NONE })
+    whole.with_groups(TermGroups { w1: true, ..TermGroups::NONE })
 }
 
 /// X = [Phi_t, B_x, B_j e_b for each axis b and mode j, Psi].
@@ -282,7 +282,7 @@ impl Products {
                 modal_mass: self.modal_mass(),
                 plane: false,
             }),
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         })
     }
 
@@ -314,7 +314,7 @@ impl Products {
                 modal_mass: self.modal_mass(),
                 plane: true,
             }),
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         })
     }
 

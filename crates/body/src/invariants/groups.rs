@@ -2,7 +2,7 @@
 
 /// A group of the kinetic energy: the terms that one invariant makes, in every place where they act.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Group {
+pub enum TermGroup {
     /// Inertia linear in q, and the constant centrifugal load of the modes.
     W1,
     /// Inertia quadratic in q, and the centrifugal load that grows with q.
@@ -11,9 +11,9 @@ pub enum Group {
     W3,
 }
 
-impl Group {
+impl TermGroup {
     /// Every group, in the order of the documentation.
-    pub const ALL: [Group; 3] = [Self::W1, Self::W2, Self::W3];
+    pub const ALL: [TermGroup; 3] = [Self::W1, Self::W2, Self::W3];
 
     /// Name in files and reports.
     pub fn name(self) -> &'static str {
@@ -27,36 +27,36 @@ impl Group {
 
 /// Which groups of the kinetic energy there are. What does not depend on q, and W0, always is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Groups {
-    /// [`Group::W1`].
+pub struct TermGroups {
+    /// [`TermGroup::W1`].
     pub w1: bool,
-    /// [`Group::W2`].
+    /// [`TermGroup::W2`].
     pub w2: bool,
-    /// [`Group::W3`].
+    /// [`TermGroup::W3`].
     pub w3: bool,
 }
 
-impl Groups {
+impl TermGroups {
     /// The exact kinetic energy.
     pub const ALL: Self = Self { w1: true, w2: true, w3: true };
     /// That of a body whose inertia does not depend on its deformation.
     pub const NONE: Self = Self { w1: false, w2: false, w3: false };
 
     /// Whether `group` is there.
-    pub fn has(self, group: Group) -> bool {
+    pub fn has(self, group: TermGroup) -> bool {
         match group {
-            Group::W1 => self.w1,
-            Group::W2 => self.w2,
-            Group::W3 => self.w3,
+            TermGroup::W1 => self.w1,
+            TermGroup::W2 => self.w2,
+            TermGroup::W3 => self.w3,
         }
     }
 
     /// These and `group`.
-    pub fn with(mut self, group: Group) -> Self {
+    pub fn with(mut self, group: TermGroup) -> Self {
         match group {
-            Group::W1 => self.w1 = true,
-            Group::W2 => self.w2 = true,
-            Group::W3 => self.w3 = true,
+            TermGroup::W1 => self.w1 = true,
+            TermGroup::W2 => self.w2 = true,
+            TermGroup::W3 => self.w3 = true,
         }
         self
     }
@@ -67,8 +67,8 @@ impl Groups {
     }
 
     /// All but one.
-    pub fn without(group: Group) -> Self {
-        Self { w1: group != Group::W1, w2: group != Group::W2, w3: group != Group::W3 }
+    pub fn without(group: TermGroup) -> Self {
+        Self { w1: group != TermGroup::W1, w2: group != TermGroup::W2, w3: group != TermGroup::W3 }
     }
 
     /// Those that are in both.
@@ -82,13 +82,13 @@ impl Groups {
     }
 
     /// Those that are not there.
-    pub fn dropped(self) -> impl Iterator<Item = Group> {
-        Group::ALL.into_iter().filter(move |group| !self.has(*group))
+    pub fn dropped(self) -> impl Iterator<Item = TermGroup> {
+        TermGroup::ALL.into_iter().filter(move |group| !self.has(*group))
     }
 }
 
-impl Default for Groups {
-    /// [`Groups::ALL`]: nothing is dropped unless asked for.
+impl Default for TermGroups {
+    /// [`TermGroups::ALL`]: nothing is dropped unless asked for.
     fn default() -> Self {
         Self::ALL
     }

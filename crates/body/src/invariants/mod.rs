@@ -37,7 +37,7 @@ pub use frame::{
 };
 pub use general::rigid_first_moment;
 pub use general::{MassProduct, RigidMotion, condense_general, condense_general_linear};
-pub use groups::{Group, Groups};
+pub use groups::{TermGroup, TermGroups};
 pub use identities::{Expected, IdentityCheck, Turning, derived_identities, identities};
 pub use inertia_stiffness::{InertiaShares, InertiaStiffness};
 pub use lumped::{LumpedMasses, LumpedScheme, condense_lumped};

@@ -2,7 +2,7 @@
 //! names follows.
 
 use super::general::{s_of, second_moment_of};
-use super::{CauchySchwarz, GeneralTerms, Groups, Invariants, PrimaryData, s_of_modal_mass};
+use super::{CauchySchwarz, GeneralTerms, Invariants, PrimaryData, TermGroups, s_of_modal_mass};
 use faer::Mat;
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
@@ -35,7 +35,7 @@ pub struct Numbered {
     /// I9_jk(a,b) in row a nf + j, column b nf + k (3nf x 3nf): -W2. `None` where the body does not hold it.
     pub i9: Option<Mat<f64>>,
     /// The groups of the kinetic energy that are there.
-    pub groups: Groups,
+    pub groups: TermGroups,
 }
 
 impl Invariants {
@@ -69,7 +69,7 @@ impl Invariants {
     pub fn from_numbered(numbered: &Numbered, modal_stiffness: Mat<f64>, rounding: f64) -> Self {
         let nf = numbered.i8.len();
         let Numbered { i5, i6, i8, i9, .. } = numbered;
-        let groups = Groups { w2: i9.is_some(), w3: i5.is_some(), ..numbered.groups };
+        let groups = TermGroups { w2: i9.is_some(), w3: i5.is_some(), ..numbered.groups };
         let ibar = |k: usize, l: usize| {
             let entry = |i8: &Matrix3<f64>| if k == l { 0.5 * i8.trace() } else { 0.0 } - i8[(l, k)];
             i8.iter().map(entry).collect()

@@ -1,6 +1,6 @@
 //! The primary inertia data of a flexible body and the invariants that are linear in them.
 
-use super::Groups;
+use super::TermGroups;
 use faer::Mat;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
@@ -48,7 +48,7 @@ pub struct PrimaryData {
     pub general: Option<GeneralTerms>,
     /// The groups of the kinetic energy that are held; the arrays know nothing of others
     /// ([`Invariants::with_groups`]).
-    pub groups: Groups,
+    pub groups: TermGroups,
 }
 
 impl Invariants {
@@ -128,7 +128,7 @@ impl Invariants {
     }
 
     /// The groups of the kinetic energy that the body holds.
-    pub fn groups(&self) -> Groups {
+    pub fn groups(&self) -> TermGroups {
         self.0.groups
     }
 

@@ -2,13 +2,13 @@
 
 use super::derived::CYCLIC;
 use super::general::symmetrise;
-use super::{GeneralTerms, Groups, Invariants, PrimaryData};
+use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::Mat;
 
 impl Invariants {
     /// The same body with those of its groups only that are in `groups`: a kinetic energy of its own, which
     /// keeps itself and both momenta. m, c, J, C1, C2, W0, m_ff and K_ff stay what they are.
-    pub fn with_groups(mut self, groups: Groups) -> Self {
+    pub fn with_groups(mut self, groups: TermGroups) -> Self {
         let groups = self.0.groups.and(groups);
         let nf = self.n_modes();
         if !groups.w1 {

@@ -1,7 +1,7 @@
 //! Rigid motion as modes: M in rigid motions and modes, and the same body with other amounts of rigid motion
 //! in its modes.
 
-use super::{GeneralTerms, Groups, Invariants, PrimaryData};
+use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::{Mat, MatRef};
 
 impl Invariants {
@@ -70,13 +70,13 @@ impl Invariants {
                 if p < 6 || q < 6 { 0.0 } else { old.0.modal_stiffness[(p - 6, q - 6)] }
             }),
             general: None,
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         })
     }
 
     /// W3 by its formula from S.
     fn w3_of_s(&self) -> Mat<f64> {
-        let solid = Self(PrimaryData { general: None, groups: Groups::ALL, ..self.0.clone() });
+        let solid = Self(PrimaryData { general: None, groups: TermGroups::ALL, ..self.0.clone() });
         solid.w3().expect("held")
     }
 
@@ -92,7 +92,7 @@ impl Invariants {
     pub fn without_rigid_motion(&self, taken: MatRef<'_, f64>) -> Self {
         let nf = self.n_modes();
         assert!((taken.nrows(), taken.ncols()) == (6, nf), "six rigid motions of every mode");
-        assert!(self.0.groups == Groups::ALL, "a body that holds all groups");
+        assert!(self.0.groups == TermGroups::ALL, "a body that holds all groups");
         let change = Mat::from_fn(6 + nf, nf, |i, j| match i.checked_sub(6) {
             None => -taken[(i, j)],
             Some(mode) => f64::from(mode == j),

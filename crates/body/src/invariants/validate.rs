@@ -1,6 +1,6 @@
 //! What must hold for the arrays of the invariants.
 
-use super::{Groups, Invariants};
+use super::{Invariants, TermGroups};
 use crate::problems::Problems;
 use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
@@ -42,7 +42,7 @@ impl Invariants {
             problems.matrix(&format!("{name}.modal_mass"), &general.modal_mass, nf, nf);
         }
         // What follows takes the shapes of all arrays for granted.
-        if problems.is_empty() && data.groups != Groups::ALL && !self.holds_its_groups_only() {
+        if problems.is_empty() && data.groups != TermGroups::ALL && !self.holds_its_groups_only() {
             problems.add(format!("`{name}` has entries of groups that it does not hold"));
         }
         problems.found()

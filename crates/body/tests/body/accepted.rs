@@ -14,7 +14,7 @@ use flexbody_linalg::CscMatrix;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel, RawShapes};
 use nalgebra::{Matrix3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, entries};
 use oracle::random::Random;
@@ -71,7 +71,7 @@ fn a_rotor_on_a_frame_is_a_body() {
 
 /// Two blocks end to end, their facing nodes tied to each other by springs along all axes.
 fn joined_pair(stiffness: f64) -> RawModel {
-    let mesh = Mesh::block(Kind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);
+    let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);
     let other = mesh.moved(&Matrix3::identity(), [0.75, 0.0, 0.0]);
     let [one, two] = [&mesh, &other].map(|mesh| mesh.assemble(&UNIT, MassRule::Consistent).raw_model());
     let n = one.nodes.len();
@@ -181,7 +181,7 @@ proptest! {
 /// What is written has passed the checks; what fails them is refused with exit code 3, and says which.
 #[test]
 fn a_body_that_breaks_an_identity_is_refused() {
-    let mesh = Mesh::block(Kind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);
+    let mesh = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25]);
     let mut raw = mesh.assemble(&UNIT, MassRule::Consistent).raw_model();
     raw.damping = Some(Damping::Ratio(0.02));
     let model = FeModel::from_raw(raw).expect("a body").model;

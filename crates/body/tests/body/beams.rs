@@ -1,6 +1,6 @@
 //! Closed forms of free-free beams, rods and shafts.
 
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 use oracle::pipeline::modes;
 use std::f64::consts::{PI, TAU};
@@ -49,7 +49,7 @@ fn timoshenko(material: &Material, length: f64, h: f64, shear_factor: f64) -> f6
 /// Frequencies of a square beam along x, of length 1, in quadratic hexahedra half as long as its thickness.
 fn beam(material: &Material, slenderness: f64, across: i32) -> Vec<f64> {
     let h = 1.0 / slenderness;
-    let mesh = Mesh::block(Kind::Hex20, [2 * slenderness as i32, across, across], [1.0, h, h]);
+    let mesh = Mesh::block(ElementKind::Hex20, [2 * slenderness as i32, across, across], [1.0, h, h]);
     modes(&mesh.assemble(material, MassRule::Consistent), 10).frequencies()
 }
 
@@ -90,7 +90,7 @@ fn rod_vibrates_along_its_axis_as_the_discrete_closed_form_says() {
     // gives lambda = 6 E / (rho d^2) (1 - cos k d) / (2 + cos k d), k = n pi / L, at any refinement.
     for cells in [4, 8, 16] {
         let length = 2.0;
-        let mesh = Mesh::block(Kind::Hex8, [cells, 1, 1], [length, 0.3, 0.2]);
+        let mesh = Mesh::block(ElementKind::Hex8, [cells, 1, 1], [length, 0.3, 0.2]);
         let body = mesh.assemble(&NO_CONTRACTION, MassRule::Consistent);
         let all = modes(&body, body.n_dofs() - 6);
         let d = length / f64::from(cells);
@@ -112,8 +112,8 @@ fn shaft_twists_at_multiples_of_the_shear_wave_frequency() {
     let errors: Vec<f64> = [1, 2, 4]
         .iter()
         .map(|&n| {
-            let body =
-                Mesh::cylinder(Kind::Hex8, n, 4 * n, radius, length).assemble(&STEEL, MassRule::Consistent);
+            let body = Mesh::cylinder(ElementKind::Hex8, n, 4 * n, radius, length)
+                .assemble(&STEEL, MassRule::Consistent);
             let found = modes(&body, 8);
             let shapes = &found.modes.solution.vectors;
             let twist =

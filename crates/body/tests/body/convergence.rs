@@ -5,7 +5,7 @@ use flexbody_body::invariants::{
     BodyFrame, LumpedMasses, choose_frame, condense, condense_lumped, error_norms,
 };
 use flexbody_linalg::SymmetricMatrix;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh};
 use oracle::pipeline::modes;
 use std::f64::consts::PI;
@@ -35,7 +35,7 @@ fn error_of(body: &Assembly, field: impl Fn([f64; 3]) -> [f64; 3], exact: f64) -
 /// Lame's equivoluminal mode of a square prism of side 1 and height 1/3 in cells of side 1/n: u = (cos a sin
 /// b, -sin a cos b, 0), a = pi x, b = pi y. No traction on any face and no change of volume, so lambda = 2
 /// pi^2 mu / rho exactly, at any Poisson's ratio and height.
-fn lame_error(kind: Kind, n: i32) -> f64 {
+fn lame_error(kind: ElementKind, n: i32) -> f64 {
     let body = Mesh::block(kind, [n, n, n / 3], [1.0, 1.0, 1.0 / 3.0]).assemble(&STEEL, MassRule::Consistent);
     let (_, mu) = STEEL.lame();
     let field = |x: [f64; 3]| {
@@ -47,7 +47,7 @@ fn lame_error(kind: Kind, n: i32) -> f64 {
 
 /// The first axial mode of a rod 1 x 1/8 x 1/8 without lateral contraction, in cells of side 1/n:
 /// lambda = pi^2 E / rho.
-fn rod_error(kind: Kind, n: i32) -> f64 {
+fn rod_error(kind: ElementKind, n: i32) -> f64 {
     let material = Material { poisson: 0.0, ..STEEL };
     let body =
         Mesh::block(kind, [n, n / 8, n / 8], [1.0, 0.125, 0.125]).assemble(&material, MassRule::Consistent);
@@ -57,7 +57,7 @@ fn rod_error(kind: Kind, n: i32) -> f64 {
 #[test]
 #[ignore = "slow"]
 fn linear_hexahedra_converge_with_order_two() {
-    let errors = [6, 12, 24].map(|n| lame_error(Kind::Hex8, n));
+    let errors = [6, 12, 24].map(|n| lame_error(ElementKind::Hex8, n));
     assert!(errors[2] > 0.0 && errors[2] < 4e-3, "{errors:?}");
     let orders = orders(&errors);
     assert!((orders[1] - 2.0).abs() < 0.05 && orders[0] < orders[1], "{orders:?}");
@@ -66,7 +66,7 @@ fn linear_hexahedra_converge_with_order_two() {
 #[test]
 #[ignore = "slow"]
 fn quadratic_hexahedra_converge_with_order_four() {
-    let errors = [3, 6, 12].map(|n| lame_error(Kind::Hex20, n));
+    let errors = [3, 6, 12].map(|n| lame_error(ElementKind::Hex20, n));
     let orders = orders(&errors);
     assert!(errors[2] > 0.0 && errors[2] < 2e-5, "{errors:?}");
     assert!((orders[1] - 4.0).abs() < 0.05, "{orders:?}");
@@ -77,9 +77,10 @@ fn quadratic_hexahedra_converge_with_order_four() {
 fn quadratic_tetrahedra_converge_with_order_four() {
     // The split of hexahedra into tetrahedra has no mirror symmetry: free faces add a term of order five, so
     // the observed order approaches four linearly in the mesh width.
-    for errors in
-        [[8, 16, 32].map(|n| rod_error(Kind::Tet10, n)), [3, 6, 12].map(|n| lame_error(Kind::Tet10, n))]
-    {
+    for errors in [
+        [8, 16, 32].map(|n| rod_error(ElementKind::Tet10, n)),
+        [3, 6, 12].map(|n| lame_error(ElementKind::Tet10, n)),
+    ] {
         let orders = orders(&errors);
         assert!(errors[2] > 0.0 && errors[2] < 1e-4, "{errors:?}");
         assert!(orders[1] > 3.65 && orders[1] < 4.0, "{orders:?}");
@@ -90,7 +91,7 @@ fn quadratic_tetrahedra_converge_with_order_four() {
 #[test]
 fn refinement_lowers_every_frequency() {
     // Spaces of nested meshes with exact mass are nested: Rayleigh quotients can only fall.
-    for kind in [Kind::Tet4, Kind::Hex8, Kind::Tet10] {
+    for kind in [ElementKind::Tet4, ElementKind::Hex8, ElementKind::Tet10] {
         let found: Vec<Vec<f64>> =
             [1, 2, 4].iter().map(|&s| modes(&block(kind, s), 12).eigenvalues().to_vec()).collect();
         for pair in found.windows(2) {
@@ -119,7 +120,7 @@ fn lumped_errors(body: &Assembly, shapes: MatRef<'_, f64>) -> [[f64; 2]; 2] {
 
 const SIZE: [f64; 3] = [1.0, 0.62, 0.45];
 
-fn block(kind: Kind, s: i32) -> Assembly {
+fn block(kind: ElementKind, s: i32) -> Assembly {
     Mesh::block(kind, [2 * s, s, s], SIZE).assemble(&STEEL, MassRule::Consistent)
 }
 
@@ -139,7 +140,7 @@ fn smooth_shapes(nodes: &[[f64; 3]]) -> Mat<f64> {
 fn row_sums_of_linear_hexahedra_err_by_two_over_n_squared_in_every_second_moment() {
     // The trapezoidal rule: sum of x^2 over n cells is (1 + 2 / n^2) times the integral.
     let cells = [5, 4, 3];
-    let body = Mesh::block(Kind::Hex8, cells, SIZE).assemble(&STEEL, MassRule::Consistent);
+    let body = Mesh::block(ElementKind::Hex8, cells, SIZE).assemble(&STEEL, MassRule::Consistent);
     let mass = SymmetricMatrix::new(body.scalar_mass.clone()).expect("symmetric");
     let (frame, _) = choose_frame(&mass, &body.nodes, BodyFrame::Com).expect("a body with mass");
     let positions = frame.to_body(&body.nodes);
@@ -158,7 +159,7 @@ fn row_sums_of_linear_hexahedra_err_by_two_over_n_squared_in_every_second_moment
 #[test]
 fn lumping_errors_of_linear_hexahedra_have_order_two() {
     let errors = [2, 4, 8].map(|s| {
-        let body = block(Kind::Hex8, s);
+        let body = block(ElementKind::Hex8, s);
         lumped_errors(&body, modes(&body, 5).shapes().as_ref())
     });
     for scheme in 0..2 {
@@ -172,7 +173,7 @@ fn lumping_errors_of_linear_hexahedra_have_order_two() {
 #[test]
 #[ignore = "slow"]
 fn row_sum_errors_of_quadratic_tetrahedra_have_order_four() {
-    let bodies = [4, 8].map(|s| block(Kind::Tet10, s));
+    let bodies = [4, 8].map(|s| block(ElementKind::Tet10, s));
     let smooth = bodies.each_ref().map(|body| lumped_errors(body, smooth_shapes(&body.nodes).as_ref()));
     // x x' is quadratic, and row sums of straight quadratic tetrahedra integrate quadratics exactly.
     assert!(smooth.iter().all(|e| e[0][0] < 1e-13), "{smooth:?}");

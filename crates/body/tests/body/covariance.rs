@@ -6,7 +6,7 @@ use flexbody_eigen::Method;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::RawModel;
 use nalgebra::Matrix3;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{DofOrder, Numbering, reordered};
 use oracle::mesh::{Assembly, Mesh, grid};
 use oracle::pipeline::{Body, proved};
@@ -18,7 +18,9 @@ const METHODS: [Method; 2] = [Method::Dense, Method::Lanczos];
 /// A bracket with a taper and unequal arms: no symmetry, no repeated eigenvalue.
 fn mesh() -> Mesh {
     let cells: Vec<_> = grid([6, 3, 5]).into_iter().filter(|c| c[0] < 2 || c[2] < 2).collect();
-    Mesh::from_cells(Kind::Hex8, &cells, |[x, y, z]| [0.125 * x, 0.125 * y * (1.0 + 0.0625 * x), 0.125 * z])
+    Mesh::from_cells(ElementKind::Hex8, &cells, |[x, y, z]| {
+        [0.125 * x, 0.125 * y * (1.0 + 0.0625 * x), 0.125 * z]
+    })
 }
 
 fn assemble(mesh: &Mesh) -> Assembly {

@@ -23,7 +23,7 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_linalg::{CscMatrix, gram};
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use oracle::brackets::{bracket, strip};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 use oracle::reference::{dense, symmetric_eigen};
 use std::collections::HashSet;
@@ -404,7 +404,7 @@ fn broken(body: &FlexBody) -> Vec<String> {
 /// all the same.
 #[test]
 fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
-    let mesh = Mesh::block(Kind::Hex8, [30, 1, 1], [3.0, 0.05, 0.04]);
+    let mesh = Mesh::block(ElementKind::Hex8, [30, 1, 1], [3.0, 0.05, 0.04]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let digits = 11;
     let rounded = |v: f64| format!("{v:.*e}", digits - 1).parse::<f64>().expect("a number");
@@ -581,7 +581,7 @@ fn what_cannot_be_a_craig_bampton_basis_is_refused() {
 /// move.
 #[test]
 fn mechanisms_are_found_whether_the_interfaces_hold_them_or_not() {
-    let mesh = Mesh::hinge(Kind::Hex8, 2);
+    let mesh = Mesh::hinge(ElementKind::Hex8, 2);
     let face = |at: f64| -> Vec<i64> {
         let kept = mesh.nodes.iter().enumerate().filter(|(_, x)| (x[0] - at).abs() < 1e-9);
         kept.map(|(i, _)| i as i64 + 1).collect()

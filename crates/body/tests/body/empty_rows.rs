@@ -1,7 +1,7 @@
 //! Rows and directions that neither K nor M holds: nodes without elements, rotations of solids, the normals of shells
 //! without drilling stiffness. The body is what it is without them.
 
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -26,7 +26,7 @@ fn told(found: &[Diagnostic], code: Code) -> String {
 }
 
 fn block() -> RawModel {
-    Mesh::block(Kind::Hex8, [3, 2, 2], [0.3, 0.15, 0.1])
+    Mesh::block(ElementKind::Hex8, [3, 2, 2], [0.3, 0.15, 0.1])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model()
 }

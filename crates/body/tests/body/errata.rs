@@ -3,7 +3,7 @@
 
 use flexbody_body::invariants::BodyFrame;
 use nalgebra::{DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::equations::{Coriolis, ReducedBody, State};
 use oracle::integrate;
 use oracle::mesh::Mesh;
@@ -13,7 +13,7 @@ use oracle::pipeline::modes;
 /// A rubber-like block without any symmetry, 10 modes, about its principal axes: W1, W2 and W3 all count.
 fn soft_body() -> ReducedBody {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &oracle::mesh::grid([6, 4, 2]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &oracle::mesh::grid([6, 4, 2]), |[x, y, z]| {
         [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
     });
     let body = modes(&mesh.assemble(&rubber, MassRule::Consistent), 10);

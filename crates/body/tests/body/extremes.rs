@@ -13,7 +13,7 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, gram};
 use flexbody_model::{FeModel, RawModel, check};
 use nalgebra::{Matrix3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{Triangle, write_model};
 use oracle::mesh::{Assembly, Mesh, entries};
 use oracle::random::Random;
@@ -23,7 +23,7 @@ const UNIT: Material = Material { youngs: 1.0, poisson: 0.25, density: 1.0 };
 
 /// 0.75 x 0.5 x 0.25, all frequencies distinct; coordinates, K and M of few binary digits.
 fn bar() -> Mesh {
-    Mesh::block(Kind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25])
+    Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.75, 0.5, 0.25])
 }
 
 /// A mesh of `inner` material where the first node of an element has x between `from` and `to`, of `outer`
@@ -166,7 +166,7 @@ fn body_a_billion_lengths_away_is_the_same_as_far_as_its_coordinates_are() {
     }
     assert!(!told);
     // Coordinates of which the spacing of numbers there leaves seven digits.
-    let oblong = Mesh::block(Kind::Hex8, [3, 2, 1], [0.7, 0.47, 0.26]);
+    let oblong = Mesh::block(ElementKind::Hex8, [3, 2, 1], [0.7, 0.47, 0.26]);
     let (differences, told) = near_and_far(&oblong, [1e9 / 3.0, 1e9, -1e9 / 7.0]);
     let lost = differences.iter().find(|(name, _)| name == "second_moment").expect("J").1;
     assert!(told && (1e-10..1e-6).contains(&lost), "{lost:e}");
@@ -177,7 +177,8 @@ fn inertia_of_needles_and_foils_keeps_all_digits() {
     let mut random = Random(7);
     for size in [[1e5, 1.0, 1.0], [1e3, 1.0, 0.5], [1e3, 1e3, 1.0], [1.0, 1.0, 1.0]] {
         // Along the axes of the model: coordinates have all digits of the small sides.
-        let raw = Mesh::block(Kind::Hex8, [2, 2, 2], size).assemble(&UNIT, MassRule::Consistent).raw_model();
+        let raw =
+            Mesh::block(ElementKind::Hex8, [2, 2, 2], size).assemble(&UNIT, MassRule::Consistent).raw_model();
         let body = converted(raw, 4, Method::Auto).body;
         let mass = size[0] * size[1] * size[2];
         let mut expected: Vec<f64> =
@@ -225,7 +226,7 @@ fn inertia_of_needles_and_foils_keeps_all_digits() {
 fn thin_bodies_lose_digits_and_say_so_or_are_refused() {
     let plate = |ratio: f64| {
         let size = [ratio, 0.8 * ratio, 1.0];
-        Mesh::block(Kind::Hex8, [2, 2, 1], size).assemble(&UNIT, MassRule::Consistent).raw_model()
+        Mesh::block(ElementKind::Hex8, [2, 2, 1], size).assemble(&UNIT, MassRule::Consistent).raw_model()
     };
     assert!(!codes(&converted(plate(10.0), 6, Method::Auto).diagnostics).contains(&Code::NoiseFloor));
     assert!(codes(&converted(plate(1e3), 6, Method::Auto).diagnostics).contains(&Code::NoiseFloor));
@@ -268,7 +269,7 @@ fn stiffness_contrast_is_told_and_never_makes_a_body_that_fails_its_own_checks()
 #[test]
 fn every_mode_of_one_element_and_of_a_block_together_is_the_whole_body() {
     for cells in [[1, 1, 1], [2, 1, 1], [2, 2, 1]] {
-        let mesh = Mesh::block(Kind::Hex8, cells, [0.75, 0.5, 0.375]);
+        let mesh = Mesh::block(ElementKind::Hex8, cells, [0.75, 0.5, 0.375]);
         let raw = mesh.assemble(&UNIT, MassRule::Consistent).raw_model();
         let flexible = raw.stiffness.matrix.n_cols() - 6;
         let done = converted(raw, flexible, Method::Auto);
@@ -288,7 +289,7 @@ fn every_mode_of_one_element_and_of_a_block_together_is_the_whole_body() {
 
 #[test]
 fn hinges_are_refused_whether_free_or_of_a_stiffness_that_rounding_hides() {
-    let free = Mesh::hinge(Kind::Hex8, 2).assemble(&UNIT, MassRule::Consistent).raw_model();
+    let free = Mesh::hinge(ElementKind::Hex8, 2).assemble(&UNIT, MassRule::Consistent).raw_model();
     assert_eq!(refusal(free.clone(), 6), [Code::Mechanism]);
     // A spring between the two blocks, beside the hinge at x = y = 2.
     let x = &free.nodes.positions;
@@ -323,8 +324,9 @@ fn hinges_are_refused_whether_free_or_of_a_stiffness_that_rounding_hides() {
 #[test]
 fn digits_of_files_are_told_when_they_are_gone_and_only_then() {
     let folder = tempfile::tempdir().expect("a folder");
-    let mesh =
-        |size| Mesh::block(Kind::Hex8, [3, 1, 1], size).assemble(&Material::STEEL, MassRule::Consistent);
+    let mesh = |size| {
+        Mesh::block(ElementKind::Hex8, [3, 1, 1], size).assemble(&Material::STEEL, MassRule::Consistent)
+    };
     for (size, thin) in [([1.0, 0.21, 0.3], false), ([100.0, 1.1, 0.9], true)] {
         let raw = mesh(size).raw_model();
         let exact = converted(raw.clone(), 6, Method::Auto).body.modes().eigenvalue[0];

@@ -4,12 +4,12 @@ use flexbody_body::convert::{ConvertSettings, LumpedPipeline, Lumping, convert};
 use flexbody_eigen::Wanted;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{FeModel, check};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 
 /// A bar whose bending modes come in pairs of equal frequencies.
 fn square_bar() -> FeModel {
-    let mesh = Mesh::block(Kind::Hex8, [6, 2, 2], [0.6, 0.1, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [6, 2, 2], [0.6, 0.1, 0.1]);
     check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound body").model
 }
 

@@ -8,7 +8,7 @@ use flexbody_body::invariants::error_norms;
 use flexbody_eigen::{Accuracy, FactorChoice, Method, Multigrid, Precision, Wanted};
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{FeModel, check};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 use oracle::plane::rectangle;
 
@@ -30,7 +30,7 @@ fn steel(mesh: &Mesh) -> FeModel {
     check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound model").model
 }
 
-fn cube(kind: Kind, cells: i32) -> FeModel {
+fn cube(kind: ElementKind, cells: i32) -> FeModel {
     steel(&Mesh::block(kind, [cells; 3], [0.1; 3]))
 }
 
@@ -67,7 +67,9 @@ fn said(found: &Conversion) -> Vec<&str> {
 #[test]
 #[ignore = "slow"]
 fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
-    for (kind, cells) in [(Kind::Hex8, 12), (Kind::Tet4, 9), (Kind::Tet10, 5), (Kind::Hex20, 6)] {
+    for (kind, cells) in
+        [(ElementKind::Hex8, 12), (ElementKind::Tet4, 9), (ElementKind::Tet10, 5), (ElementKind::Hex20, 6)]
+    {
         let name = format!("{kind:?}");
         let [_, found] = both(&name, &cube(kind, cells), 20);
         assert_eq!(way(&found), Multigrid::Used, "{name}");
@@ -76,8 +78,8 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
         assert_eq!((work.factorizations, work.factor_bytes), (0, 0), "{name}");
         // Columns of cycles, and of products with K in double precision. Elements of the second order take more.
         let [most_solved, most_products] = match kind {
-            Kind::Hex20 => [60, 20],
-            Kind::Tet10 => [40, 15],
+            ElementKind::Hex20 => [60, 20],
+            ElementKind::Tet10 => [40, 15],
             _ => [22, 13],
         };
         assert!(work.solved_columns <= 20 * most_solved, "{name}: {work:?}");
@@ -89,7 +91,7 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
 #[test]
 #[ignore = "slow"]
 fn the_last_modes_of_a_cube_are_those_of_a_factor() {
-    let model = cube(Kind::Hex8, 9);
+    let model = cube(ElementKind::Hex8, 9);
     for count in 1..=24 {
         let [_, found] = both(&format!("{count} modes"), &model, count);
         assert_eq!(way(&found), Multigrid::Used, "{count} modes");
@@ -102,7 +104,7 @@ fn plane_bodies_and_bodies_with_arms_have_them_too() {
     let plane = check(rectangle(60, 40, 0.7, [1.0, 2.0])).expect("a sound model").model;
     let [_, found] = both("rectangle", &plane, 12);
     assert_eq!(way(&found), Multigrid::Used);
-    let bracket = steel(&Mesh::bracket(Kind::Hex8, 14, 12, 0.01));
+    let bracket = steel(&Mesh::bracket(ElementKind::Hex8, 14, 12, 0.01));
     let [_, found] = both("bracket", &bracket, 12);
     assert_eq!(way(&found), Multigrid::Used);
 }
@@ -112,7 +114,7 @@ fn plane_bodies_and_bodies_with_arms_have_them_too() {
 #[test]
 #[ignore = "slow"]
 fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
-    let mesh = Mesh::block(Kind::Hex8, [10; 3], [0.1; 3]);
+    let mesh = Mesh::block(ElementKind::Hex8, [10; 3], [0.1; 3]);
     for contrast in [1e4, 1e8] {
         let soft = Material { youngs: Material::STEEL.youngs / contrast, ..Material::STEEL };
         let stiff = mesh.part(|x| x[0] < 0.05).assemble(&Material::STEEL, MassRule::Consistent);
@@ -127,7 +129,7 @@ fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
 #[test]
 #[ignore = "slow"]
 fn a_thin_plate_is_factored_after_all_with_a_note() {
-    let plate = steel(&Mesh::block(Kind::Hex8, [40, 30, 1], [1.0, 0.7, 1e-3]));
+    let plate = steel(&Mesh::block(ElementKind::Hex8, [40, 30, 1], [1.0, 0.7, 1e-3]));
     let [factored, found] = both("plate", &plate, 10);
     assert_eq!(way(&found), Multigrid::Failed);
     assert!(said(&found)[0].starts_with("cycles over levels"), "{:?}", said(&found));
@@ -136,7 +138,7 @@ fn a_thin_plate_is_factored_after_all_with_a_note() {
 
 #[test]
 fn mechanisms_are_refused_as_with_a_factor() {
-    let hinge = steel(&Mesh::hinge(Kind::Hex8, 6));
+    let hinge = steel(&Mesh::hinge(ElementKind::Hex8, 6));
     let [by_factor, without] =
         [DOUBLE, FactorChoice::Auto].map(|factor| run(&hinge, 8, factor).expect_err("a hinge"));
     assert_eq!(by_factor.diagnostics()[0].code(), without.diagnostics()[0].code());
@@ -145,7 +147,7 @@ fn mechanisms_are_refused_as_with_a_factor() {
 #[test]
 #[ignore = "slow"]
 fn the_bits_do_not_depend_on_the_number_of_threads() {
-    let model = cube(Kind::Hex8, 14);
+    let model = cube(ElementKind::Hex8, 14);
     let bits = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let found = pool.install(|| run(&model, 10, FactorChoice::Auto)).expect("modes");
@@ -163,7 +165,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
 #[test]
 #[ignore = "slow"]
 fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
-    let model = cube(Kind::Hex8, 10);
+    let model = cube(ElementKind::Hex8, 10);
     let with = |accuracy: Accuracy, multigrid_pays: f64| {
         let modes =
             ModeSettings { wanted: Wanted::Lowest(10), accuracy, multigrid_pays, ..ModeSettings::default() };

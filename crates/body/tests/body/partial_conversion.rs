@@ -2,7 +2,7 @@
 
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{Conversion, ConvertSettings, ModalModel, convert};
-use flexbody_body::flex_body::{Groups, TermDecision};
+use flexbody_body::flex_body::{TermDecision, TermGroups};
 use flexbody_body::invariants::{BodyFrame, primary_differences};
 use flexbody_body::verification::verify;
 use flexbody_eigen::{Accuracy, Resume, Wanted};
@@ -99,7 +99,7 @@ fn a_decision_is_made_on_what_the_body_will_have() {
         let modal = ModalModel::find(&model, &settings, Resume::default(), SILENT).expect("modes");
         let linear = modal.condense_linear();
         let early = modal.body(&linear).expect("a body");
-        assert_eq!(early.groups(), Groups { w1: true, ..Groups::NONE });
+        assert_eq!(early.groups(), TermGroups { w1: true, ..TermGroups::NONE });
         near(early.invariants().mass(), body.invariants().mass());
         near(early.invariants().inertia()[(2, 2)], body.invariants().inertia()[(2, 2)]);
         assert_eq!((early.frame(), early.nodes()), (body.frame(), body.nodes()));
@@ -123,10 +123,10 @@ fn certified_digits_are_those_of_the_whole() {
     let mut settings = settings();
     settings.modes.accuracy = Accuracy::Certified;
     let whole = convert(model, &settings, SILENT).expect("converts").body;
-    let terms = decisions(Groups::NONE);
+    let terms = decisions(TermGroups::NONE);
     let found = decided(model, &settings, &terms).body;
     let modes: Vec<usize> = (0..whole.n_modes()).collect();
-    let expected = whole.reduced(&modes, Groups::NONE, terms).expect("a body");
+    let expected = whole.reduced(&modes, TermGroups::NONE, terms).expect("a body");
     assert_eq!((found.invariants(), found.certificate()), (expected.invariants(), expected.certificate()));
     assert!(verify(&found, model).expect("comparable").iter().all(|check| check.passed));
 }

@@ -4,7 +4,7 @@
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::ModeSettings;
 use flexbody_eigen::{Accuracy, Method, Proof, Wanted};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, grid};
 use oracle::pipeline::{Body, solve};
 use oracle::random::Random;
@@ -44,7 +44,7 @@ fn node_tables_of_six_digits_are_enough() {
     // FE programs print coordinates with six to eight digits. Rigid motion is then known to 1e-6 only;
     // eigenvalues do not depend on it to first order.
     let turn = Random(3).rotation();
-    let mesh = Mesh::bracket(Kind::Hex8, 5, 2, 0.125).moved(&turn, [0.3, 0.7, -0.2]);
+    let mesh = Mesh::bracket(ElementKind::Hex8, 5, 2, 0.125).moved(&turn, [0.3, 0.7, -0.2]);
     let body = mesh.assemble(&STEEL, MassRule::Consistent);
     let exact = dense_modes(&body).eigenvalues;
     for digits in [12, 9, 8, 7, 6] {
@@ -60,7 +60,7 @@ fn node_tables_of_six_digits_are_enough() {
 
 /// Two steel blocks with a layer between them that is `ratio` times as stiff.
 fn joined(ratio: f64) -> Assembly {
-    let mesh = Mesh::block(Kind::Hex8, [7, 2, 2], [0.7, 0.2, 0.2]);
+    let mesh = Mesh::block(ElementKind::Hex8, [7, 2, 2], [0.7, 0.2, 0.2]);
     let in_layer = |x: [f64; 3]| x[0] > 0.25 && x[0] < 0.35;
     let soft = Material { youngs: ratio * STEEL.youngs, ..STEEL };
     let blocks = mesh.part(|x| !in_layer(x)).assemble(&STEEL, MassRule::Consistent);
@@ -87,7 +87,7 @@ fn soft_joints_keep_six_low_modes_that_scale_with_their_stiffness() {
 #[ignore = "slow"]
 fn thin_plates_tell_their_noise() {
     // 1 m x 0.7 m x 1 mm: rounding of K alone leaves 1e-6 to 1e-4 in the lowest eigenvalues.
-    for (kind, cells) in [(Kind::Hex8, [8, 6, 1]), (Kind::Tet10, [4, 3, 1])] {
+    for (kind, cells) in [(ElementKind::Hex8, [8, 6, 1]), (ElementKind::Tet10, [4, 3, 1])] {
         let body = Mesh::block(kind, cells, [1.0, 0.7, 1e-3]).assemble(&STEEL, MassRule::Consistent);
         for count in [8, 40] {
             let mut first: Option<Vec<f64>> = None;
@@ -116,7 +116,7 @@ fn twenty_six_nearly_equal_modes_are_all_found() {
     // Thirteen equal fingers on one bar, each with two first bending modes: clusters wider than any block.
     let mut cells = grid([25, 1, 1]);
     cells.extend((0..13).flat_map(|finger| (1..5).map(move |z| [2 * finger, 0, z])));
-    let comb = Mesh::from_cells(Kind::Hex8, &cells, |[x, y, z]| {
+    let comb = Mesh::from_cells(ElementKind::Hex8, &cells, |[x, y, z]| {
         [0.01 * x, 0.01 * y, if z <= 1.0 { 0.05 * z } else { 0.03 + 0.02 * z }]
     });
     let body = comb.assemble(&STEEL, MassRule::Consistent);

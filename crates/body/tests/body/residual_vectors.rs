@@ -10,7 +10,7 @@ use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
 use flexbody_linalg::progress::SILENT;
 use flexbody_linalg::{combine, gram};
 use flexbody_model::{FeModel, NodeSet, RawShapes};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, grid};
 use oracle::reference::{dense, dense_modes};
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// A cylindrical shell segment of 0.5 rad with a twist: no symmetry.
 fn curved_plate() -> Assembly {
     let cells = [8, 6, 1];
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid(cells), |p| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid(cells), |p| {
         let [u, v, w] = [p[0] / 8.0, p[1] / 6.0, p[2]];
         let (angle, radius) = (0.5 * u * (1.0 + 0.2 * v), 1.0 + 0.02 * w);
         [radius * angle.sin(), 0.4 * v + 0.03 * u * v, radius * angle.cos()]
@@ -144,7 +144,7 @@ fn solved_responses(plate: &Assembly, loads: &Mat<f64>) -> Mat<f64> {
 /// first 50 has.
 #[test]
 fn fifty_modes_miss_a_tenth_of_the_centrifugal_response_and_six_vectors_nothing() {
-    let mesh = Mesh::from_cells(Kind::Hex20, &grid([8, 6, 1]), |p| {
+    let mesh = Mesh::from_cells(ElementKind::Hex20, &grid([8, 6, 1]), |p| {
         let (angle, radius) = (0.8 * (p[0] / 8.0 - 0.5), 1.25 + 0.01 * (p[2] - 0.5));
         [radius * angle.sin(), 0.125 * p[1], radius * angle.cos()]
     });

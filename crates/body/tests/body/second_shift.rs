@@ -7,7 +7,7 @@ use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::gram;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{FeModel, check};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh};
 
 fn fixture(name: &str) -> FeModel {
@@ -39,19 +39,20 @@ fn checked(assembly: &Assembly) -> FeModel {
 }
 
 fn block(cells: [i32; 3], lengths: [f64; 3], material: Material) -> FeModel {
-    checked(&Mesh::block(Kind::Hex8, cells, lengths).assemble(&material, MassRule::Consistent))
+    checked(&Mesh::block(ElementKind::Hex8, cells, lengths).assemble(&material, MassRule::Consistent))
 }
 
 /// Quadratic tetrahedra whose mass matrix is singular.
 fn singular_mass() -> FeModel {
     checked(
-        &Mesh::block(Kind::Tet10, [5, 2, 2], [1.0, 0.42, 0.4]).assemble(&Material::STEEL, MassRule::Reduced),
+        &Mesh::block(ElementKind::Tet10, [5, 2, 2], [1.0, 0.42, 0.4])
+            .assemble(&Material::STEEL, MassRule::Reduced),
     )
 }
 
 /// A block whose left half is 10^8 times as stiff as the right.
 fn contrast() -> FeModel {
-    let mesh = Mesh::block(Kind::Hex8, [12, 5, 4], [1.2, 0.5, 0.41]);
+    let mesh = Mesh::block(ElementKind::Hex8, [12, 5, 4], [1.2, 0.5, 0.41]);
     let half = |left: bool, youngs: f64| {
         let kept = move |x: [f64; 3]| (x[0] < 0.6) == left;
         mesh.part(kept).assemble(&Material { youngs, ..Material::STEEL }, MassRule::Consistent)

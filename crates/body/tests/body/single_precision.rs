@@ -10,7 +10,7 @@ use flexbody_eigen::{FactorChoice, Method, Precision, Wanted};
 use flexbody_input::{ModelFiles, read_model};
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{FeModel, check};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 use std::path::PathBuf;
 
@@ -51,7 +51,7 @@ fn run(model: &FeModel, count: usize, factor: FactorChoice, single_pays: f64) ->
 
 /// A steel plate of 1 m x 0.7 m: cond(K + tau M) grows with the fourth power of length over thickness.
 fn plate(thickness: f64) -> FeModel {
-    let mesh = Mesh::block(Kind::Hex8, [16, 12, 1], [1.0, 0.7, thickness]);
+    let mesh = Mesh::block(ElementKind::Hex8, [16, 12, 1], [1.0, 0.7, thickness]);
     check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound model").model
 }
 
@@ -133,7 +133,7 @@ fn counts_in_single_precision_are_those_of_double_precision() {
 /// of a per mille, which a count in single precision does not resolve. It is made above the next ones.
 #[test]
 fn a_count_in_single_precision_is_made_above_eigenvalues_that_it_does_not_resolve() {
-    let mesh = Mesh::block(Kind::Hex8, [8, 8, 8], [1.0, 1.0, 1.0 + 1e-5]);
+    let mesh = Mesh::block(ElementKind::Hex8, [8, 8, 8], [1.0, 1.0, 1.0 + 1e-5]);
     let model =
         check(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model()).expect("a sound model");
     let all = run(&model.model, 20, DOUBLE, 0.0).expect("modes");

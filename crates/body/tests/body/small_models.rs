@@ -8,7 +8,7 @@ use flexbody_eigen::{Accuracy, Method, Proof, Wanted};
 use flexbody_linalg::CscMatrix;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{RawModel, check};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, entries};
 use oracle::pipeline::{proved, solve, try_modes};
 use oracle::reference::{dense_modes, unit_cube_eigenvalues};
@@ -24,12 +24,12 @@ fn assert_close(found: &[f64], exact: &[f64], tolerance: f64, what: &str) {
     }
 }
 
-fn one_element(kind: Kind) -> Assembly {
+fn one_element(kind: ElementKind) -> Assembly {
     let lattice = match kind {
-        Kind::Hex8 | Kind::Hex20 => {
+        ElementKind::Hex8 | ElementKind::Hex20 => {
             return Mesh::block(kind, [1; 3], [1.0; 3]).assemble(&UNIT, MassRule::Consistent);
         }
-        Kind::Tet4 | Kind::Tet10 => Mesh::block(kind, [1; 3], [1.0; 3]),
+        ElementKind::Tet4 | ElementKind::Tet10 => Mesh::block(kind, [1; 3], [1.0; 3]),
     };
     // The first of the six tetrahedra alone, its nodes renumbered.
     let element = &lattice.elements[0].1;
@@ -42,14 +42,14 @@ fn one_element(kind: Kind) -> Assembly {
 fn one_trilinear_cube_has_all_eighteen_modes_of_its_closed_form() {
     let (lambda, mu) = UNIT.lame();
     for method in METHODS {
-        let found = proved(one_element(Kind::Hex8).raw_model(), 18, method);
+        let found = proved(one_element(ElementKind::Hex8).raw_model(), 18, method);
         assert_close(found.eigenvalues(), &unit_cube_eigenvalues(lambda, mu), 1e-12, &format!("{method:?}"));
     }
 }
 
 #[test]
 fn one_element_of_every_kind_has_all_its_modes() {
-    for kind in [Kind::Tet4, Kind::Tet10, Kind::Hex8, Kind::Hex20] {
+    for kind in [ElementKind::Tet4, ElementKind::Tet10, ElementKind::Hex8, ElementKind::Hex20] {
         let body = one_element(kind);
         let reference = dense_modes(&body);
         assert_eq!((reference.zero, reference.eigenvalues.len()), (6, body.n_dofs() - 6), "{kind:?}");
@@ -64,12 +64,12 @@ fn one_element_of_every_kind_has_all_its_modes() {
 #[ignore = "slow"]
 fn dense_and_sparse_paths_agree_with_the_reference() {
     for (kind, cells, rule) in [
-        (Kind::Hex8, [5, 3, 2], MassRule::Consistent),
-        (Kind::Tet4, [4, 2, 2], MassRule::Consistent),
-        (Kind::Tet10, [2, 1, 1], MassRule::Consistent),
-        (Kind::Hex20, [3, 1, 1], MassRule::Consistent),
-        (Kind::Hex8, [5, 3, 2], MassRule::Reduced),
-        (Kind::Tet10, [2, 1, 1], MassRule::Reduced),
+        (ElementKind::Hex8, [5, 3, 2], MassRule::Consistent),
+        (ElementKind::Tet4, [4, 2, 2], MassRule::Consistent),
+        (ElementKind::Tet10, [2, 1, 1], MassRule::Consistent),
+        (ElementKind::Hex20, [3, 1, 1], MassRule::Consistent),
+        (ElementKind::Hex8, [5, 3, 2], MassRule::Reduced),
+        (ElementKind::Tet10, [2, 1, 1], MassRule::Reduced),
     ] {
         let body = Mesh::block(kind, cells, [0.4, 0.15, 0.1]).assemble(&Material::STEEL, rule);
         let reference = dense_modes(&body);
@@ -92,7 +92,7 @@ fn dense_and_sparse_paths_agree_with_the_reference() {
 
 #[test]
 fn singular_mass_gives_its_finite_modes_and_says_so() {
-    for (kind, cells) in [(Kind::Hex8, [3, 2, 1]), (Kind::Tet10, [1, 1, 1])] {
+    for (kind, cells) in [(ElementKind::Hex8, [3, 2, 1]), (ElementKind::Tet10, [1, 1, 1])] {
         let body = Mesh::block(kind, cells, [0.3, 0.2, 0.1]).assemble(&Material::STEEL, MassRule::Reduced);
         let reference = dense_modes(&body);
         assert!(reference.infinite > 0);
@@ -109,7 +109,7 @@ fn singular_mass_gives_its_finite_modes_and_says_so() {
 
 #[test]
 fn nodes_without_mass_are_counted_on_every_path() {
-    let mut body = Mesh::block(Kind::Hex8, [4, 2, 2], [0.4, 0.2, 0.1])
+    let mut body = Mesh::block(ElementKind::Hex8, [4, 2, 2], [0.4, 0.2, 0.1])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .with_lumped_mass();
     let massless = [7u32, 20];
@@ -134,7 +134,7 @@ fn nodes_without_mass_are_counted_on_every_path() {
 
 #[test]
 fn every_mode_below_a_frequency_is_found() {
-    let body = Mesh::block(Kind::Hex8, [4; 3], [1.0; 3]).assemble(&UNIT, MassRule::Consistent);
+    let body = Mesh::block(ElementKind::Hex8, [4; 3], [1.0; 3]).assemble(&UNIT, MassRule::Consistent);
     let reference = dense_modes(&body);
     let model = check(body.raw_model()).expect("a sound body").model;
     for count in [1usize, 2, 3, 10, 40] {
@@ -165,7 +165,7 @@ fn refusal(raw: RawModel, method: Method) -> Vec<(Code, ExitCode)> {
 #[test]
 fn mechanisms_and_separate_bodies_are_refused() {
     for method in METHODS {
-        for (kind, n) in [(Kind::Hex8, 1), (Kind::Hex8, 3), (Kind::Tet10, 2)] {
+        for (kind, n) in [(ElementKind::Hex8, 1), (ElementKind::Hex8, 3), (ElementKind::Tet10, 2)] {
             let hinge = Mesh::hinge(kind, n).assemble(&UNIT, MassRule::Consistent);
             assert_eq!(
                 refusal(hinge.raw_model(), method),
@@ -180,7 +180,8 @@ fn mechanisms_and_separate_bodies_are_refused() {
 
 #[test]
 fn negative_row_sum_masses_are_refused() {
-    let body = Mesh::block(Kind::Tet10, [2, 1, 1], [2.0, 1.0, 1.0]).assemble(&UNIT, MassRule::Consistent);
+    let body =
+        Mesh::block(ElementKind::Tet10, [2, 1, 1], [2.0, 1.0, 1.0]).assemble(&UNIT, MassRule::Consistent);
     let lumped = body.with_lumped_mass();
     let codes = refusal(lumped.raw_model(), Method::Auto);
     assert!(codes.iter().all(|(_, exit)| *exit == ExitCode::Untrustworthy), "{codes:?}");

@@ -1,7 +1,7 @@
 //! Multiplicities that the symmetry of a body dictates, and the frequencies of the sphere and the disc.
 
 use flexbody_eigen::Method;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh};
 use oracle::pipeline::{Body, modes, proved};
 use oracle::reference::dense_modes;
@@ -62,7 +62,7 @@ fn angular(found: &Body) -> Vec<f64> {
 fn sphere_has_lambs_fivefold_modes_split_two_and_three_by_the_cubic_mesh() {
     let (torsional, spheroidal) = lamb();
     let meshes = [2, 4, 8].map(|n| {
-        let found = modes(&unit(&Mesh::ball(Kind::Hex8, n, 1.0)), 10);
+        let found = modes(&unit(&Mesh::ball(ElementKind::Hex8, n, 1.0)), 10);
         let mut groups = multiplicities(found.eigenvalues());
         groups[..2].sort_unstable();
         groups[2..].sort_unstable();
@@ -85,7 +85,7 @@ fn sphere_has_lambs_fivefold_modes_split_two_and_three_by_the_cubic_mesh() {
 #[test]
 fn cube_has_single_double_and_triple_modes_only() {
     // The cubic group has irreducible representations of dimension 1, 2 and 3, no other.
-    let cube = unit(&Mesh::block(Kind::Hex8, [4; 3], [1.0; 3]));
+    let cube = unit(&Mesh::block(ElementKind::Hex8, [4; 3], [1.0; 3]));
     let all = multiplicities(&dense_modes(&cube).eigenvalues);
     assert!(all.iter().all(|&times| times <= 3), "{all:?}");
     // The library finds the same groups, whole ones at the end too.
@@ -103,7 +103,7 @@ fn disc_has_double_modes_for_odd_numbers_of_nodal_diameters() {
     // A four-fold symmetric mesh keeps pairs with an odd number of nodal diameters exactly, and splits those
     // with an even number less and less.
     let split = [1, 2, 4].map(|n| {
-        let found = modes(&unit(&Mesh::cylinder(Kind::Hex20, n, 1, 1.0, 0.1)), 5);
+        let found = modes(&unit(&Mesh::cylinder(ElementKind::Hex20, n, 1, 1.0, 0.1)), 5);
         assert_eq!(multiplicities(found.eigenvalues()), [1, 1, 1, 2], "{n}: (2,0) twice, (0,1), (3,0)");
         let omega = angular(&found);
         omega[1] / omega[0] - 1.0

@@ -1,7 +1,7 @@
 //! What was proved about a body: the rows of `/certificate`.
 
 use super::super::item::Item;
-use super::super::item::Kind::{Float, Int, Text};
+use super::super::item::ItemKind::{Float, Int, Text};
 use super::super::value::{Value, View, count, text};
 use super::{ONE, PER_TIME2, attribute};
 use flexbody_body::flex_body::{FixedInterface, Guarantee};

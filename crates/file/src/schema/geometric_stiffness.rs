@@ -1,7 +1,7 @@
 //! Geometric stiffness and stiffness of inertia of unit loads: the rows of `/geometric_stiffness/<load>` and
 //! `/inertia_stiffness/<load>`.
 
-use super::super::item::Kind::{Floats, Text};
+use super::super::item::ItemKind::{Floats, Text};
 use super::super::item::{Extent::Modes, Item};
 use super::super::value::{Units, Value, View, matrix, text};
 use super::{ONE, PER_TIME2, attribute, dataset};

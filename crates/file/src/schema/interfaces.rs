@@ -2,7 +2,7 @@
 
 use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
 use super::super::item::Item;
-use super::super::item::Kind::{Floats, Ints, Text};
+use super::super::item::ItemKind::{Floats, Ints, Text};
 use super::{LENGTH, ONE, PER_ROOT_MASS, PER_ROOT_MASS_LENGTH, attribute, dataset};
 use crate::value::{Units, Value, matrix, shape_rows, text};
 

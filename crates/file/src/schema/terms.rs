@@ -1,21 +1,21 @@
 //! What was decided about the groups of the kinetic energy: the rows of `/terms`.
 
 use super::super::item::Item;
-use super::super::item::Kind::{Float, Int, Text};
+use super::super::item::ItemKind::{Float, Int, Text};
 use super::super::value::{Value, View, text};
 use super::{ONE, attribute};
-use flexbody_body::flex_body::{Group, TermDecision};
+use flexbody_body::flex_body::{TermDecision, TermGroup};
 
 /// Texts of a group that is held, and of one that is not.
 pub(in super::super) const KEPT: &str = "kept";
 /// See [`KEPT`].
 pub(in super::super) const DROPPED: &str = "dropped";
 
-fn decision<'a>(view: &View<'a>, group: Group) -> Option<&'a TermDecision> {
+fn decision<'a>(view: &View<'a>, group: TermGroup) -> Option<&'a TermDecision> {
     view.body.terms.iter().find(|term| term.group == group)
 }
 
-fn held(view: &View<'_>, group: Group) -> Option<Value> {
+fn held(view: &View<'_>, group: TermGroup) -> Option<Value> {
     text(if view.body.invariants.groups().has(group) { KEPT } else { DROPPED })
 }
 
@@ -35,7 +35,7 @@ macro_rules! of_groups {
                     "`kept`, or `dropped`: the body has no group ", $name,
                     " of the kinetic energy, and the file none of its datasets (files up to 1.2: always `kept`)"
                 ),
-                |v| held(v, Group::$group),
+                |v| held(v, TermGroup::$group),
             ),)*
             attribute("reason", Text, ONE, "why", |v| {
                 text(match v.body.terms.is_empty() {
@@ -45,7 +45,7 @@ macro_rules! of_groups {
             }),
             $(
                 attribute(concat!($name, "_reason"), Text, ONE, "why, where it was decided", |v| {
-                    text(decision(v, Group::$group)?.reason.as_str())
+                    text(decision(v, TermGroup::$group)?.reason.as_str())
                 })
                 .added(3),
                 attribute(
@@ -53,7 +53,7 @@ macro_rules! of_groups {
                     Int,
                     ONE,
                     "what decided: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
-                    |v| Some(Value::Int(decision(v, Group::$group)?.tier.into())),
+                    |v| Some(Value::Int(decision(v, TermGroup::$group)?.tier.into())),
                 )
                 .added(3),
                 attribute(
@@ -61,7 +61,7 @@ macro_rules! of_groups {
                     Float,
                     ONE,
                     "largest error that dropping makes, of what the reason names; absent: none is known",
-                    |v| number(decision(v, Group::$group)?.bound),
+                    |v| number(decision(v, TermGroup::$group)?.bound),
                 )
                 .added(3),
                 attribute(
@@ -69,7 +69,7 @@ macro_rules! of_groups {
                     Float,
                     ONE,
                     "largest error that is allowed; absent: no limit",
-                    |v| number(decision(v, Group::$group)?.limit),
+                    |v| number(decision(v, TermGroup::$group)?.limit),
                 )
                 .added(3),
             )*

@@ -10,7 +10,7 @@ use flexbody_eigen::{Accuracy, Method, Wanted};
 use flexbody_linalg::progress::SILENT;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use flexbody_model::{FeModel, RawModel, check};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::exact::count_below;
 use oracle::mesh::{Mesh, entries};
 
@@ -24,7 +24,7 @@ fn settings(accuracy: Accuracy, count: usize, frame: BodyFrame) -> ConvertSettin
     ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() }
 }
 
-fn model(kind: Kind, cells: [i32; 3], rule: MassRule) -> FeModel {
+fn model(kind: ElementKind, cells: [i32; 3], rule: MassRule) -> FeModel {
     let mesh = Mesh::block(kind, cells, [0.4, 0.15, 0.1]);
     check(mesh.assemble(&Material::STEEL, rule).raw_model()).expect("a sound body").model
 }
@@ -40,7 +40,7 @@ fn dense(a: &SymmetricMatrix, block: usize) -> Vec<Vec<f64>> {
 #[test]
 #[ignore = "slow"]
 fn eigenvalues_of_a_cuboid_of_tetrahedra_lie_between_their_bounds() {
-    let model = model(Kind::Tet4, [1, 1, 1], MassRule::Consistent);
+    let model = model(ElementKind::Tet4, [1, 1, 1], MassRule::Consistent);
     let conversion =
         convert(&model, &settings(Accuracy::Certified, 18, BodyFrame::Principal), SILENT).expect("sound");
     let guarantee = conversion.body.certificate().guarantee.as_ref().expect("certified");
@@ -60,8 +60,8 @@ fn certified_bodies_keep_their_guarantees_through_file_and_check() {
     let path = folder.path().join("body.flex.h5");
     // Singular masses and turned frames too.
     for (kind, rule, frame) in [
-        (Kind::Hex8, MassRule::Consistent, BodyFrame::Principal),
-        (Kind::Tet10, MassRule::Reduced, BodyFrame::Model),
+        (ElementKind::Hex8, MassRule::Consistent, BodyFrame::Principal),
+        (ElementKind::Tet10, MassRule::Reduced, BodyFrame::Model),
     ] {
         let model = model(kind, [3, 2, 1], rule);
         let conversion = convert(&model, &settings(Accuracy::Certified, 10, frame), SILENT).expect("sound");
@@ -85,7 +85,7 @@ fn certified_bodies_keep_their_guarantees_through_file_and_check() {
 
 #[test]
 fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
-    let model = model(Kind::Hex8, [2, 1, 1], MassRule::Consistent);
+    let model = model(ElementKind::Hex8, [2, 1, 1], MassRule::Consistent);
     let conversion =
         convert(&model, &settings(Accuracy::Certified, 6, BodyFrame::Principal), SILENT).expect("sound");
     let failed = |change: &dyn Fn(&mut flexbody_body::flex_body::Parts)| -> Vec<&'static str> {
@@ -116,7 +116,7 @@ fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
 #[test]
 fn guarantees_do_not_depend_on_the_number_of_threads() {
     // More rows than one task takes.
-    let model = model(Kind::Hex8, [10, 6, 4], MassRule::Consistent);
+    let model = model(ElementKind::Hex8, [10, 6, 4], MassRule::Consistent);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let settings = settings(Accuracy::Certified, 12, BodyFrame::Principal);
@@ -127,7 +127,7 @@ fn guarantees_do_not_depend_on_the_number_of_threads() {
 
 #[test]
 fn other_levels_store_no_guarantees() {
-    let model = model(Kind::Hex8, [2, 1, 1], MassRule::Consistent);
+    let model = model(ElementKind::Hex8, [2, 1, 1], MassRule::Consistent);
     let conversion =
         convert(&model, &settings(Accuracy::Standard, 6, BodyFrame::Principal), SILENT).expect("sound");
     assert_eq!(conversion.body.certificate().guarantee, None);
@@ -135,7 +135,7 @@ fn other_levels_store_no_guarantees() {
 
 /// A model whose mass is the same along all axes, changed by `change` of its entries (row, column, value).
 fn with_mass(change: impl Fn(u32, u32, f64) -> f64) -> RawModel {
-    let mesh = Mesh::block(Kind::Hex8, [2, 2, 1], [0.4, 0.15, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [2, 2, 1], [0.4, 0.15, 0.1]);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let changed: Vec<_> = entries(&raw.mass.matrix).map(|(i, j, v)| (i, j, change(i, j, v))).collect();
     let n = raw.mass.matrix.n_rows();

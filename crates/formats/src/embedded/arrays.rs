@@ -72,7 +72,7 @@ impl Content {
         }
         let (translations, axes) = if body.dimension() == 2 { (2, 1) } else { (3, 3) };
         let frames = frames(body, points);
-        let mut places = Places::new(body, &frames, translations, axes);
+        let mut places = EmbeddedFrames::new(body, &frames, translations, axes);
         let arrays = ARRAYS.iter().map(|array| {
             let padded = |matrix: &Option<Mat<f64>>| Some(Array::padded(matrix.as_ref()?, unit));
             let Constants { modal_mass, .. } = &constants;
@@ -99,7 +99,7 @@ impl Content {
 }
 
 /// The arrays of the frames.
-struct Places {
+struct EmbeddedFrames {
     nf: usize,
     translations: usize,
     number: Vec<i64>,
@@ -110,7 +110,7 @@ struct Places {
     second: Vec<f64>,
 }
 
-impl Places {
+impl EmbeddedFrames {
     fn new(body: &FlexBody, frames: &[ExportFrame], translations: usize, axes: usize) -> Self {
         let nf = body.n_modes();
         let mut places = Self {

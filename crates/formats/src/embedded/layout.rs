@@ -19,32 +19,32 @@ pub(crate) const ALIGNMENT: usize = 64;
 pub(crate) const CHECKED_FROM: usize = 24;
 
 /// Entries in front of the table of arrays: name, type, content. In this order, without gaps.
-pub(crate) const HEADER: &[(&str, Kind, &str)] = &[
-    ("magic", Kind::Bytes, "`FLEXBODY`"),
-    ("byte_order", Kind::U32, "0x01020304"),
-    ("version", Kind::U32, "1"),
-    ("size", Kind::U32, "bytes of the file"),
-    ("checksum", Kind::U32, "CRC-32 (that of gzip and zlib) of all bytes from here on"),
-    ("precision", Kind::U32, "bytes per number of the arrays: 8 (binary64) or 4 (binary32)"),
-    ("modes", Kind::U32, "nf"),
-    ("translations", Kind::U32, "T: axes that the body moves along, 3 or, in the plane, 2 (x, y)"),
-    ("axes", Kind::U32, "A: axes that it turns about, 3 or, in the plane, 1 (z)"),
-    ("frames", Kind::U32, "n: places of the body"),
-    ("terms", Kind::U32, "bit 0: `linear` has W1; bit 1: W2 is held; bit 2: W3 is held; others 0"),
-    ("length", Kind::F64, "unit of length in m"),
-    ("mass", Kind::F64, "unit of mass in kg"),
-    ("time", Kind::F64, "unit of time in s"),
+pub(crate) const HEADER: &[(&str, HeaderType, &str)] = &[
+    ("magic", HeaderType::Bytes, "`FLEXBODY`"),
+    ("byte_order", HeaderType::U32, "0x01020304"),
+    ("version", HeaderType::U32, "1"),
+    ("size", HeaderType::U32, "bytes of the file"),
+    ("checksum", HeaderType::U32, "CRC-32 (that of gzip and zlib) of all bytes from here on"),
+    ("precision", HeaderType::U32, "bytes per number of the arrays: 8 (binary64) or 4 (binary32)"),
+    ("modes", HeaderType::U32, "nf"),
+    ("translations", HeaderType::U32, "T: axes that the body moves along, 3 or, in the plane, 2 (x, y)"),
+    ("axes", HeaderType::U32, "A: axes that it turns about, 3 or, in the plane, 1 (z)"),
+    ("frames", HeaderType::U32, "n: places of the body"),
+    ("terms", HeaderType::U32, "bit 0: `linear` has W1; bit 1: W2 is held; bit 2: W3 is held; others 0"),
+    ("length", HeaderType::F64, "unit of length in m"),
+    ("mass", HeaderType::F64, "unit of mass in kg"),
+    ("time", HeaderType::F64, "unit of time in s"),
 ];
 
 /// Types of the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kind {
+pub(crate) enum HeaderType {
     Bytes,
     U32,
     F64,
 }
 
-impl Kind {
+impl HeaderType {
     fn bytes(self) -> usize {
         match self {
             Self::Bytes | Self::F64 => 8,

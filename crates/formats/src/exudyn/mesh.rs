@@ -61,7 +61,7 @@ impl Mesh {
     }
 
     fn of_places(body: &FlexBody, points: &Points) -> Self {
-        let mut places = Places { body, mesh: Self::empty(), columns: Vec::new() };
+        let mut places = MeshBuilder { body, mesh: Self::empty(), columns: Vec::new() };
         let held: &[Interface] = if points.of_interfaces() { body.interfaces() } else { &[] };
         for (number, interface) in held.iter().enumerate() {
             let frames = interface_frames(body, interface, number);
@@ -84,14 +84,14 @@ impl Mesh {
 }
 
 /// A mesh that grows place by place.
-struct Places<'b> {
+struct MeshBuilder<'b> {
     body: &'b FlexBody,
     mesh: Mesh,
     /// The motion of every node in each mode.
     columns: Vec<Vec<Vector3<f64>>>,
 }
 
-impl Places<'_> {
+impl MeshBuilder<'_> {
     /// Adds one node, or the six of a cross with this `arm` where the place turns; answers their indices.
     fn add(&mut self, frame: &ExportFrame, arm: f64) -> Vec<usize> {
         let column = |a: &Mat<f64>, j: usize| Vector3::from_fn(|k, _| a[(k, j)]);

@@ -9,7 +9,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
 use flexbody_base::text::InputFile;
-use flexbody_body::invariants::{Groups, Numbered};
+use flexbody_body::invariants::{Numbered, TermGroups};
 use flexbody_linalg::larger;
 use flexbody_model::SurfaceMesh;
 use nalgebra::{Matrix3, Vector3};
@@ -202,7 +202,7 @@ impl Given {
             i7: Matrix3::from_fn(|i, j| self.inertia[(i, j)]),
             i8: (0..nf).map(|j| Matrix3::from_fn(|a, b| self.x_psi_tilde[(a, at(b, j))])).collect(),
             i9: Some(Mat::from_fn(3 * nf, 3 * nf, i9)),
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         }
     }
 

@@ -82,7 +82,7 @@ impl ExportFormat for Gltf {
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
         let played = options.motion.as_ref().map(played);
-        let scene = Scene::new(body, modes(body, options), played.as_ref());
+        let scene = DrawnScene::new(body, modes(body, options), played.as_ref());
         let file = scene.file(played.as_ref())?;
         Ok(Exported::single(file))
     }
@@ -99,7 +99,7 @@ fn played(motion: &RecordedMotion) -> Played<'_> {
 }
 
 /// What the file shows.
-struct Scene<'b> {
+struct DrawnScene<'b> {
     body: &'b FlexBody,
     drawn: Drawn<'b>,
     names: Vec<String>,
@@ -111,7 +111,7 @@ struct Scene<'b> {
     largest: Vec<f64>,
 }
 
-impl<'b> Scene<'b> {
+impl<'b> DrawnScene<'b> {
     fn new(body: &'b FlexBody, modes: usize, played: Option<&Played<'_>>) -> Self {
         let largest = |played: &Played<'_>| -> Vec<f64> {
             let one = |j: usize| (0..played.len()).map(|at| played.q(at)[j].abs()).fold(0.0, f64::max);

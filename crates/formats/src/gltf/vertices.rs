@@ -24,7 +24,7 @@ impl Vertices {
     /// The vertices of what is drawn, whose points lie at `positions`.
     pub(super) fn new(drawn: &Drawn<'_>, positions: &[[f64; 3]]) -> Self {
         let (triangles, edges) = (drawn.triangles(), drawn.edges());
-        let mut groups = Groups::new(3 * triangles.len());
+        let mut groups = CornerGroups::new(3 * triangles.len());
         join_smooth(triangles, edges, &mut groups);
         let mut own =
             Self { points: Vec::new(), triangles: Vec::new(), edges: Vec::new(), normals: Vec::new() };
@@ -79,7 +79,7 @@ impl Vertices {
 }
 
 /// Joins the corners of triangles that share an edge which is no feature, and lie alike on both sides of it.
-fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut Groups) {
+fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut CornerGroups) {
     let sorted = |[a, b]: [u32; 2]| if a < b { [a, b] } else { [b, a] };
     let features: HashSet<[u32; 2]> = edges.iter().map(|edge| sorted(*edge)).collect();
     // Edge, its direction, and the corners at its ends, first the one with the lower point.
@@ -104,9 +104,9 @@ fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut Groups) 
 }
 
 /// Groups of corners: each points to another of its group, the first to itself.
-struct Groups(Vec<usize>);
+struct CornerGroups(Vec<usize>);
 
-impl Groups {
+impl CornerGroups {
     fn new(count: usize) -> Self {
         Self((0..count).collect())
     }

@@ -9,8 +9,8 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    Certificate, FlexBody, Frame, GeometricStiffness, Group, Interface, MassStructure, ModalChange, Modes,
-    Parts, ReferenceConditions, Source, Storage, TermDecision, diagonal_eigenvalues, reduced_residuals,
+    Certificate, FlexBody, Frame, GeometricStiffness, Interface, MassStructure, ModalChange, Modes, Parts,
+    ReferenceConditions, Source, Storage, TermDecision, TermGroup, diagonal_eigenvalues, reduced_residuals,
     rigid_motions,
 };
 use flexbody_body::invariants::{BodyFrame, FrameChoice, Invariants, identities, symmetric_part};
@@ -315,7 +315,7 @@ fn stacked<'f>(
     Mat::from_fn(3 * frames.len(), nf, |row, j| rows(&frames[row / 3]).map_or(0.0, |rows| rows[(row % 3, j)]))
 }
 
-fn not_in_file(group: Group, format: &str) -> TermDecision {
+fn not_in_file(group: TermGroup, format: &str) -> TermDecision {
     TermDecision {
         group,
         kept: false,

@@ -8,7 +8,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
 use flexbody_base::text::InputFile;
-use flexbody_body::invariants::{Groups, Invariants, Numbered, PrimaryData};
+use flexbody_body::invariants::{Invariants, Numbered, PrimaryData, TermGroups};
 use flexbody_linalg::larger;
 use flexbody_model::SurfaceMesh;
 use nalgebra::{Matrix3, Vector3};
@@ -138,7 +138,7 @@ impl Integrals {
             s: [0, 1, 2].map(|a| [0, 1, 2].map(|b| s(a, b))),
             modal_stiffness: Mat::zeros(nf, nf),
             general: None,
-            groups: Groups::ALL,
+            groups: TermGroups::ALL,
         };
         Invariants::new(body).numbered()
     }

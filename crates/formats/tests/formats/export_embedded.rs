@@ -5,7 +5,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::Code;
 use flexbody_body::basis::{BasisChoice, CraigBampton, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_formats::export::{ExportFrame, ExportOptions, Exported, Points, frames};
@@ -372,7 +372,7 @@ fn geometric_stiffness_damping_and_modes_of_any_mass_are_held() {
         assert_same(&format!("kind {at}"), &body, "double", &["-O3"]);
         assert_same(&format!("kind {at}"), &body, "float", &["-O2"]);
         // Geometric stiffness for spin is there without W2, and the rest without W3.
-        let bare = with_groups(&body, Groups::NONE);
+        let bare = with_groups(&body, TermGroups::NONE);
         assert_same(&format!("kind {at}, bare"), &bare, "double", &["-O2"]);
     }
 }

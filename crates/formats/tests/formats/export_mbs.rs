@@ -13,7 +13,7 @@ use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::FeModel;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::{body_of, fixture, soft_block, stressed};
 use oracle::mesh::{Mesh, grid};
 use oracle::partial::{combinations, with_groups};
@@ -170,7 +170,7 @@ fn places(body: &FlexBody, found: &ImportedFile, format: &str, case: &str) {
 /// A block without symmetry, its model and its body about a point that is not its centre of mass.
 fn block() -> (FeModel, FlexBody) {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([3, 2, 2]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 2, 2]), |[x, y, z]| {
         [0.4 + 0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y) - 0.3]
     });
     let raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();

@@ -3,7 +3,7 @@
 
 use faer::Mat;
 use flexbody_base::text::InputFile;
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_formats::export::{ExportFormat, ExportOptions, Points};
 use flexbody_formats::find_import_format;
@@ -404,7 +404,7 @@ fn bodies_without_groups_and_with_damping_are_written() {
         let failed: Vec<_> = imported.checks.iter().filter_map(|check| check.finding()).collect();
         assert!(failed.is_empty(), "{groups:?}: {failed:?}");
         assert_eq!(imported.body.inertia.groups, groups);
-        assert!(groups == Groups::ALL || text(&partial, &ExportOptions::default()).contains("without W"));
+        assert!(groups == TermGroups::ALL || text(&partial, &ExportOptions::default()).contains("without W"));
     }
     let mut parts = body.into_parts();
     parts.modes.damping_ratio = vec![0.02; MODES];

@@ -14,7 +14,7 @@ use flexbody_formats::{export, find_format};
 use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::FeModel;
 use hdf5_metno as hdf5;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::mesh::{Mesh, grid};
 use proptest::prelude::*;
@@ -24,7 +24,7 @@ use std::sync::LazyLock;
 /// A small block without symmetry and its model.
 static BLOCK: LazyLock<(FeModel, FlexBody)> = LazyLock::new(|| {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([2, 2, 1]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([2, 2, 1]), |[x, y, z]| {
         [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
     });
     let raw = mesh.assemble(&rubber, MassRule::Consistent).raw_model();

@@ -23,7 +23,7 @@ pub(super) struct BadLine {
 
 /// A parsed piece of the file.
 #[derive(Debug, Default)]
-pub(super) struct Piece {
+pub(super) struct EntryLines {
     pub entries: Vec<Entry>,
     pub lines: usize,
     /// The first few bad lines, and how many there are.
@@ -37,8 +37,8 @@ pub(super) struct Piece {
 }
 
 /// Parses whole lines.
-pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
-    let mut piece = Piece { entries: Vec::with_capacity(most_entries(text)), ..Piece::default() };
+pub(super) fn parse(text: &[u8], limits: Limits) -> EntryLines {
+    let mut piece = EntryLines { entries: Vec::with_capacity(most_entries(text)), ..EntryLines::default() };
     let mut at = 0;
     while at < text.len() {
         piece.lines += 1;
@@ -66,7 +66,7 @@ pub(super) fn parse(text: &[u8], limits: Limits) -> Piece {
     piece
 }
 
-impl Piece {
+impl EntryLines {
     fn push(&mut self, entry: Entry, number: &[u8]) {
         if self.entries.len() < COUNTED && entry.value != 0.0 {
             self.written = self.written.max(written_digits(number));

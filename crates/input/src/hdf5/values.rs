@@ -21,13 +21,13 @@ const SMALL_CHUNK: u64 = 1 << 20;
 
 /// Type of the numbers of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum NumberKind {
     Whole,
     Single,
     Double,
 }
 
-impl Kind {
+impl NumberKind {
     fn of(descriptor: &TypeDescriptor) -> Option<Self> {
         match descriptor {
             TypeDescriptor::Integer(_) | TypeDescriptor::Unsigned(_) => Some(Self::Whole),
@@ -43,7 +43,7 @@ pub(super) struct Numbers {
     pub dataset: Dataset,
     /// Path within the file, for messages.
     pub name: String,
-    kind: Kind,
+    kind: NumberKind,
 }
 
 impl Numbers {
@@ -55,7 +55,7 @@ impl Numbers {
     pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
         let (dataset, at) = stored_here(group, members, group_name, name)?;
         let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
-        let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| Kind::of(&t));
+        let kind = dataset.dtype().and_then(|t| t.to_descriptor()).ok().and_then(|t| NumberKind::of(&t));
         let kind = kind.ok_or_else(|| {
             refuse(Code::MatrixKind, "holds no real numbers (complex, boolean or structured values?)".into())
         })?;
@@ -64,7 +64,7 @@ impl Numbers {
     }
 
     pub(super) fn is_single_precision(&self) -> bool {
-        self.kind == Kind::Single
+        self.kind == NumberKind::Single
     }
 }
 
@@ -152,7 +152,7 @@ pub(super) struct Vector {
     dimensions: usize,
     axis: usize,
     pub len: usize,
-    kind: Kind,
+    kind: NumberKind,
     /// Values per chunk, 1 when not chunked.
     pub chunk: usize,
 }
@@ -179,7 +179,7 @@ impl Vector {
     }
 
     pub(super) fn is_single_precision(&self) -> bool {
-        self.kind == Kind::Single
+        self.kind == NumberKind::Single
     }
 
     pub(super) fn floats(&self, range: Range<usize>) -> Found<Vec<f64>> {
@@ -188,7 +188,7 @@ impl Vector {
 
     /// Whole numbers; 64-bit ones beyond i64 come out as its largest.
     pub(super) fn integers(&self, range: Range<usize>) -> Found<Vec<i64>> {
-        if self.kind == Kind::Whole {
+        if self.kind == NumberKind::Whole {
             return self.read::<i64>(range);
         }
         // MATLAB's h5write stores indices as doubles.
@@ -218,7 +218,7 @@ impl Vector {
 
 /// The whole numbers of a small attribute.
 pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
-    let kind = Kind::of(&attribute.dtype().ok()?.to_descriptor().ok()?)?;
+    let kind = NumberKind::of(&attribute.dtype().ok()?.to_descriptor().ok()?)?;
     let shape = attribute.shape();
     let scalar = attribute.is_scalar();
     // A null dataspace has no shape and no value.
@@ -226,7 +226,7 @@ pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
         return None;
     }
     match kind {
-        Kind::Whole => attribute.read_raw::<i64>().ok(),
+        NumberKind::Whole => attribute.read_raw::<i64>().ok(),
         _ => {
             let numbers = attribute.read_raw::<f64>().ok()?;
             numbers.iter().all(|v| v.fract() == 0.0).then(|| numbers.iter().map(|&v| v as i64).collect())

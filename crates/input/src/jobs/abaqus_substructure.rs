@@ -183,10 +183,10 @@ impl SubstructureFile<'_> {
     }
 
     /// The numbers below a card.
-    fn values(&self, card: &Card) -> Found<Vec<Piece>> {
+    fn values(&self, card: &Card) -> Found<Vec<NumberLines>> {
         let (first, text) = self.deck.text(card);
         let texts: Vec<&[u8]> = line_aligned(text).collect();
-        let pieces: Vec<Piece> = texts.into_par_iter().map(Piece::parse).collect();
+        let pieces: Vec<NumberLines> = texts.into_par_iter().map(NumberLines::parse).collect();
         let mut above = first;
         for piece in &pieces {
             if let Some((line, text)) = &piece.bad {
@@ -203,7 +203,7 @@ impl SubstructureFile<'_> {
 
 /// Numbers of some lines.
 #[derive(Default)]
-struct Piece {
+struct NumberLines {
     values: Vec<f64>,
     written: u8,
     lines: usize,
@@ -211,7 +211,7 @@ struct Piece {
     bad: Option<(usize, String)>,
 }
 
-impl Piece {
+impl NumberLines {
     fn parse(text: &[u8]) -> Self {
         let mut piece = Self { values: Vec::with_capacity(text.len() / 20), ..Self::default() };
         for line in lines(text) {

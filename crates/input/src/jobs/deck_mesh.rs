@@ -41,7 +41,7 @@ impl DeckMesh {
     /// # Errors
     /// FB110 for lines that cannot be read, FB111 for cards that make nodes in ways that are not read.
     pub(super) fn of(deck: &Deck) -> Found<Self> {
-        let mut reading = Reading { deck, bad: Vec::new(), bad_count: 0 };
+        let mut reading = DeckMeshReader { deck, bad: Vec::new(), bad_count: 0 };
         let mut scopes = Scopes::default();
         for card in deck.cards() {
             reading.card(card, &mut scopes);
@@ -200,13 +200,13 @@ fn power_of_ten_above(number: i64) -> i64 {
 }
 
 /// A deck while it is read.
-struct Reading<'d> {
+struct DeckMeshReader<'d> {
     deck: &'d Deck,
     bad: Vec<Diagnostic>,
     bad_count: usize,
 }
 
-impl Reading<'_> {
+impl DeckMeshReader<'_> {
     fn card(&mut self, card: &Card, scopes: &mut Scopes) {
         match card.keyword.as_str() {
             "PART" => scopes.part = Some(card.name("NAME").unwrap_or_default()),

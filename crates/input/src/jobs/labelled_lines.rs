@@ -50,7 +50,7 @@ fn is_data(line: &[u8]) -> bool {
 
 /// The lines of a file.
 struct LabelledLines {
-    pieces: Vec<Piece>,
+    pieces: Vec<LabelledEntries>,
 }
 
 impl LabelledLines {
@@ -61,7 +61,7 @@ impl LabelledLines {
         let mut pieces = Vec::new();
         while let Some(block) = blocks.next().map_err(|e| one(file.failed(&e)))? {
             let texts: Vec<&[u8]> = line_aligned(&block).collect();
-            pieces.par_extend(texts.into_par_iter().map(Piece::parse));
+            pieces.par_extend(texts.into_par_iter().map(LabelledEntries::parse));
             blocks.take_back(block);
         }
         // What is wrong with a file that changed meanwhile may be wrong for this reason.
@@ -88,7 +88,7 @@ impl LabelledLines {
     }
 }
 
-fn bad_lines(pieces: &[Piece], path: &Path) -> Vec<Diagnostic> {
+fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
     let mut before = 0;
     let mut told = Vec::new();
     for piece in pieces {
@@ -104,7 +104,7 @@ fn bad_lines(pieces: &[Piece], path: &Path) -> Vec<Diagnostic> {
 
 /// Some lines. Rows and columns of the entries are places in `labels`, where a label may stand more than once.
 #[derive(Default)]
-struct Piece {
+struct LabelledEntries {
     entries: Vec<Entry>,
     labels: Vec<DofLabel>,
     written: u8,
@@ -113,7 +113,7 @@ struct Piece {
     bad: Vec<(usize, String)>,
 }
 
-impl Piece {
+impl LabelledEntries {
     fn parse(text: &[u8]) -> Self {
         let mut piece = Self { entries: Vec::with_capacity(most_entries(text)), ..Self::default() };
         let mut recent = Recent::new();

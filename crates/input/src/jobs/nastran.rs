@@ -16,7 +16,7 @@ use super::{Found, JobFile, JobModel, JobReader, condensed};
 use crate::bulk_cards::is_bulk_data;
 use crate::node_file::{NodeFile, Unresolved};
 use bulk::Bulk;
-use elimination::Places;
+use elimination::GridPlaces;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_model::{Elements, NodeAxes as Axes, Nodes};
@@ -57,7 +57,7 @@ impl JobReader for Nastran {
         }
         let (nodes, axes) = places(&bulk)?;
         let dmigs = std::mem::take(&mut bulk.dmigs);
-        let places = Places::new(&nodes, &axes);
+        let places = GridPlaces::new(&nodes, &axes);
         let matrices = Matrices::of(&bulk, dmigs, job, &places)?;
         let mut diagnostics = told(&bulk, path);
         let matrices = matrices.without_followers(&mut diagnostics).turned(&axes)?;

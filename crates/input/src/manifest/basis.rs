@@ -1,7 +1,7 @@
 //! The table `[basis]`: what the command line may say about the basis, kept with the model. What the command
 //! line says replaces it.
 
-use super::{ManifestWalk, MatrixLocation, Table};
+use super::{ManifestWalk, MatrixLocation, TomlTable};
 use crate::LoadSource;
 use flexbody_base::diagnostic::Code;
 use std::path::Path;
@@ -12,7 +12,7 @@ pub(super) const BASIS: &[&str] = &["residual_vectors", "loads"];
 impl ManifestWalk<'_, '_> {
     /// The loads of residual vectors; empty without the table, and with something in `found` when it is
     /// wrong.
-    pub(super) fn residual_vectors(&mut self, top: &Table) -> Vec<LoadSource> {
+    pub(super) fn residual_vectors(&mut self, top: &TomlTable) -> Vec<LoadSource> {
         let Some((table, _)) = self.table(top, "basis") else { return Vec::new() };
         self.known_keys(table, "[basis]", BASIS);
         let mut loads = self.load_sets(table);
@@ -21,13 +21,13 @@ impl ManifestWalk<'_, '_> {
     }
 
     /// Nodal forces of the user.
-    fn load_file(&mut self, table: &Table) -> Option<LoadSource> {
+    fn load_file(&mut self, table: &TomlTable) -> Option<LoadSource> {
         let file = self.string(table, "loads")?;
         let folder = self.path.parent().unwrap_or(Path::new(""));
         Some(LoadSource::File(MatrixLocation::parse(file).relative_to(folder)))
     }
 
-    fn load_sets(&mut self, table: &Table) -> Vec<LoadSource> {
+    fn load_sets(&mut self, table: &TomlTable) -> Vec<LoadSource> {
         const EXPECTED: &str = "a list of \"centrifugal\" and \"interfaces\", each also with a frequency as in \"interfaces@500\"";
         let Some(value) = table.get("residual_vectors") else { return Vec::new() };
         let DeValue::Array(list) = value.get_ref() else {

@@ -1,6 +1,6 @@
 //! The table `[damping]`.
 
-use super::{ManifestWalk, MatrixLocation, Table};
+use super::{ManifestWalk, MatrixLocation, TomlTable};
 use flexbody_base::diagnostic::Code;
 use flexbody_model::{Damping, damping_bands};
 use std::path::Path;
@@ -10,7 +10,7 @@ pub(super) const RAYLEIGH: &[&str] = &["alpha", "beta"];
 
 impl ManifestWalk<'_, '_> {
     /// `None` without the table, and with something in `found` when it is wrong.
-    pub(super) fn damping(&mut self, top: &Table) -> Option<Damping<MatrixLocation>> {
+    pub(super) fn damping(&mut self, top: &TomlTable) -> Option<Damping<MatrixLocation>> {
         let (table, span) = self.table(top, "damping")?;
         self.known_keys(table, "[damping]", DAMPING);
         let given: Vec<&str> = DAMPING.iter().copied().filter(|key| table.contains_key(*key)).collect();

@@ -1,6 +1,6 @@
 //! The tables `[[geometric_stiffness]]`.
 
-use super::{ManifestWalk, MatrixLocation, Table};
+use super::{ManifestWalk, MatrixLocation, TomlTable};
 use flexbody_base::diagnostic::Code;
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 use std::ops::Range;
@@ -21,7 +21,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[&str] = &[
 
 impl ManifestWalk<'_, '_> {
     /// Whatever is not in the list is in `found`.
-    pub(super) fn geometric_stiffness(&mut self, top: &Table) -> Vec<GeometricStiffness<MatrixLocation>> {
+    pub(super) fn geometric_stiffness(&mut self, top: &TomlTable) -> Vec<GeometricStiffness<MatrixLocation>> {
         const EXPECTED: &str = "a list of tables: write [[geometric_stiffness]]";
         let Some(value) = top.get("geometric_stiffness") else { return Vec::new() };
         let DeValue::Array(list) = value.get_ref() else {
@@ -40,7 +40,7 @@ impl ManifestWalk<'_, '_> {
 
     fn one_geometric_stiffness(
         &mut self,
-        table: &Table,
+        table: &TomlTable,
         span: Range<usize>,
     ) -> Option<GeometricStiffness<MatrixLocation>> {
         self.known_keys(table, "[[geometric_stiffness]]", GEOMETRIC_STIFFNESS);
@@ -55,7 +55,7 @@ impl ManifestWalk<'_, '_> {
     }
 
     /// The load whose stress it is: one key with the axis (or the name of the load) as its value.
-    fn unit_load(&mut self, table: &Table, span: Range<usize>) -> Option<UnitLoad> {
+    fn unit_load(&mut self, table: &TomlTable, span: Range<usize>) -> Option<UnitLoad> {
         let given: Vec<&str> =
             LoadKind::NAMES.iter().copied().filter(|name| table.contains_key(*name)).collect();
         let &[key] = given.as_slice() else {

@@ -1,6 +1,6 @@
 //! The tables `[[interface]]`.
 
-use super::{ManifestWalk, Table, Value, integer, real};
+use super::{ManifestWalk, TomlTable, Value, integer, real};
 use crate::model_files::{InterfaceNodes, InterfaceSource};
 use flexbody_base::diagnostic::Code;
 use flexbody_model::{Coupling, Reference};
@@ -31,7 +31,7 @@ const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane
 
 impl ManifestWalk<'_, '_> {
     /// `None` when anything is wrong with the list.
-    pub(super) fn interfaces(&mut self, top: &Table, dimension: usize) -> Option<Vec<InterfaceSource>> {
+    pub(super) fn interfaces(&mut self, top: &TomlTable, dimension: usize) -> Option<Vec<InterfaceSource>> {
         let Some(value) = top.get("interface") else {
             return Some(Vec::new());
         };
@@ -63,7 +63,12 @@ impl ManifestWalk<'_, '_> {
         Some(interfaces)
     }
 
-    fn interface(&mut self, table: &Table, span: Range<usize>, dimension: usize) -> Option<InterfaceSource> {
+    fn interface(
+        &mut self,
+        table: &TomlTable,
+        span: Range<usize>,
+        dimension: usize,
+    ) -> Option<InterfaceSource> {
         self.known_keys(table, "[[interface]]", INTERFACE);
         if !table.contains_key("name") {
             self.complain(Code::ManifestSyntax, span.clone(), "interface has no name".into());
@@ -107,7 +112,7 @@ impl ManifestWalk<'_, '_> {
     /// Which nodes an interface has: one key says it.
     fn interface_nodes(
         &mut self,
-        table: &Table,
+        table: &TomlTable,
         name: &str,
         span: Range<usize>,
         dimension: usize,

@@ -1,6 +1,6 @@
 //! Regions whose nodes an interface has: `box`, `cylinder`, `plane`, `nearest`.
 
-use super::{ManifestWalk, Table, Value, integer, real};
+use super::{ManifestWalk, TomlTable, Value, integer, real};
 use crate::region::Region;
 use flexbody_base::diagnostic::Code;
 use std::ops::Range;
@@ -51,7 +51,7 @@ impl ManifestWalk<'_, '_> {
 
     fn place(
         &mut self,
-        table: &Table,
+        table: &TomlTable,
         region: &str,
         key: &str,
         span: &Range<usize>,
@@ -68,7 +68,7 @@ impl ManifestWalk<'_, '_> {
         None
     }
 
-    fn length(&mut self, table: &Table, region: &str, key: &str, span: &Range<usize>) -> Option<f64> {
+    fn length(&mut self, table: &TomlTable, region: &str, key: &str, span: &Range<usize>) -> Option<f64> {
         let Some(value) = table.get(key) else { return self.lacks(region, key, span) };
         let length = real(value).filter(|length| length.is_finite() && *length >= 0.0);
         if length.is_none() {
@@ -78,7 +78,7 @@ impl ManifestWalk<'_, '_> {
     }
 
     /// A largest distance, or a list of the least and the largest.
-    fn radius(&mut self, table: &Table, span: &Range<usize>) -> Option<[f64; 2]> {
+    fn radius(&mut self, table: &TomlTable, span: &Range<usize>) -> Option<[f64; 2]> {
         let Some(value) = table.get("radius") else { return self.lacks("cylinder", "radius", span) };
         let given: Option<Vec<f64>> = match value.get_ref() {
             DeValue::Array(list) => list.iter().map(real).collect(),
@@ -95,7 +95,7 @@ impl ManifestWalk<'_, '_> {
         }
     }
 
-    fn count(&mut self, table: &Table) -> Option<usize> {
+    fn count(&mut self, table: &TomlTable) -> Option<usize> {
         let Some(value) = table.get("count") else { return Some(1) };
         let count = integer(value).filter(|count| *count > 0);
         if count.is_none() {

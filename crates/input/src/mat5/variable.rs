@@ -16,7 +16,7 @@ const BOTH_TRIANGLES: &str = "save both triangles: K + tril(K, -1)'";
 
 /// What a variable holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum VariableKind {
     Sparse,
     /// A full array of real numbers with two extents.
     Full,
@@ -27,7 +27,7 @@ pub(super) enum Kind {
 /// A variable whose head has been read.
 pub(super) struct Variable<'a> {
     pub name: String,
-    pub kind: Kind,
+    pub kind: VariableKind,
     pub rows: u64,
     pub columns: u64,
     single: bool,
@@ -48,13 +48,13 @@ impl<'a> Variable<'a> {
         let flags = flags.whole(0).unwrap_or(0);
         let extent = |k: usize| extents.whole(k).and_then(|extent| u64::try_from(extent).ok()).unwrap_or(0);
         let kind = match (flags & 0xff, extents.len()) {
-            (5, 2) => Kind::Sparse,
-            (6..=15, 2) => Kind::Full,
-            (6..=15, _) => Kind::Other("an array of more than two extents"),
-            (1, _) => Kind::Other("a cell array"),
-            (2, _) => Kind::Other("a struct"),
-            (4, _) => Kind::Other("a text"),
-            _ => Kind::Other("an object"),
+            (5, 2) => VariableKind::Sparse,
+            (6..=15, 2) => VariableKind::Full,
+            (6..=15, _) => VariableKind::Other("an array of more than two extents"),
+            (1, _) => VariableKind::Other("a cell array"),
+            (2, _) => VariableKind::Other("a struct"),
+            (4, _) => VariableKind::Other("a text"),
+            _ => VariableKind::Other("an object"),
         };
         let not_real = match flags >> 8 {
             flags if flags & 8 != 0 => Some("complex numbers"),
@@ -93,17 +93,17 @@ impl<'a> Variable<'a> {
         let mut elements = Elements::of(self.body, self.compressed, self.order)?;
         Self::head(&mut elements)?;
         let raw = match (self.kind, self.not_real) {
-            (Kind::Other(what), _) | (_, Some(what)) => {
+            (VariableKind::Other(what), _) | (_, Some(what)) => {
                 let message = format!("variable `{}` holds {what}, not a matrix of real numbers", self.name);
                 return Err(Diagnostic::new(Code::MatrixKind, message).with_help(REAL));
             }
-            (Kind::Sparse, None) => {
+            (VariableKind::Sparse, None) => {
                 let (indices, values) = (self.most_entries() * 4, self.most_entries() * 8);
                 let pointers = self.columns.saturating_add(1).saturating_mul(8);
                 let own = [elements.next(indices)?, elements.next(pointers)?, elements.next(values)?];
                 self.sparse(own, path)?
             }
-            (Kind::Full, None) => {
+            (VariableKind::Full, None) => {
                 let places = self.rows.saturating_mul(self.columns);
                 self.full(&elements.next(places.saturating_mul(8))?, path)?
             }

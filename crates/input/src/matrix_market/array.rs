@@ -20,7 +20,7 @@ type Found<T> = Result<T, Vec<Diagnostic>>;
 pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Array> {
     let damaged = |e: std::io::Error| vec![broken(file.path(), &e)];
     let mut blocks = Blocks::of(file, compression);
-    let mut reading = Reading::default();
+    let mut reading = ArrayReader::default();
     while let Some(block) = blocks.next().map_err(damaged)? {
         for line in block.split(|&b| b == b'\n') {
             reading.line += 1;
@@ -64,7 +64,7 @@ fn banner(line: &[u8]) -> Found<()> {
 
 /// What has been read below the first line.
 #[derive(Default)]
-struct Reading {
+struct ArrayReader {
     line: usize,
     /// Rows, columns and their product.
     size: Option<(usize, usize, usize)>,
@@ -72,7 +72,7 @@ struct Reading {
     written: u8,
 }
 
-impl Reading {
+impl ArrayReader {
     fn content(&mut self, line: &[u8]) -> Result<(), Diagnostic> {
         let content = line.split(|&b| b == b'%').next().unwrap_or(line);
         let mut fields = content.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());

@@ -17,7 +17,7 @@ pub(super) fn recognises(head: &[u8]) -> bool {
 
 /// What is read so far.
 #[derive(Default)]
-struct Reading {
+struct AnsysListReader {
     table: ModeTable,
     /// Load step and substep of the mode.
     mode: Option<(i64, i64)>,
@@ -27,7 +27,7 @@ struct Reading {
 
 /// Reads all lists; pages and lists of one substep are one mode.
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
-    let mut reading = Reading::default();
+    let mut reading = AnsysListReader::default();
     for (at, line) in lines(file) {
         let words = numbers_apart(line);
         let first = words.first().map(Vec::as_slice).unwrap_or_default();
@@ -49,7 +49,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
             reading.columns = None;
         }
     }
-    let Reading { mut table, .. } = reading;
+    let AnsysListReader { mut table, .. } = reading;
     if table.len() == 0 {
         let help = "SET,1,K and PRNSOL,DOF for every mode K";
         return Err(unreadable(file, "no displacements of modes are in the list", help));
@@ -59,7 +59,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     Ok(table)
 }
 
-impl Reading {
+impl AnsysListReader {
     /// `LOAD STEP=     1  SUBSTEP=     7`, and below it `FREQ=    3907.0      LOAD CASE=   0`.
     fn head(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
         self.columns = None;

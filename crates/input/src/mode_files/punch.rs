@@ -25,7 +25,7 @@ const COLUMNS: usize = 72;
 
 /// What the lines below a head are.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum SectionKind {
     /// Shapes of modes.
     Modes,
     /// Anything else.
@@ -35,7 +35,7 @@ enum Kind {
 /// Reads the eigenvectors of all modes.
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut table = ModeTable::new(DIGITS, DIGITS).along_nodes();
-    let mut kind = Kind::Other;
+    let mut kind = SectionKind::Other;
     let mut is_mode = false;
     // The node whose rotations are on the next line.
     let mut node: Option<i64> = None;
@@ -46,7 +46,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                 return Err(syntax(file, at, format!("the second line of grid point {node} is missing")));
             }
             kind = kind_of(line, kind);
-            if kind == Kind::Modes {
+            if kind == SectionKind::Modes {
                 refuse_other_forms(file, at, line)?;
                 match eigenvalue(file, at, line)? {
                     Some(value) => {
@@ -56,7 +56,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                     None => is_mode &= !line.starts_with(b"$TITLE"),
                 }
             }
-        } else if kind == Kind::Modes && is_mode && !line.trim_ascii().is_empty() {
+        } else if kind == SectionKind::Modes && is_mode && !line.trim_ascii().is_empty() {
             node = grid_line(&mut table, file, at, line, node)?;
         }
     }
@@ -74,7 +74,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 }
 
 /// What a line of the head says of the lines below it.
-fn kind_of(line: &[u8], before: Kind) -> Kind {
+fn kind_of(line: &[u8], before: SectionKind) -> SectionKind {
     const HEADS: &[&[u8]] = &[
         b"$TITLE",
         b"$SUBTITLE",
@@ -87,9 +87,9 @@ fn kind_of(line: &[u8], before: Kind) -> Kind {
     ];
     let line = line.trim_ascii();
     match line {
-        b"$EIGENVECTOR" | b"$DISPLACEMENTS" => Kind::Modes,
+        b"$EIGENVECTOR" | b"$DISPLACEMENTS" => SectionKind::Modes,
         _ if HEADS.iter().any(|head| line.starts_with(head)) => before,
-        _ => Kind::Other,
+        _ => SectionKind::Other,
     }
 }
 

@@ -1,7 +1,7 @@
 //! Binary files: records of Fortran, each between two lengths, in either order of bytes and with words of
 //! four or eight bytes.
 
-use super::layout::{Column, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
+use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::InputFile;
 
@@ -54,7 +54,7 @@ impl Binary {
                 let column = header.column(column)?;
                 let bytes = at..next;
                 at = next;
-                let Column::Number(column) = column else { break };
+                let ColumnRecord::Number(column) = column else { break };
                 stored.add(column, record.len() / size, bytes, 0);
             }
             all.push(stored);
@@ -73,7 +73,7 @@ impl Binary {
         while let Some((record, next)) = self.record(bytes, at) {
             at = next;
             let column = self.integer(record, 0).ok_or_else(|| misread(header))?;
-            let Column::Number(column) = header.column(column)? else { break };
+            let ColumnRecord::Number(column) = header.column(column)? else { break };
             self.column(record, header, column, &mut columns)?;
         }
         Ok(columns)

@@ -80,10 +80,12 @@ impl Header {
     }
 
     /// Checks a column number: within the matrix, or the one after it, which ends the matrix.
-    pub(super) fn column(&self, column: i64) -> Result<Column, Diagnostic> {
+    pub(super) fn column(&self, column: i64) -> Result<ColumnRecord, Diagnostic> {
         match u64::try_from(column) {
-            Ok(column) if column >= 1 && column <= self.columns => Ok(Column::Number(column as u32 - 1)),
-            Ok(column) if column == self.columns + 1 => Ok(Column::End),
+            Ok(column) if column >= 1 && column <= self.columns => {
+                Ok(ColumnRecord::Number(column as u32 - 1))
+            }
+            Ok(column) if column == self.columns + 1 => Ok(ColumnRecord::End),
             _ => {
                 let message =
                     format!("matrix {} has {} columns, found column {column}", self.name, self.columns);
@@ -112,7 +114,7 @@ pub(super) fn unpadded(name: &[u8]) -> &[u8] {
 }
 
 /// What a column record is.
-pub(super) enum Column {
+pub(super) enum ColumnRecord {
     Number(u32),
     End,
 }

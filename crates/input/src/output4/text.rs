@@ -1,7 +1,7 @@
 //! Text files: a header with the format of the numbers, a line for each column or string, and the numbers,
 //! side by side without blanks.
 
-use super::layout::{Column, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
+use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
 use crate::bulk_cards::whole;
 use crate::coordinates::{excerpt, real};
 use crate::digits::written_digits;
@@ -133,7 +133,7 @@ impl<'a> Text<'a> {
         let [column, start, words] =
             integers(line).ok_or_else(|| self.expected("column, row and number of words", line))?;
         let values = match header.column(column).map_err(|d| d.at_line(self.line))? {
-            Column::End => {
+            ColumnRecord::End => {
                 // The number that stands there has a format of its own.
                 let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
                 return match (0..lines).all(|_| self.next_line().is_some()) {
@@ -141,10 +141,10 @@ impl<'a> Text<'a> {
                     false => Err(cut_off(&header.name)),
                 };
             }
-            Column::Number(column) if start != 0 => {
+            ColumnRecord::Number(column) if start != 0 => {
                 (column, self.string(header, (column, start, words), format, place)?)
             }
-            Column::Number(column) => (column, self.strings(header, column, words, format, place)?),
+            ColumnRecord::Number(column) => (column, self.strings(header, column, words, format, place)?),
         };
         Ok(Some(values))
     }

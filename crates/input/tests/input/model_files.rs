@@ -4,7 +4,7 @@
 use flexbody_base::units::UnitSystem;
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::CscMatrix;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{DofOrder, Numbering, Triangle, reordered, write_model};
 use oracle::mesh::{Mesh, entries};
 
@@ -15,7 +15,7 @@ fn nonzeros(matrix: &CscMatrix) -> Vec<(u32, u32, f64)> {
 
 #[test]
 fn a_model_read_from_files_is_the_one_written() {
-    let mesh = Mesh::bracket(Kind::Tet10, 3, 1, 0.1);
+    let mesh = Mesh::bracket(ElementKind::Tet10, 3, 1, 0.1);
     let mut raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     raw.units = UnitSystem::parse("m", "kg", "s").expect("known units");
     for (order, numbering) in [

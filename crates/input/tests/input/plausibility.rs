@@ -6,7 +6,7 @@ use flexbody_base::error::{Error, ExitCode};
 use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{Coupling, DofLabel, FeModel, NodeSet, Plausibility, RawModel, Reference};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, entries};
 use oracle::random::Random;
@@ -199,7 +199,7 @@ fn two_exchanged_nodes_are_told() {
 fn nodes_of_one_element_that_are_exchanged_are_named() {
     // A corner and the middle of an edge that belong to one element alone: K couples them with the same
     // nodes.
-    let raw = Mesh::block(Kind::Hex20, [3, 1, 1], [3.0, 1.0, 1.0])
+    let raw = Mesh::block(ElementKind::Hex20, [3, 1, 1], [3.0, 1.0, 1.0])
         .assemble(&Material::STEEL, MassRule::Consistent)
         .raw_model();
     let at = |x: [f64; 3]| raw.nodes.positions.iter().position(|p| *p == x).expect("a node");
@@ -216,7 +216,7 @@ fn nodes_of_one_element_that_are_exchanged_are_named() {
 #[test]
 fn mass_of_another_mesh_with_as_many_nodes_is_refused() {
     let block = |cells| {
-        Mesh::block(Kind::Hex8, cells, [3.0, 2.0, 1.0])
+        Mesh::block(ElementKind::Hex8, cells, [3.0, 2.0, 1.0])
             .assemble(&Material::STEEL, MassRule::Consistent)
             .raw_model()
     };

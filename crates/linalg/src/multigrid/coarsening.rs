@@ -118,7 +118,7 @@ pub(super) fn strong_couplings<const B: usize>(
 }
 
 /// The groups of a level, with an orthonormal basis of the motions of each.
-pub(super) struct Groups<const B: usize, const C: usize> {
+pub(super) struct Aggregates<const B: usize, const C: usize> {
     pub count: usize,
     /// Group of each node.
     of_node: Vec<u32>,
@@ -128,7 +128,7 @@ pub(super) struct Groups<const B: usize, const C: usize> {
     pub motions: Motions<C, C>,
 }
 
-impl<const B: usize, const C: usize> Groups<B, C> {
+impl<const B: usize, const C: usize> Aggregates<B, C> {
     pub(super) fn new(strong: &Strong, motions: &Motions<B, C>) -> Self {
         let (of_node, count) = aggregates(strong);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];

@@ -2,7 +2,8 @@
 
 use super::blocks::{BlockMatrix, Rows};
 use super::coarsening::{
-    Block, Groups, Motions, SymmetricBlocks, diagonal, galerkin, inverse, narrow, stored, strong_couplings,
+    Aggregates, Block, Motions, SymmetricBlocks, diagonal, galerkin, inverse, narrow, stored,
+    strong_couplings,
 };
 use super::smoother::Smoother;
 
@@ -39,7 +40,7 @@ impl<const B: usize, const C: usize> Level<B, C> {
     ) -> Option<(Self, Coarse<C>)> {
         let diagonal = diagonal(matrix);
         let inverse: Vec<[[f64; B]; B]> = diagonal.iter().map(inverse).collect::<Option<_>>()?;
-        let groups = Groups::new(&strong_couplings(matrix, &diagonal, least_coupling), motions);
+        let groups = Aggregates::new(&strong_couplings(matrix, &diagonal, least_coupling), motions);
         if groups.count * C >= matrix.nodes() * B {
             return None;
         }

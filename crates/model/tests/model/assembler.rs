@@ -1,12 +1,13 @@
 //! The test models themselves: an error in them would be an error in every oracle.
 
 use flexbody_linalg::CscMatrix;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, entries};
 use oracle::random::Random;
 use oracle::reference::{dense, dense_modes, rigid_data, symmetric_eigen, unit_cube_eigenvalues};
 
-const KINDS: [Kind; 4] = [Kind::Tet4, Kind::Tet10, Kind::Hex8, Kind::Hex20];
+const KINDS: [ElementKind; 4] =
+    [ElementKind::Tet4, ElementKind::Tet10, ElementKind::Hex8, ElementKind::Hex20];
 
 fn product(matrix: &CscMatrix, x: &[f64]) -> Vec<f64> {
     let mut y = vec![0.0; matrix.n_rows()];
@@ -39,7 +40,7 @@ fn largest(values: &[f64]) -> f64 {
 
 /// A block with every node moved at random: no two elements are alike. Mid-edge nodes of tetrahedra stay in
 /// place.
-fn distorted(kind: Kind) -> Mesh {
+fn distorted(kind: ElementKind) -> Mesh {
     let mut random = Random(7);
     let corner = random.vector::<3>();
     Mesh::from_cells(kind, &oracle::mesh::grid([3, 2, 2]), |p| {
@@ -104,7 +105,7 @@ fn patch_test_constant_strain_has_exact_energy_and_no_inner_force() {
 }
 
 /// Nodes inside the distorted block: those that every one of the eight surrounding cells holds.
-fn inner_nodes(body: &Assembly, kind: Kind) -> Vec<usize> {
+fn inner_nodes(body: &Assembly, kind: ElementKind) -> Vec<usize> {
     let reference = Mesh::block(kind, [3, 2, 2], [3.0, 2.0, 2.0]);
     assert_eq!(reference.nodes.len(), body.nodes.len());
     let inside = |x: &[f64; 3]| x.iter().zip([3.0, 2.0, 2.0]).all(|(v, l)| *v > 1e-9 && *v < l - 1e-9);
@@ -134,7 +135,7 @@ fn linear_tetrahedra_have_the_textbook_mass() {
     // rho V / 20 (1 + delta_ij).
     let nodes = [[0.0, 0.0, 0.0], [2.0, 0.1, 0.0], [0.3, 1.5, 0.2], [0.1, 0.2, 1.1]];
     let material = Material { youngs: 1.0, poisson: 0.25, density: 3.0 };
-    let (_, mass) = Kind::Tet4.matrices(&nodes, &material, MassRule::Consistent);
+    let (_, mass) = ElementKind::Tet4.matrices(&nodes, &material, MassRule::Consistent);
     let edge = |i: usize| nalgebra::Vector3::from(nodes[i]) - nalgebra::Vector3::from(nodes[0]);
     let volume = edge(1).dot(&edge(2).cross(&edge(3))) / 6.0;
     for i in 0..4 {
@@ -158,7 +159,7 @@ fn quadratic_tetrahedra_have_the_textbook_mass() {
             .map(|&(a, b)| -> [f64; 3] { std::array::from_fn(|k| (nodes[a][k] + nodes[b][k]) / 2.0) }),
     );
     let material = Material { youngs: 1.0, poisson: 0.25, density: 420.0 * 6.0 };
-    let (_, mass) = Kind::Tet10.matrices(&all, &material, MassRule::Consistent);
+    let (_, mass) = ElementKind::Tet10.matrices(&all, &material, MassRule::Consistent);
     let ends = |i: usize| if i < 4 { vec![i] } else { vec![edges[i - 4].0, edges[i - 4].1] };
     for i in 0..10 {
         for j in 0..10 {
@@ -181,7 +182,7 @@ fn quadratic_tetrahedra_have_the_textbook_mass() {
 fn one_trilinear_cube_has_its_closed_form_spectrum() {
     // Parity splits the 24 modes of the unit cube: K by itself first, then the free body's lambda.
     let unit = Material { youngs: 1.0, poisson: 0.2, density: 1.0 };
-    let body = Mesh::block(Kind::Hex8, [1; 3], [1.0; 3]).assemble(&unit, MassRule::Consistent);
+    let body = Mesh::block(ElementKind::Hex8, [1; 3], [1.0; 3]).assemble(&unit, MassRule::Consistent);
     let (lambda, mu) = unit.lame();
     let (found, _) = symmetric_eigen(dense(&body.stiffness).as_ref());
     let mut stiffness = vec![0.0; 6];
@@ -209,9 +210,9 @@ fn one_trilinear_cube_has_its_closed_form_spectrum() {
 #[test]
 fn dense_reference_satisfies_its_equations() {
     for (kind, rule) in [
-        (Kind::Hex8, MassRule::Consistent),
-        (Kind::Hex8, MassRule::Reduced),
-        (Kind::Tet10, MassRule::Reduced),
+        (ElementKind::Hex8, MassRule::Consistent),
+        (ElementKind::Hex8, MassRule::Reduced),
+        (ElementKind::Tet10, MassRule::Reduced),
     ] {
         let body = Mesh::block(kind, [3, 2, 1], [0.3, 0.1, 0.08]).assemble(&Material::STEEL, rule);
         let modes = dense_modes(&body);
@@ -238,12 +239,12 @@ fn dense_reference_satisfies_its_equations() {
 fn mechanisms_and_separate_bodies_have_more_zero_modes() {
     let unit = Material { youngs: 1.0, poisson: 0.3, density: 1.0 };
     for (mesh, zero) in [
-        (Mesh::hinge(Kind::Hex8, 2), 7),
-        (Mesh::two_bodies(Kind::Hex8, 2), 12),
-        (Mesh::bracket(Kind::Hex8, 4, 1, 1.0), 6),
-        (Mesh::ball(Kind::Hex8, 1, 1.0), 6),
-        (Mesh::cylinder(Kind::Hex8, 1, 2, 1.0, 2.0), 6),
-        (Mesh::hinge(Kind::Tet10, 1), 7),
+        (Mesh::hinge(ElementKind::Hex8, 2), 7),
+        (Mesh::two_bodies(ElementKind::Hex8, 2), 12),
+        (Mesh::bracket(ElementKind::Hex8, 4, 1, 1.0), 6),
+        (Mesh::ball(ElementKind::Hex8, 1, 1.0), 6),
+        (Mesh::cylinder(ElementKind::Hex8, 1, 2, 1.0, 2.0), 6),
+        (Mesh::hinge(ElementKind::Tet10, 1), 7),
     ] {
         assert_eq!(dense_modes(&mesh.assemble(&unit, MassRule::Consistent)).zero, zero);
     }

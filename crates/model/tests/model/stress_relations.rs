@@ -6,7 +6,7 @@ use flexbody_linalg::CscMatrix;
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, NodeSet, RawMatrix, RawModel, UnitLoad};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Rotation3, SMatrix, Vector3};
 use oracle::beams::chain;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Mesh, entries, grid};
 use oracle::plane::rectangle;
 use std::path::PathBuf;
@@ -108,7 +108,7 @@ fn told(raw: RawModel) -> (Vec<Code>, String) {
 
 /// A bent and tapered bar of hexahedra, turned in space, with its first layer of nodes held or not.
 fn solid(is_held: bool) -> (Mesh, Body) {
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([6, 2, 2]), |p| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 2, 2]), |p| {
         [
             0.1 * p[0],
             0.05 * p[1] * (1.0 - 0.06 * p[0]) + 0.004 * p[0] * p[0],
@@ -203,7 +203,7 @@ fn difference_of_tangents(mesh: &Mesh, material: &Material, u: &DVector<f64>) ->
 fn add_tangent(
     k: &mut DMatrix<f64>,
     mesh: &Mesh,
-    kind: Kind,
+    kind: ElementKind,
     nodes: &[usize],
     material: &Material,
     u: &DVector<f64>,

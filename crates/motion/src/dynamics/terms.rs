@@ -1,6 +1,6 @@
 //! Which terms of the kinetic energy an equation of motion has.
 
-use flexbody_body::flex_body::Groups;
+use flexbody_body::flex_body::TermGroups;
 
 /// Terms by group of the kinetic energy (theory section 7).
 ///
@@ -28,7 +28,7 @@ impl Terms {
     pub const NONE: Self = Self { w1: false, w2: false, w3: false, geometric_stiffness: false };
 
     /// Those of a body that holds `groups`.
-    pub fn held(self, groups: Groups) -> Self {
+    pub fn held(self, groups: TermGroups) -> Self {
         Self { w1: self.w1 && groups.w1, w2: self.w2 && groups.w2, w3: self.w3 && groups.w3, ..self }
     }
 }

@@ -107,7 +107,7 @@ pub fn integrate_closely<E: From<Failure>>(
     for (stop, is_break) in inner.chain([(last, ends_in_break)]) {
         method.restart();
         // f at a break is that after it, which is not what the last rate of an explicit step is about.
-        let piece = Piece { from, before: if is_break { just_before(stop) } else { stop } };
+        let piece = SmoothInterval { from, before: if is_break { just_before(stop) } else { stop } };
         match method {
             Method::Explicit(method) => {
                 explicit_piece(method, system, state, piece, parts, &mut wanted, &mut observe)?;
@@ -134,7 +134,7 @@ fn just_before(stop: f64) -> f64 {
 
 /// A stretch of time without breaks.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
+struct SmoothInterval {
     from: f64,
     /// Its end, just before the break there.
     before: f64,
@@ -167,7 +167,7 @@ fn explicit_piece<E: From<Failure>>(
     method: &mut Explicit,
     system: &mut dyn System,
     state: &mut [f64],
-    piece: Piece,
+    piece: SmoothInterval,
     parts: usize,
     wanted: &mut Wanted<'_>,
     observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
@@ -201,7 +201,7 @@ fn gauss_piece<E: From<Failure>>(
     longest: f64,
     system: &mut dyn System,
     state: &mut [f64],
-    piece: Piece,
+    piece: SmoothInterval,
     wanted: &mut Wanted<'_>,
     observe: &mut impl FnMut(Sight, f64, &[f64]) -> Result<(), E>,
 ) -> Result<(), E> {

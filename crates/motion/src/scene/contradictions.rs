@@ -1,11 +1,11 @@
 //! What a scene says against itself, or twice.
 
 use flexbody_base::diagnostic::Code;
-use flexbody_base::text::walk::{Table, Value, Walk, integer};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, integer};
 use toml::de::DeValue;
 
 /// Complains about everything that another part of the scene would silently take the place of.
-pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
+pub(super) fn contradictions(walk: &mut Walk<'_>, top: &TomlTable) {
     let spin = table_of(top, "spin");
     let holds = spin
         .and_then(|spin| spin.get("hold"))
@@ -30,7 +30,7 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
         refuse("angular_velocity", by);
         let carried_spin = table_of(top, "carried").and_then(|carried| table_of(carried, "spin"));
         let has_attitude =
-            |table: Option<&Table>| table.is_some_and(|table| table.contains_key("attitude_from"));
+            |table: Option<&TomlTable>| table.is_some_and(|table| table.contains_key("attitude_from"));
         let by_attitude = (has_attitude(spin) || has_attitude(carried_spin))
             .then_some("`attitude_from` says which attitude the body starts with");
         refuse("rotation", by_attitude);
@@ -43,7 +43,7 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
         }
         twice(walk, initial.get("mode"), "mode", numbered);
     }
-    let is_list = |table: &Table, key: &str| {
+    let is_list = |table: &TomlTable, key: &str| {
         table.get(key).is_some_and(|value| matches!(value.get_ref(), DeValue::Array(_)))
     };
     for (name, keys) in
@@ -65,7 +65,7 @@ pub(super) fn contradictions(walk: &mut Walk<'_>, top: &Table) {
     });
 }
 
-fn table_of<'t>(top: &'t Table<'_>, key: &str) -> Option<&'t Table<'t>> {
+fn table_of<'t>(top: &'t TomlTable<'_>, key: &str) -> Option<&'t TomlTable<'t>> {
     match top.get(key)?.get_ref() {
         DeValue::Table(table) => Some(table),
         _ => None,

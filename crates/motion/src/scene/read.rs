@@ -13,7 +13,7 @@ use super::{
 use crate::dynamics::Terms;
 use flexbody_base::diagnostic::Code;
 use flexbody_base::provenance::SourceFile;
-use flexbody_base::text::walk::{Table, Value, Walk, integer};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, integer};
 use nalgebra::Vector3;
 use std::ops::Range;
 use toml::de::DeValue;
@@ -42,13 +42,13 @@ const TOLERANCES: Range<f64> = 1e-14..0.1;
 
 /// A scene without cases, named `stem` where it has no name. `None` only with something in `found`, as
 /// everything here.
-pub(super) fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Scene> {
+pub(super) fn scene(walk: &mut Walk<'_>, top: &TomlTable, stem: String) -> Option<Scene> {
     let required = read_requirements::TABLES.map(|(name, _)| name);
     walk.known_keys(top, "the scene", &[TOP, &required].concat());
     let name = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
     let run = match walk.table(top, "run") {
         Some((table, span)) => run(walk, table, span),
-        None => run(walk, &Table::new(), 0..0),
+        None => run(walk, &TomlTable::new(), 0..0),
     };
     let initial = match walk.table(top, "initial") {
         Some((table, _)) => initial(walk, table),
@@ -82,7 +82,7 @@ pub(super) fn scene(walk: &mut Walk<'_>, top: &Table, stem: String) -> Option<Sc
     })
 }
 
-fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
+fn run(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Run> {
     walk.known_keys(table, "[run]", RUN);
     let duration = match table.contains_key("duration") {
         true => positive(walk, table, "duration", &span).map(Some),
@@ -110,7 +110,7 @@ fn run(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Run> {
     Some(Run { duration: duration?, outputs, most_steps, scheme: scheme?, terms: terms? })
 }
 
-fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+fn scheme(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<Scheme> {
     let method =
         if table.contains_key("method") { walk.string(table, "method")? } else { "adaptive".to_owned() };
     let mut refuse = |keys: &[&str]| {
@@ -135,7 +135,7 @@ fn scheme(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Sch
     }
 }
 
-fn adaptive(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+fn adaptive(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<Scheme> {
     let tolerance = match table.contains_key("tolerance") {
         true => positive(walk, table, "tolerance", span)?,
         false => TOLERANCE,
@@ -149,7 +149,7 @@ fn adaptive(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<S
     Some(Scheme::Adaptive { tolerance })
 }
 
-fn conserving(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<Scheme> {
+fn conserving(walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<Scheme> {
     let order = match table.get("order") {
         None => 4,
         Some(value) => match integer(value) {
@@ -187,7 +187,7 @@ fn terms(walk: &mut Walk<'_>, value: &Value) -> Option<Terms> {
     Some(terms)
 }
 
-fn initial(walk: &mut Walk<'_>, table: &Table) -> Option<Initial> {
+fn initial(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Initial> {
     walk.known_keys(table, "[initial]", INITIAL);
     let mut or_zero = |key: &str| match table.get(key) {
         Some(value) => vector(walk, key, value),
@@ -233,7 +233,7 @@ fn settled(walk: &mut Walk<'_>, value: &Value) -> Option<bool> {
     settled
 }
 
-fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<Load> {
+fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Range<usize>) -> Option<Load> {
     walk.known_keys(table, "[[load]]", LOAD);
     let at = place(walk, table, span.clone());
     let factor = match table.get("history") {
@@ -266,7 +266,7 @@ fn load(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<us
     Some(Load { at: at?, force: force?, torque: torque?, axes: axes? })
 }
 
-fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<Spin> {
+fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &TomlTable, span: Range<usize>) -> Option<Spin> {
     walk.known_keys(table, "[spin]", SPIN);
     let hold = match table.get("hold").map(|value| (value, value.get_ref())) {
         None => Some(false),

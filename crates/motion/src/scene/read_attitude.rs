@@ -5,7 +5,7 @@ use super::read_values::{EVERY, axes, direction, history};
 use super::{Axes, Interpolation, Samples, VectorHistory};
 use crate::dynamics::{EulerParameters, Orientation, RotationVector};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::walk::{Table, Walk};
+use flexbody_base::text::walk::{TomlTable, Walk};
 use nalgebra::{Vector3, Vector4};
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ pub(super) struct Turning {
 pub(super) fn turning(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
-    table: &Table,
+    table: &TomlTable,
     span: Range<usize>,
     place: &str,
 ) -> Option<Turning> {
@@ -93,7 +93,7 @@ pub(super) fn turning(
 }
 
 /// The axis of a rotation.
-fn axis_of(walk: &mut Walk<'_>, table: &Table) -> Option<Vector3<f64>> {
+fn axis_of(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Vector3<f64>> {
     if table.contains_key("axis") { direction(walk, table, "axis") } else { Some(Vector3::z()) }
 }
 

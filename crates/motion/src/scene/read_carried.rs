@@ -5,7 +5,7 @@ use super::read_columns::{HistoryFiles, columns_history};
 use super::read_values::{direction, history, place, transposed, vector};
 use super::{Carried, CarriedSpin, Drive, Interpolation, VectorHistory};
 use flexbody_base::diagnostic::Code;
-use flexbody_base::text::walk::{Table, Walk};
+use flexbody_base::text::walk::{TomlTable, Walk};
 use std::ops::Range;
 
 pub(super) const CARRIED: &[&str] = &["node", "interface", "spin", "translation"];
@@ -25,7 +25,7 @@ pub(super) const TRANSLATION: &[&str] = &[
 pub(super) fn carried(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
-    table: &Table,
+    table: &TomlTable,
     span: Range<usize>,
 ) -> Option<Carried> {
     walk.known_keys(table, "[carried]", CARRIED);
@@ -42,7 +42,12 @@ pub(super) fn carried(
     Some(Carried { by: by?, spin: transposed(spin.ok()?)?, translation: transposed(translation.ok()?)? })
 }
 
-fn spin(walk: &mut Walk<'_>, files: &HistoryFiles, table: &Table, span: Range<usize>) -> Option<CarriedSpin> {
+fn spin(
+    walk: &mut Walk<'_>,
+    files: &HistoryFiles,
+    table: &TomlTable,
+    span: Range<usize>,
+) -> Option<CarriedSpin> {
     walk.known_keys(table, "[carried.spin]", CARRIED_SPIN);
     let through = table.get("through").map(|value| vector(walk, "through", value));
     let turning = turning(walk, files, table, span, "[carried.spin]")?;
@@ -68,7 +73,7 @@ const DERIVATIVES: [(&str, &str, Driven); 3] = [
 fn translation(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
-    table: &Table,
+    table: &TomlTable,
     span: Range<usize>,
 ) -> Option<Drive> {
     walk.known_keys(table, "[carried.translation]", TRANSLATION);

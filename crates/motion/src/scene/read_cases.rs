@@ -5,7 +5,7 @@ use super::read::{TOP, scene};
 use super::{CaseName, Scene, read_requirements};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::text::walk::{Table, Value, Walk, read_toml};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, read_toml};
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -31,7 +31,7 @@ pub(super) fn read_cases(path: &Path) -> Result<Vec<Scene>> {
 }
 
 /// `None` only with something in `found`, as everything here.
-fn cases(walk: &mut Walk<'_>, top: &Table<'_>, list: &Value<'_>, stem: String) -> Option<Vec<Scene>> {
+fn cases(walk: &mut Walk<'_>, top: &TomlTable<'_>, list: &Value<'_>, stem: String) -> Option<Vec<Scene>> {
     let whole = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
     let tables = tables(walk, list)?;
     let names = names(walk, &tables);
@@ -60,7 +60,10 @@ fn cases(walk: &mut Walk<'_>, top: &Table<'_>, list: &Value<'_>, stem: String) -
 }
 
 /// The tables of the list of cases, and where they stand.
-fn tables<'t, 'i>(walk: &mut Walk<'_>, list: &'t Value<'i>) -> Option<Vec<(&'t Table<'i>, Range<usize>)>> {
+fn tables<'t, 'i>(
+    walk: &mut Walk<'_>,
+    list: &'t Value<'i>,
+) -> Option<Vec<(&'t TomlTable<'i>, Range<usize>)>> {
     let table = |value: &'t Value<'i>| match value.get_ref() {
         DeValue::Table(table) => Some((table, value.span())),
         _ => None,
@@ -77,7 +80,7 @@ fn tables<'t, 'i>(walk: &mut Walk<'_>, list: &'t Value<'i>) -> Option<Vec<(&'t T
 }
 
 /// The names of the cases; where one is wrong, that was complained about.
-fn names(walk: &mut Walk<'_>, tables: &[(&Table<'_>, Range<usize>)]) -> Vec<String> {
+fn names(walk: &mut Walk<'_>, tables: &[(&TomlTable<'_>, Range<usize>)]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for (table, span) in tables {
         let Some(value) = table.get("name") else {
@@ -111,7 +114,7 @@ pub(super) fn known_keys() -> Vec<&'static str> {
 /// The scene that a case is: what is `common`, with the tables of [`BY_KEY`] key by key and the lists of
 /// [`ADDED`] item by item joined by those of the case, and everything else of the case instead of what is
 /// common.
-fn merged<'t>(common: &Table<'t>, case: &Table<'t>) -> Table<'t> {
+fn merged<'t>(common: &TomlTable<'t>, case: &TomlTable<'t>) -> TomlTable<'t> {
     let mut merged = common.clone();
     merged.remove("case");
     merged.remove("name");

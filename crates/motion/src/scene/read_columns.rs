@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
 use flexbody_base::text::series::{ColumnKey, Series, read_series};
-use flexbody_base::text::walk::{Table, Value, Walk, integer};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, integer};
 use nalgebra::Vector3;
 use std::cell::RefCell;
 use std::ops::Range;
@@ -64,7 +64,7 @@ impl HistoryFiles {
     }
 
     /// Opens a file beside the scene.
-    fn open(&self, walk: &mut Walk<'_>, table: &Table, span: &Range<usize>) -> Option<InputFile> {
+    fn open(&self, walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<InputFile> {
         if !table.contains_key("file") {
             walk.wrong(span.clone(), "key `file` is missing".to_owned());
         }
@@ -129,7 +129,7 @@ pub(super) struct FromFile {
 }
 
 /// What a table says of its columns besides which they are.
-struct Reading {
+struct ColumnOptions {
     scale: f64,
     time_scale: f64,
     time_zero: f64,
@@ -137,8 +137,13 @@ struct Reading {
     held: bool,
 }
 
-impl Reading {
-    fn new(walk: &mut Walk<'_>, table: &Table, span: &Range<usize>, default: Interpolation) -> Option<Self> {
+impl ColumnOptions {
+    fn new(
+        walk: &mut Walk<'_>,
+        table: &TomlTable,
+        span: &Range<usize>,
+        default: Interpolation,
+    ) -> Option<Self> {
         let mut or = |key: &str, default: f64| {
             if table.contains_key(key) { finite(walk, table, key, span) } else { Some(default) }
         };
@@ -162,7 +167,7 @@ impl Reading {
 /// How a history goes on between its rows.
 pub(super) fn interpolation(
     walk: &mut Walk<'_>,
-    table: &Table,
+    table: &TomlTable,
     default: Interpolation,
 ) -> Option<Interpolation> {
     let known = [("linear", Interpolation::Linear), ("cubic", Interpolation::Cubic)];
@@ -172,7 +177,7 @@ pub(super) fn interpolation(
 /// The meaning of a word under `key`.
 fn one_of<T: Copy>(
     walk: &mut Walk<'_>,
-    table: &Table,
+    table: &TomlTable,
     key: &str,
     known: &[(&str, T)],
     default: T,
@@ -208,10 +213,10 @@ fn column(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<ColumnKey> {
 fn series(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
-    table: &Table,
+    table: &TomlTable,
     span: &Range<usize>,
     keys: Option<Vec<ColumnKey>>,
-    reading: &Reading,
+    reading: &ColumnOptions,
 ) -> Option<FromFile> {
     let time = match table.get("time") {
         Some(value) => column(walk, "time", value),
@@ -254,7 +259,7 @@ pub(super) fn tell(walk: &mut Walk<'_>, found: Vec<Diagnostic>) {
 pub(super) fn column_history(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
-    table: &Table,
+    table: &TomlTable,
     span: &Range<usize>,
 ) -> Option<History> {
     let value = match table.get("value") {
@@ -264,7 +269,7 @@ pub(super) fn column_history(
             None
         }
     };
-    let reading = Reading::new(walk, table, span, Interpolation::Linear);
+    let reading = ColumnOptions::new(walk, table, span, Interpolation::Linear);
     let reading = reading?;
     let read = series(walk, files, table, span, value.map(|value| vec![value]), &reading)?;
     Some(History::samples(read.times, &read.columns[0], reading.interpolation, reading.held))
@@ -273,7 +278,7 @@ pub(super) fn column_history(
 /// The `count` columns of a list.
 fn column_list(
     walk: &mut Walk<'_>,
-    table: &Table,
+    table: &TomlTable,
     span: &Range<usize>,
     count: usize,
 ) -> Option<Vec<ColumnKey>> {
@@ -298,7 +303,7 @@ pub(super) fn columns_history(
     let table = table_of_columns(walk, key, value, COLUMNS)?;
     let span = value.span();
     let keys = column_list(walk, table, &span, 3);
-    let reading = Reading::new(walk, table, &span, default)?;
+    let reading = ColumnOptions::new(walk, table, &span, default)?;
     let read = series(walk, files, table, &span, keys, &reading)?;
     let [x, y, z] = &read.columns[..] else { return None };
     let rows: Vec<Vector3<f64>> = (0..x.len()).map(|row| Vector3::new(x[row], y[row], z[row])).collect();
@@ -316,7 +321,7 @@ pub(super) fn four_columns(
     let table = table_of_columns(walk, key, value, known)?;
     let span = value.span();
     let keys = column_list(walk, table, &span, 4);
-    let reading = Reading::new(walk, table, &span, Interpolation::Cubic)?;
+    let reading = ColumnOptions::new(walk, table, &span, Interpolation::Cubic)?;
     series(walk, files, table, &span, keys, &reading)
 }
 
@@ -326,7 +331,7 @@ fn table_of_columns<'t, 'i>(
     key: &str,
     value: &'t Value<'i>,
     known: &[&str],
-) -> Option<&'t Table<'i>> {
+) -> Option<&'t TomlTable<'i>> {
     let DeValue::Table(table) = value.get_ref() else {
         walk.mistyped(key, value, "a table { file, time, columns }");
         return None;

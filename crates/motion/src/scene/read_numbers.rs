@@ -2,11 +2,11 @@
 //!
 //! Every function gives `None` only with something in `found`.
 
-use flexbody_base::text::walk::{Table, Walk};
+use flexbody_base::text::walk::{TomlTable, Walk};
 use std::ops::Range;
 
 /// A finite number that must be there.
-pub(super) fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+pub(super) fn finite(walk: &mut Walk<'_>, table: &TomlTable, key: &str, span: &Range<usize>) -> Option<f64> {
     let number = walk.number(table, key, span)?;
     if !number.is_finite() {
         walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a finite number"));
@@ -16,7 +16,12 @@ pub(super) fn finite(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range
 }
 
 /// A positive number that must be there.
-pub(super) fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Range<usize>) -> Option<f64> {
+pub(super) fn positive(
+    walk: &mut Walk<'_>,
+    table: &TomlTable,
+    key: &str,
+    span: &Range<usize>,
+) -> Option<f64> {
     let number = finite(walk, table, key, span)?;
     if number <= 0.0 {
         walk.wrong(place_of(table, key, span), format!("`{key}` is {number}, expected a positive number"));
@@ -26,6 +31,6 @@ pub(super) fn positive(walk: &mut Walk<'_>, table: &Table, key: &str, span: &Ran
 }
 
 /// Where the value of `key` stands; `span` is that of its table.
-pub(super) fn place_of(table: &Table, key: &str, span: &Range<usize>) -> Range<usize> {
+pub(super) fn place_of(table: &TomlTable, key: &str, span: &Range<usize>) -> Range<usize> {
     table.get(key).map_or_else(|| span.clone(), |value| value.span())
 }

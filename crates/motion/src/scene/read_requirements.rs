@@ -5,7 +5,7 @@ use super::PerQuantity;
 use super::read_numbers::{finite, place_of, positive};
 use super::read_values::{axes, list, mode_number, vector};
 use super::requirements::{Attachment, AttachmentKind, Limits, MotionRange, Range, Requirements, Tolerance};
-use flexbody_base::text::walk::{Table, Value, Walk, integer, real};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, real};
 use flexbody_model::{DampingRatios, damping_bands};
 use nalgebra::{Matrix3, Vector3};
 use toml::de::DeValue;
@@ -24,7 +24,7 @@ pub(super) const TABLES: [(&str, &[&str]); 7] = [
 const LIMITED_MODE: &[&str] = &["number", "amplitude"];
 
 /// `None` only with something in `found`.
-pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requirements> {
+pub(super) fn requirements(walk: &mut Walk<'_>, top: &TomlTable) -> Option<Requirements> {
     let mut requirements = Requirements::default();
     let mut complete = true;
     for (name, keys) in TABLES {
@@ -44,7 +44,7 @@ pub(super) fn requirements(walk: &mut Walk<'_>, top: &Table) -> Option<Requireme
 /// One of the tables.
 struct Section<'s, 'w> {
     walk: &'s mut Walk<'w>,
-    table: &'s Table<'s>,
+    table: &'s TomlTable<'s>,
     span: std::ops::Range<usize>,
 }
 
@@ -141,12 +141,12 @@ impl Section<'_, '_> {
 }
 
 /// Axes that turn with the body.
-fn turning_axes(walk: &mut Walk<'_>, table: &Table) -> Option<Axes> {
+fn turning_axes(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Axes> {
     axes(walk, table, &[Axes::Model, Axes::Body], Axes::Model)
 }
 
 /// A number that is not negative, or three of them.
-fn range(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Option<Range>> {
+fn range(walk: &mut Walk<'_>, table: &TomlTable, key: &str) -> Option<Option<Range>> {
     let Some(value) = table.get(key) else { return Some(None) };
     if let DeValue::Array(_) = value.get_ref() {
         let components = vector(walk, key, value)?;
@@ -156,7 +156,7 @@ fn range(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Option<Range>>
     not_negative(walk, key, value, Vector3::repeat(length)).map(|_| Some(Range::Any(length)))
 }
 
-fn attached_inertia(walk: &mut Walk<'_>, table: &Table) -> Option<Vector3<f64>> {
+fn attached_inertia(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Vector3<f64>> {
     let Some(value) = table.get("inertia") else { return Some(Vector3::zeros()) };
     let inertia = match value.get_ref() {
         DeValue::Array(_) => vector(walk, "inertia", value)?,
@@ -186,7 +186,7 @@ fn not_negative(
     Some(components)
 }
 
-fn kind(walk: &mut Walk<'_>, table: &Table) -> Option<AttachmentKind> {
+fn kind(walk: &mut Walk<'_>, table: &TomlTable) -> Option<AttachmentKind> {
     let Some(value) = table.get("kind") else { return Some(AttachmentKind::default()) };
     let kinds = [AttachmentKind::Free, AttachmentKind::Soft, AttachmentKind::Stiff];
     let known = match value.get_ref() {
@@ -199,7 +199,7 @@ fn kind(walk: &mut Walk<'_>, table: &Table) -> Option<AttachmentKind> {
     known
 }
 
-fn limits(walk: &mut Walk<'_>, table: &Table, span: &std::ops::Range<usize>) -> Option<Limits> {
+fn limits(walk: &mut Walk<'_>, table: &TomlTable, span: &std::ops::Range<usize>) -> Option<Limits> {
     let mut optional = |key: &str| match table.contains_key(key) {
         true => positive(walk, table, key, span).map(Some),
         false => Some(None),

@@ -6,7 +6,7 @@ use super::read_columns::{COLUMN, HistoryFiles, column_history, interpolation};
 use super::read_numbers::{finite, positive};
 use super::{Axes, History, Interpolation, Point};
 use flexbody_base::text::series::closer_than_rounding;
-use flexbody_base::text::walk::{Table, Value, Walk, integer, real};
+use flexbody_base::text::walk::{TomlTable, Value, Walk, integer, real};
 use nalgebra::Vector3;
 use std::ops::Range;
 use toml::de::DeValue;
@@ -33,7 +33,7 @@ pub(super) fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
 /// The number of a mode, from 0.
 pub(super) fn mode_number(
     walk: &mut Walk<'_>,
-    table: &Table,
+    table: &TomlTable,
     span: &Range<usize>,
     place: &str,
 ) -> Option<usize> {
@@ -49,7 +49,7 @@ pub(super) fn mode_number(
 }
 
 /// One of the axes `known` under the key `axes`.
-pub(super) fn axes(walk: &mut Walk<'_>, table: &Table, known: &[Axes], default: Axes) -> Option<Axes> {
+pub(super) fn axes(walk: &mut Walk<'_>, table: &TomlTable, known: &[Axes], default: Axes) -> Option<Axes> {
     let Some(value) = table.get("axes") else { return Some(default) };
     let given = match value.get_ref() {
         DeValue::String(text) => known.iter().copied().find(|axes| axes.name() == text.as_ref()),
@@ -63,7 +63,7 @@ pub(super) fn axes(walk: &mut Walk<'_>, table: &Table, known: &[Axes], default: 
 }
 
 /// A vector of length one along that of `key`, which must be there.
-pub(super) fn direction(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option<Vector3<f64>> {
+pub(super) fn direction(walk: &mut Walk<'_>, table: &TomlTable, key: &str) -> Option<Vector3<f64>> {
     let value = table.get(key)?;
     let unit = vector(walk, key, value)?.try_normalize(0.0);
     if unit.is_none() {
@@ -73,7 +73,7 @@ pub(super) fn direction(walk: &mut Walk<'_>, table: &Table, key: &str) -> Option
 }
 
 /// A node or an interface.
-pub(super) fn place(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Point> {
+pub(super) fn place(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Point> {
     match (table.get("node"), table.contains_key("interface")) {
         (Some(value), false) => {
             let node = integer(value);
@@ -142,7 +142,7 @@ pub(super) fn history(
 }
 
 /// A table of points.
-fn points(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<History> {
+fn points(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<History> {
     let mut numbers = |key: &str| {
         let list: Option<Vec<f64>> = table.get(key).and_then(|value| match value.get_ref() {
             DeValue::Array(list) => list.iter().map(|item| real(item).filter(|v| v.is_finite())).collect(),
@@ -179,9 +179,9 @@ fn points(walk: &mut Walk<'_>, table: &Table, span: Range<usize>) -> Option<Hist
 /// The tables `[[key]]`.
 pub(super) fn list<T>(
     walk: &mut Walk<'_>,
-    table: &Table,
+    table: &TomlTable,
     key: &str,
-    mut read: impl FnMut(&mut Walk<'_>, &Table, Range<usize>) -> Option<T>,
+    mut read: impl FnMut(&mut Walk<'_>, &TomlTable, Range<usize>) -> Option<T>,
 ) -> Option<Vec<T>> {
     let Some(value) = table.get(key) else { return Some(Vec::new()) };
     let DeValue::Array(items) = value.get_ref() else {

@@ -23,14 +23,14 @@ pub enum Interpolation {
 
 /// A function of time with N components, given at rows. Copies share the rows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Samples<const N: usize>(Arc<Pieces<N>>);
+pub struct Samples<const N: usize>(Arc<Spline<N>>);
 
 #[derive(Debug, Clone, PartialEq)]
-struct Pieces<const N: usize> {
+struct Spline<const N: usize> {
     /// Ascending, two at least.
     times: Vec<f64>,
     /// Of every piece between two rows.
-    pieces: Vec<Piece<N>>,
+    pieces: Vec<SplinePiece<N>>,
     /// Integral from the first row to every row.
     integrals: Vec<SVector<f64, N>>,
     interpolation: Interpolation,
@@ -40,7 +40,7 @@ struct Pieces<const N: usize> {
 
 /// Coefficients of 1, t, t^2 and t^3, with t from the beginning of the piece.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Piece<const N: usize>([SVector<f64, N>; 4]);
+struct SplinePiece<const N: usize>([SVector<f64, N>; 4]);
 
 /// A function at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,24 +81,24 @@ impl<const N: usize> Samples<N> {
         held: bool,
     ) -> Self {
         assert!(times.len() >= 2 && times.len() == values.len(), "two rows or more, with a value each");
-        let pieces: Vec<Piece<N>> = match interpolation {
-            Interpolation::Linear => times.windows(2).zip(values.windows(2)).map(Piece::line).collect(),
+        let pieces: Vec<SplinePiece<N>> = match interpolation {
+            Interpolation::Linear => times.windows(2).zip(values.windows(2)).map(SplinePiece::line).collect(),
             Interpolation::Cubic => {
                 let slopes = slopes(&times, values);
                 let ends = times.windows(2).zip(values.windows(2)).zip(slopes.windows(2));
-                ends.map(|((times, values), slopes)| Piece::cubic(times, values, slopes)).collect()
+                ends.map(|((times, values), slopes)| SplinePiece::cubic(times, values, slopes)).collect()
             }
         };
         let mut integrals = vec![SVector::zeros()];
         for (piece, ends) in pieces.iter().zip(times.windows(2)) {
             integrals.push(integrals[integrals.len() - 1] + piece.integral(ends[1] - ends[0]));
         }
-        Self(Arc::new(Pieces { times, pieces, integrals, interpolation, held }))
+        Self(Arc::new(Spline { times, pieces, integrals, interpolation, held }))
     }
 
     /// The piece of a time, and the time since its beginning.
     fn piece_at(&self, time: f64) -> (usize, f64) {
-        let Pieces { times, pieces, .. } = &*self.0;
+        let Spline { times, pieces, .. } = &*self.0;
         let piece = times.partition_point(|&t| t <= time).saturating_sub(1).min(pieces.len() - 1);
         (piece, time - times[piece])
     }
@@ -122,7 +122,7 @@ impl<const N: usize> Samples<N> {
 
     /// The value at a row.
     fn row(&self, row: usize) -> SVector<f64, N> {
-        let Pieces { times, pieces, .. } = &*self.0;
+        let Spline { times, pieces, .. } = &*self.0;
         match pieces.get(row) {
             Some(piece) => piece.0[0],
             None => pieces[row - 1].at(times[row] - times[row - 1]).value,
@@ -155,7 +155,7 @@ impl<const N: usize> Samples<N> {
     /// Times at which it is not smooth: the rows of straight lines, and the ends where it stays what it is
     /// outside.
     pub fn breaks(&self) -> Vec<f64> {
-        let Pieces { times, interpolation, held, .. } = &*self.0;
+        let Spline { times, interpolation, held, .. } = &*self.0;
         let last = times.len() - 1;
         let inner = match interpolation {
             Interpolation::Linear => &times[1..last],
@@ -199,10 +199,10 @@ impl<const N: usize> Samples<N> {
     }
 
     /// The pieces from time zero to `end`: from when to when, since their beginning.
-    fn pieces_until<'p>(&'p self, end: f64) -> impl Iterator<Item = (&'p Piece<N>, f64, f64)> + 'p {
-        let Pieces { times, pieces, held, .. } = &*self.0;
+    fn pieces_until<'p>(&'p self, end: f64) -> impl Iterator<Item = (&'p SplinePiece<N>, f64, f64)> + 'p {
+        let Spline { times, pieces, held, .. } = &*self.0;
         let last = pieces.len() - 1;
-        let span = move |(at, piece): (usize, &'p Piece<N>)| {
+        let span = move |(at, piece): (usize, &'p SplinePiece<N>)| {
             let first_piece_goes_on = at == 0 && !held;
             let last_piece_goes_on = at == last && !held;
             let from = if first_piece_goes_on { 0.0 } else { times[at].max(0.0) };
@@ -246,10 +246,10 @@ impl<const N: usize> Samples<N> {
 
     /// Linear combinations of the components.
     pub fn turned<const M: usize>(&self, matrix: &SMatrix<f64, M, N>) -> Samples<M> {
-        let Pieces { times, pieces, integrals, interpolation, held } = &*self.0;
-        Samples(Arc::new(Pieces {
+        let Spline { times, pieces, integrals, interpolation, held } = &*self.0;
+        Samples(Arc::new(Spline {
             times: times.clone(),
-            pieces: pieces.iter().map(|piece| Piece(piece.0.map(|c| matrix * c))).collect(),
+            pieces: pieces.iter().map(|piece| SplinePiece(piece.0.map(|c| matrix * c))).collect(),
             integrals: integrals.iter().map(|integral| matrix * integral).collect(),
             interpolation: *interpolation,
             held: *held,
@@ -264,7 +264,7 @@ impl<const N: usize> Samples<N> {
     }
 }
 
-impl<const N: usize> Piece<N> {
+impl<const N: usize> SplinePiece<N> {
     fn line((times, values): (&[f64], &[SVector<f64, N>])) -> Self {
         let slope = (values[1] - values[0]) / (times[1] - times[0]);
         Self([values[0], slope, SVector::zeros(), SVector::zeros()])

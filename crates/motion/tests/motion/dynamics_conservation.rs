@@ -6,7 +6,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_model::LoadKind;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use oracle::elements::Kind;
+use oracle::elements::ElementKind;
 use oracle::flexible::{body_of, fixture, oracle, soft_block, stressed};
 use oracle::general::dense;
 use oracle::integrate;
@@ -68,7 +68,7 @@ fn nothing(_: &Evaluation<'_>, _: &Matrix3<f64>, _: &DVector<f64>, _: &mut [f64]
 #[test]
 fn energy_and_momenta_are_kept_by_every_truncation() {
     let turning =
-        [block(Kind::Hex8).raw, disc_on_shaft(2.0)].map(|raw| body_of(raw, 6, BodyFrame::Principal));
+        [block(ElementKind::Hex8).raw, disc_on_shaft(2.0)].map(|raw| body_of(raw, 6, BodyFrame::Principal));
     let bodies = [soft_block(10), fixture("frame_beams", 6, BodyFrame::Principal)];
     for body in bodies.into_iter().chain(turning) {
         for bits in 0..8 {

@@ -8,7 +8,7 @@ use flexbody_motion::dynamics::{
     BodyPoint, EquationsOfMotion, Evaluation, LoadAxes, LoadJacobian, Orientation, RotationVector, Terms,
 };
 use nalgebra::{DVector, Matrix3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::{body_of, fixture, stressed};
 use oracle::mesh::Mesh;
 use oracle::plane::rectangle;
@@ -18,7 +18,7 @@ const CELL: f64 = 0.05;
 
 /// A bracket with its ends as interfaces, the second about a point far from its nodes.
 fn bracket() -> FlexBody {
-    let mesh = Mesh::bracket(Kind::Hex8, 4, 2, CELL);
+    let mesh = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL);
     let set = |name: &str, axis: usize, reference: Reference| {
         let kept = mesh.nodes.iter().enumerate().filter(|(_, x)| (x[axis] - 4.0 * CELL).abs() < 1e-9);
         let nodes = kept.map(|(i, _)| i as i64 + 1).collect();

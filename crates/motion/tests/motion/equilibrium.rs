@@ -6,7 +6,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_model::{Coupling, NodeSet, RawModel};
 use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
 use nalgebra::{DMatrix, DVector};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::{body_of, fixture};
 use oracle::mesh::Mesh;
 use oracle::random::Random;
@@ -16,7 +16,7 @@ use std::fs;
 
 /// A solid bar along x with the interface `root`.
 fn bar() -> RawModel {
-    let mesh = Mesh::block(Kind::Hex8, [4, 1, 1], [1.0, 0.2, 0.16]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 1, 1], [1.0, 0.2, 0.16]);
     let root = (1..=mesh.nodes.len() as i64).filter(|i| mesh.nodes[*i as usize - 1][0] < 1e-9).collect();
     let mut raw = mesh
         .assemble(&Material { youngs: 1e7, poisson: 0.3, density: 1000.0 }, MassRule::Consistent)
@@ -27,7 +27,7 @@ fn bar() -> RawModel {
 
 /// A block whose rigid end is one node with rotations, the interface `root`.
 fn rigid_ended() -> RawModel {
-    let mut raw = block(Kind::Hex8).raw;
+    let mut raw = block(ElementKind::Hex8).raw;
     let reference = *raw.nodes.ids.last().expect("a node");
     raw.interfaces = vec![NodeSet::new("root", vec![reference])];
     raw

@@ -15,7 +15,7 @@ use flexbody_motion::dynamics::{
     NodalEvaluation, NodalModes, Orientation, ReferenceConditions, Terms,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use oracle::elements::Kind;
+use oracle::elements::ElementKind;
 use oracle::equations::State;
 use oracle::general::{FIXTURES, dense, raw_fixture, to_faer};
 use oracle::random::Random;
@@ -28,8 +28,8 @@ const LIMIT: f64 = 1e-11;
 /// Solids, plane bodies, general masses without rotational mass, and masses without an inverse.
 fn bodies() -> Vec<(String, Unreduced)> {
     let made = [
-        ("hex8", soft_block(Kind::Hex8, [3, 2, 1])),
-        ("tet10", soft_block(Kind::Tet10, [1, 1, 1])),
+        ("hex8", soft_block(ElementKind::Hex8, [3, 2, 1])),
+        ("tet10", soft_block(ElementKind::Tet10, [1, 1, 1])),
         ("plate", soft_plate()),
     ];
     let made = made.into_iter().map(|(name, raw)| (name.to_owned(), Unreduced::new(raw)));
@@ -311,7 +311,7 @@ fn projected_on_modes_they_are_the_reduced_equations() {
         assert_projection(name, raw_fixture(name));
     }
     assert_projection("plate", soft_plate());
-    assert_projection("tet10", soft_block(Kind::Tet10, [2, 1, 1]));
+    assert_projection("tet10", soft_block(ElementKind::Tet10, [2, 1, 1]));
 }
 
 /// Larger models that lie beside the project on some machines.
@@ -426,7 +426,7 @@ fn loads_accelerate_the_nodes_as_they_accelerate_all_modes() {
     let raws = ["frame_beams", "frame_lumped", "shell_folded", "mpc_block", "plane_frame", "spring_ends"]
         .map(|name| (name, raw_fixture(name)));
     for (name, raw) in
-        raws.into_iter().chain([("hex8", soft_block(Kind::Hex8, [2, 1, 1])), ("plate", soft_plate())])
+        raws.into_iter().chain([("hex8", soft_block(ElementKind::Hex8, [2, 1, 1])), ("plate", soft_plate())])
     {
         let whole = converted(raw, 10_000);
         let axes = modal_state(9, &whole.1).attitude.axes();
@@ -485,7 +485,7 @@ fn damping_matrices_act_on_the_nodes() {
 /// nothing else.
 #[test]
 fn conditions_of_solids_hold_the_moment_of_elastic_forces() {
-    for (name, raw) in [("hex8", soft_block(Kind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {
+    for (name, raw) in [("hex8", soft_block(ElementKind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {
         let body = Unreduced::new(raw);
         let d = body.model.dimension();
         let held = holding(&body.model);
@@ -526,7 +526,7 @@ fn what_has_no_nodal_equations_says_why() {
         assert!(error.to_string().starts_with(|c: char| c.is_lowercase() || c.is_ascii_digit()), "{error}");
         error
     };
-    let block = model(soft_block(Kind::Hex8, [2, 1, 1]));
+    let block = model(soft_block(ElementKind::Hex8, [2, 1, 1]));
     let dof = |node, direction| DofLabel { node, direction };
     let held = |dofs: &[DofLabel]| ReferenceConditions::Held(dofs.to_vec());
     let six = [dof(1, 1), dof(1, 2), dof(1, 3), dof(2, 1), dof(2, 2), dof(3, 1)];
@@ -553,7 +553,7 @@ fn what_has_no_nodal_equations_says_why() {
     let error = refused(&folded, &ReferenceConditions::Held(holding(&folded)));
     assert_eq!(error, NodalError::HeldMassSingular { null_vectors: 8 });
 
-    let raw = RawModel { damping: Some(Damping::Ratio(0.02)), ..soft_block(Kind::Hex8, [1, 1, 1]) };
+    let raw = RawModel { damping: Some(Damping::Ratio(0.02)), ..soft_block(ElementKind::Hex8, [1, 1, 1]) };
     assert_eq!(refused(&model(raw), &ReferenceConditions::MeanAxes), NodalError::DampingOfModes);
 
     let equations =
@@ -577,7 +577,7 @@ fn what_has_no_nodal_equations_says_why() {
 /// Another frame shows the same places and velocities of the nodes, and the same kinetic energy.
 #[test]
 fn frames_of_solids_show_the_same_nodes() {
-    for (name, raw) in [("hex8", soft_block(Kind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {
+    for (name, raw) in [("hex8", soft_block(ElementKind::Hex8, [3, 2, 1])), ("plate", soft_plate())] {
         let body = Unreduced::new(raw);
         let frame = Frame {
             axes: nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 0.8).into_inner(),

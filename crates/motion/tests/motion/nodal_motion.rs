@@ -14,7 +14,7 @@ use flexbody_motion::dynamics::{
 };
 use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, integrate};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
-use oracle::elements::Kind;
+use oracle::elements::ElementKind;
 use oracle::flexible::oracle;
 use oracle::general::raw_fixture;
 use oracle::unreduced::{holding, soft_block, soft_plate};
@@ -141,8 +141,8 @@ fn stretch(path: &Path) -> f64 {
 #[ignore = "slow"]
 fn all_modes_move_as_the_nodes_do() {
     let raws = [
-        ("hex8", soft_block(Kind::Hex8, [3, 2, 1]), 3.0),
-        ("tet10", soft_block(Kind::Tet10, [1, 1, 1]), 3.0),
+        ("hex8", soft_block(ElementKind::Hex8, [3, 2, 1]), 3.0),
+        ("tet10", soft_block(ElementKind::Tet10, [1, 1, 1]), 3.0),
         ("plate", soft_plate(), 3.0),
         ("frame_lumped", raw_fixture("frame_lumped"), 1.0),
     ];
@@ -208,7 +208,7 @@ fn between_frames(model: &FeModel, body: &FlexBody, conditions: &ReferenceCondit
 #[test]
 #[ignore = "slow"]
 fn mean_axes_and_held_nodes_are_the_same_motion_to_second_order() {
-    let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
+    let model = model_of(soft_block(ElementKind::Hex8, [3, 2, 1]));
     let body = body_of(&model, 8);
     let solid = between_frames(&model, &body, &ReferenceConditions::Held(holding(&model)));
     let model = model_of(raw_fixture("mpc_block"));
@@ -275,7 +275,7 @@ fn drifts(
 #[test]
 #[ignore = "slow"]
 fn long_motion_keeps_energy_and_momenta() {
-    let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
+    let model = model_of(soft_block(ElementKind::Hex8, [3, 2, 1]));
     let body = body_of(&model, ALL);
     let instants: Vec<f64> = (0..=200).map(|i| instants(&body, 60.0)[10] * f64::from(i) / 200.0).collect();
     for conditions in [ReferenceConditions::MeanAxes, ReferenceConditions::Held(holding(&model))] {
@@ -335,7 +335,7 @@ impl Surroundings for Misprint {
 #[test]
 #[ignore = "slow"]
 fn truncation_and_misprints_show_against_the_nodes() {
-    let model = model_of(soft_block(Kind::Hex8, [3, 2, 1]));
+    let model = model_of(soft_block(ElementKind::Hex8, [3, 2, 1]));
     let whole = body_of(&model, ALL);
     let equations =
         NodalEquations::new(&model, whole.frame(), &ReferenceConditions::MeanAxes).expect("equations");

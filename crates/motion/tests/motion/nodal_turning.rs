@@ -17,7 +17,7 @@ use flexbody_motion::integration::{Explicit, Failure, Method, integrate};
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use oracle::attached::{Carriers, masses_on_beams, path, rigid_region};
 use oracle::beams::{BeamMass, star};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::equations::State;
 use oracle::general::RowKind;
 use oracle::mesh::{Mesh, grid};
@@ -36,7 +36,7 @@ const NUMERIC: f64 = 1e-9;
 /// A rubber block, askew, whose last layer of nodes a reference node beside it carries.
 fn block_with_rigid_face() -> (Carriers, RawModel) {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
         [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
     });
     let assembly = mesh.assemble(&rubber, MassRule::Consistent);

@@ -2,7 +2,7 @@
 //! body of its own.
 
 use flexbody_base::diagnostic::Code;
-use flexbody_body::flex_body::{FlexBody, Group, Groups, TermDecision};
+use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 use flexbody_body::invariants::{BodyFrame, error_norms, primary_differences};
 use flexbody_motion::dynamics::{
     Balance, Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Terms,
@@ -29,10 +29,10 @@ fn bodies() -> [FlexBody; 4] {
 fn all_modes_and_all_groups_are_the_body_itself() {
     for body in bodies() {
         let all: Vec<usize> = (0..body.n_modes()).collect();
-        assert_eq!(body.reduced(&all, Groups::ALL, Vec::new()).expect("a body"), body);
+        assert_eq!(body.reduced(&all, TermGroups::ALL, Vec::new()).expect("a body"), body);
         // Also of a body that lacks some already: its decisions stay.
-        let partial = with_groups(&body, Groups { w1: true, ..Groups::NONE });
-        assert_eq!(partial.reduced(&all, Groups::ALL, Vec::new()).expect("a body"), partial);
+        let partial = with_groups(&body, TermGroups { w1: true, ..TermGroups::NONE });
+        assert_eq!(partial.reduced(&all, TermGroups::ALL, Vec::new()).expect("a body"), partial);
     }
 }
 
@@ -58,7 +58,7 @@ fn what_is_held_is_what_the_full_body_has_and_nothing_else_is_there() {
             }
             for lumped in partial.lumped() {
                 assert_eq!(lumped.comparison, error_norms(own, &lumped.invariants));
-                for group in Group::ALL {
+                for group in TermGroup::ALL {
                     let told = lumped.comparison.iter().any(|(name, _)| name.starts_with(group.name()));
                     assert_eq!(told, groups.has(group), "{groups:?}");
                 }
@@ -71,7 +71,7 @@ fn what_is_held_is_what_the_full_body_has_and_nothing_else_is_there() {
 fn some_modes_are_slices_of_all() {
     for body in bodies() {
         let kept = [0, 2, 5];
-        let partial = body.reduced(&kept, Groups::ALL, Vec::new()).expect("a body");
+        let partial = body.reduced(&kept, TermGroups::ALL, Vec::new()).expect("a body");
         let (nf, full, own) = (body.n_modes(), body.invariants(), partial.invariants());
         let at = |index: usize| index / kept.len() * nf + kept[index % kept.len()];
         let (w0, w1, w2, w3) = (full.w0(), full.w1(), full.w2(), full.w3());
@@ -106,7 +106,7 @@ fn some_modes_are_slices_of_all() {
 #[test]
 fn the_proof_that_no_mode_is_missing_stays_with_the_lowest_modes_only() {
     let body = soft_block(8);
-    let of = |modes: &[usize]| body.reduced(modes, Groups::ALL, Vec::new()).expect("a body");
+    let of = |modes: &[usize]| body.reduced(modes, TermGroups::ALL, Vec::new()).expect("a body");
     assert!(body.certificate().proved_modes.is_some());
     let lowest = of(&[0, 1, 2]);
     assert_eq!(lowest.certificate(), body.certificate());
@@ -121,7 +121,7 @@ fn equations_have_the_terms_that_are_asked_for_and_held() {
     for body in bodies() {
         let (nf, states) = (body.n_modes(), if body.dimension() == 3 { 3 } else { 0 });
         for groups in combinations() {
-            let Groups { w1, w2, w3 } = groups;
+            let TermGroups { w1, w2, w3 } = groups;
             let partial = EquationsOfMotion::new(&with_groups(&body, groups), Terms::ALL);
             let masked = EquationsOfMotion::new(&body, Terms { w1, w2, w3, ..Terms::ALL });
             assert_eq!(partial.terms(), masked.terms());
@@ -184,7 +184,7 @@ fn a_body_without_groups_keeps_its_energy_and_momenta() {
 #[test]
 fn an_evaluation_of_inertia_alone_takes_a_tenth_at_ninety_modes() {
     let body = fixture("bracket_hex20", 90, BodyFrame::Principal);
-    let rigid = with_groups(&body, Groups::NONE);
+    let rigid = with_groups(&body, TermGroups::NONE);
     let of = |body: &FlexBody| EquationsOfMotion::new(body, Terms::ALL).multiplications();
     // 2 panels of 32 rows for what is linear in q, 12 rows in forces and momenta, 33 in the elimination, 4 of
     // K_ff and D.
@@ -198,19 +198,25 @@ fn an_evaluation_of_inertia_alone_takes_a_tenth_at_ninety_modes() {
 fn decisions_must_be_those_of_the_body() {
     let body = soft_block(4);
     let all = [0, 1, 2, 3];
-    let refused = |modes: &[usize], groups: Groups, terms: Vec<TermDecision>, code: Code, said: &str| {
+    let refused = |modes: &[usize], groups: TermGroups, terms: Vec<TermDecision>, code: Code, said: &str| {
         let error = body.reduced(modes, groups, terms).expect_err(said);
         let found = error.diagnostics().iter().find(|d| d.message().contains(said));
         assert_eq!(found.map(|d| d.code()), Some(code), "{error}");
     };
-    refused(&[], Groups::ALL, vec![], Code::Usage, "expected ascending indices below 4");
-    refused(&[1, 0], Groups::ALL, vec![], Code::Usage, "expected ascending indices");
-    refused(&[0, 4], Groups::ALL, vec![], Code::Usage, "expected ascending indices");
-    let without_w1 = Groups { w1: false, ..Groups::ALL };
+    refused(&[], TermGroups::ALL, vec![], Code::Usage, "expected ascending indices below 4");
+    refused(&[1, 0], TermGroups::ALL, vec![], Code::Usage, "expected ascending indices");
+    refused(&[0, 4], TermGroups::ALL, vec![], Code::Usage, "expected ascending indices");
+    let without_w1 = TermGroups { w1: false, ..TermGroups::ALL };
     let schema = Code::BodySchema;
     refused(&all, without_w1, vec![], schema, "does not hold W1, but no decision of `terms` drops it");
-    refused(&all, Groups::ALL, decisions(without_w1), schema, "drops W1, but `invariants` holds it");
-    refused(&all, Groups::NONE, decisions(without_w1), schema, "keeps W2, but `invariants` does not hold it");
+    refused(&all, TermGroups::ALL, decisions(without_w1), schema, "drops W1, but `invariants` holds it");
+    refused(
+        &all,
+        TermGroups::NONE,
+        decisions(without_w1),
+        schema,
+        "keeps W2, but `invariants` does not hold it",
+    );
     let twice = [decisions(without_w1), decisions(without_w1)].concat();
     refused(&all, without_w1, twice, schema, "two decisions about W1");
     let with = |change: &dyn Fn(&mut TermDecision)| {

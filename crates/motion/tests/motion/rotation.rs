@@ -8,7 +8,7 @@ use flexbody_motion::dynamics::{
     Surroundings, Terms,
 };
 use nalgebra::{Matrix3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::mesh::Mesh;
 use oracle::motion::{adaptive, conserving, run};
@@ -50,7 +50,7 @@ fn rigid_flip(moments: [f64; 3], omega: Vector3<f64>) -> f64 {
 
 #[test]
 fn a_flexible_body_flips_about_its_middle_axis_like_a_rigid_top_as_it_stiffens() {
-    let mesh = Mesh::block(Kind::Hex8, [4, 3, 2], [0.4, 0.25, 0.1]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 3, 2], [0.4, 0.25, 0.1]);
     let body =
         body_of(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model(), 4, BodyFrame::Principal);
     let inertia = body.invariants().inertia();
@@ -114,7 +114,7 @@ fn a_spinning_bar_stretches_as_far_as_the_closed_form_says() {
     let length = 2.0;
     let spin = 0.5; // k l = 0.5
     let stretch = |cells: i32, terms: Terms| {
-        let mesh = Mesh::block(Kind::Hex8, [cells, 1, 1], [length, 0.1, 0.1]);
+        let mesh = Mesh::block(ElementKind::Hex8, [cells, 1, 1], [length, 0.1, 0.1]);
         let raw = mesh.assemble(&material, MassRule::Consistent).raw_model();
         let all = 3 * raw.nodes.ids.len() - 6;
         let mut parts = body_of(raw, all, BodyFrame::Com).into_parts();
@@ -147,7 +147,7 @@ fn a_spinning_bar_stretches_as_far_as_the_closed_form_says() {
 /// by 2 g W (G. H. Bryan, On the beats in the vibrations of a revolving cylinder or bell, 1890).
 #[test]
 fn the_vibration_of_a_spinning_ring_turns_with_bryans_factor() {
-    let mesh = Mesh::ring(Kind::Hex20, 24, 1.0, 0.03);
+    let mesh = Mesh::ring(ElementKind::Hex20, 24, 1.0, 0.03);
     let body =
         body_of(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model(), 8, BodyFrame::Principal);
     // The axis of the ring is that of the largest moment, the third; the pair is coupled by W3 about it.

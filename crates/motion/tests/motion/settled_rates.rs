@@ -4,13 +4,13 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_motion::scene::{LoadCases, Scene, simulate, unsettled_rate};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
 use oracle::mesh::Mesh;
 
 /// A brick of so many widths along x, with four free modes.
 fn slender(ratio: f64) -> FlexBody {
-    let mesh = Mesh::block(Kind::Hex8, [4, 1, 1], [1.0, 1.0 / ratio, 1.3 / ratio]);
+    let mesh = Mesh::block(ElementKind::Hex8, [4, 1, 1], [1.0, 1.0 / ratio, 1.3 / ratio]);
     body_of(mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model(), 4, BodyFrame::Principal)
 }
 

@@ -13,7 +13,7 @@ use flexbody_model::{Coupling, DofLabel, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 use oracle::beams::elbow;
-use oracle::elements::Kind;
+use oracle::elements::ElementKind;
 use oracle::general::raw_fixture;
 use oracle::turning::{Block, block, dense, disc_on_shaft, hang, sparse};
 
@@ -137,9 +137,11 @@ fn largest(a: impl IntoIterator<Item = f64>) -> f64 {
 
 #[test]
 fn a_rigid_region_has_the_invariants_of_all_its_nodes() {
-    for (kind, frame) in
-        [(Kind::Hex8, BodyFrame::Principal), (Kind::Tet10, BodyFrame::Model), (Kind::Hex8, BodyFrame::Model)]
-    {
+    for (kind, frame) in [
+        (ElementKind::Hex8, BodyFrame::Principal),
+        (ElementKind::Tet10, BodyFrame::Model),
+        (ElementKind::Hex8, BodyFrame::Model),
+    ] {
         let block = block(kind);
         let (_, body) = converted(block.raw.clone(), 6, frame);
         let nodes = AllNodes { block: &block, body: &body };
@@ -173,7 +175,7 @@ fn a_rigid_region_has_the_invariants_of_all_its_nodes() {
 #[test]
 fn the_stiffness_of_inertia_is_what_a_finite_rotation_of_the_region_does() {
     for frame in [BodyFrame::Principal, BodyFrame::Model] {
-        let block = block(Kind::Hex8);
+        let block = block(ElementKind::Hex8);
         let (_, body) = converted(block.raw.clone(), 6, frame);
         let nodes = AllNodes { block: &block, body: &body };
         let nf = body.n_modes();
@@ -229,7 +231,7 @@ fn the_stiffness_of_inertia_is_what_a_finite_rotation_of_the_region_does() {
 #[test]
 fn two_frames_describe_one_body() {
     for raw in [
-        block(Kind::Hex8).raw,
+        block(ElementKind::Hex8).raw,
         raw_fixture("shell_folded"),
         raw_fixture("frame_beams"),
         raw_fixture("plane_frame"),
@@ -278,7 +280,8 @@ fn free_accelerations(
 #[test]
 fn a_constant_velocity_changes_nothing() {
     let names = ["frame_beams", "frame_lumped", "shell_folded", "plane_frame", "spring_ends"];
-    let raws = names.iter().map(|name| raw_fixture(name)).chain([block(Kind::Hex8).raw, disc_on_shaft(2.0)]);
+    let raws =
+        names.iter().map(|name| raw_fixture(name)).chain([block(ElementKind::Hex8).raw, disc_on_shaft(2.0)]);
     for raw in raws {
         let name = raw.name.clone();
         let (model, body) = converted(raw, 6, BodyFrame::Principal);
@@ -452,7 +455,7 @@ fn an_offset_mass_is_a_point_on_a_stiff_arm() {
 /// Gravity is an acceleration: under it the body does what it does without, in a frame that falls.
 #[test]
 fn gravity_is_an_acceleration_of_the_frame() {
-    for raw in [raw_fixture("shell_folded"), block(Kind::Hex8).raw, disc_on_shaft(2.0)] {
+    for raw in [raw_fixture("shell_folded"), block(ElementKind::Hex8).raw, disc_on_shaft(2.0)] {
         let name = raw.name.clone();
         let (_, body) = converted(raw, 6, BodyFrame::Model);
         let equations = EquationsOfMotion::new(&body, Terms::ALL);

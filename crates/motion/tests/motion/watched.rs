@@ -11,7 +11,7 @@ use flexbody_model::{Damping, FeModel, RawMatrix, RawModel};
 use flexbody_motion::dynamics::{NodalEquations, NodalEvaluation, NodalModes, ReferenceConditions};
 use flexbody_motion::scene::{LoadCases, ModeStart, Path, Point, Recording, Scene, simulate};
 use nalgebra::Vector3;
-use oracle::elements::Kind;
+use oracle::elements::ElementKind;
 use oracle::flexible::fixture;
 use oracle::general::raw_fixture;
 use oracle::scenes::nothing_happens;
@@ -193,10 +193,13 @@ fn watched_nodes_and_conditions_are_those_of_the_unreduced_equations() {
         raw
     };
     let cases = [
-        ("block", solid(soft_block(Kind::Hex8, [3, 2, 1]), None)),
+        ("block", solid(soft_block(ElementKind::Hex8, [3, 2, 1]), None)),
         (
             "damped block",
-            solid(soft_block(Kind::Hex8, [3, 2, 1]), Some(Damping::Rayleigh { alpha: 0.2, beta: 0.03 })),
+            solid(
+                soft_block(ElementKind::Hex8, [3, 2, 1]),
+                Some(Damping::Rayleigh { alpha: 0.2, beta: 0.03 }),
+            ),
         ),
         ("plate", soft_plate()),
     ];

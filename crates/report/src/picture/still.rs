@@ -102,7 +102,7 @@ impl Projection {
 }
 
 /// A piece of the drawing: how far to the front, and how it is painted.
-struct Piece {
+struct PaintedPath {
     depth: f64,
     paint: Paint,
     path: String,
@@ -118,18 +118,18 @@ enum Paint {
 /// Triangles and edges from the back to the front; pieces of one paint that follow each other are one path.
 fn surface(svg: &mut String, drawing: &Drawing<'_>, view: &Projection) {
     let seen: Vec<Vector3<f64>> = drawing.places().iter().map(|x| view.turned(x)).collect();
-    let mut pieces: Vec<Piece> = Vec::new();
+    let mut pieces: Vec<PaintedPath> = Vec::new();
     for corners in drawing.triangle_corners() {
         let corners = corners.map(|i| seen[i as usize]);
         let path = path(view, &corners) + "Z";
         let depth = corners.iter().map(|p| p.z).sum::<f64>() / 3.0;
-        pieces.push(Piece { depth, paint: Paint::Face(shade(&corners)), path });
+        pieces.push(PaintedPath { depth, paint: Paint::Face(shade(&corners)), path });
     }
     for ends in drawing.edge_ends() {
         let ends = ends.map(|i| seen[i as usize]);
         // An edge lies before the faces that it belongs to.
         let depth = 0.5 * (ends[0].z + ends[1].z) + 0.02 * view.radius;
-        pieces.push(Piece { depth, paint: Paint::Edge, path: path(view, &ends) });
+        pieces.push(PaintedPath { depth, paint: Paint::Edge, path: path(view, &ends) });
     }
     pieces.sort_by(|a, b| a.depth.total_cmp(&b.depth));
     let _ = writeln!(svg, "<g class=\"faces\" transform=\"scale({})\">", 1.0 / FINE);

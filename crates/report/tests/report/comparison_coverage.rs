@@ -4,9 +4,9 @@
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::{
-    FixedInterface, FlexBody, GeometricStiffness, Group, Guarantee, Interface, InterfaceCoordinates,
-    InternalRows, LoadKind, LumpedBody, MassStructure, Parts, ReferenceConditions, Storage, SurfaceMesh,
-    TermDecision, UnitLoad,
+    FixedInterface, FlexBody, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InternalRows,
+    LoadKind, LumpedBody, MassStructure, Parts, ReferenceConditions, Storage, SurfaceMesh, TermDecision,
+    TermGroup, UnitLoad,
 };
 use flexbody_body::invariants::{BodyFrame, DIGITS, Frame, GeneralTerms, InertiaStiffness};
 use flexbody_file::contents;
@@ -90,7 +90,7 @@ fn complete() -> FlexBody {
         free_lower: lambda.iter().map(|l| 0.9 * l).collect(),
     });
     parts.terms = vec![TermDecision {
-        group: Group::W1,
+        group: TermGroup::W1,
         kept: true,
         reason: "needed".to_owned(),
         tier: 1,

@@ -10,11 +10,12 @@ use flexbody_linalg::CscMatrix;
 use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Damping, DampingBand, FeModel, RawMatrix, RawModel};
 use flexbody_report::{Facts, Format, RunData, render};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, entries};
 
 fn block() -> Assembly {
-    Mesh::block(Kind::Hex8, [4, 2, 2], [0.4, 0.15, 0.1]).assemble(&Material::STEEL, MassRule::Consistent)
+    Mesh::block(ElementKind::Hex8, [4, 2, 2], [0.4, 0.15, 0.1])
+        .assemble(&Material::STEEL, MassRule::Consistent)
 }
 
 fn damped(damping: Damping<RawMatrix>) -> RawModel {

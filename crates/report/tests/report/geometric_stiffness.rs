@@ -18,7 +18,7 @@ use flexbody_model::{
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use flexbody_report::{Facts, Format, RunData, render};
 use nalgebra::{Matrix3, Rotation3, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, entries};
 use oracle::random::Random;
 use oracle::reference::{dense_modes, symmetric_eigen};
@@ -44,7 +44,7 @@ impl Case {
 
     /// A block without symmetry.
     fn skew_block() -> Self {
-        let mesh = Mesh::from_cells(Kind::Hex8, &oracle::mesh::grid([4, 2, 1]), |p| {
+        let mesh = Mesh::from_cells(ElementKind::Hex8, &oracle::mesh::grid([4, 2, 1]), |p| {
             [0.2 * p[0] + 0.02 * p[1] * p[2], 0.1 * p[1] * (1.0 + 0.1 * p[0]), 0.07 * p[2] + 0.01 * p[0]]
         });
         Self::new(mesh, Material::STEEL)
@@ -239,7 +239,7 @@ fn a_turned_model_is_stiffened_by_the_turned_spin() {
 
 /// A bar along x about the origin, thinner along z than along y.
 fn bar() -> Case {
-    let mesh = Mesh::block(Kind::Hex8, [32, 1, 1], [1.0, 0.04, 0.03]);
+    let mesh = Mesh::block(ElementKind::Hex8, [32, 1, 1], [1.0, 0.04, 0.03]);
     Case::new(mesh.moved(&Matrix3::identity(), [-0.5, -0.02, -0.015]), BEAM)
 }
 
@@ -535,7 +535,7 @@ fn loads_and_matrices_that_do_not_fit_are_refused() {
 
 #[test]
 fn bodies_of_one_pair_of_matrices_take_their_own_rows() {
-    let mesh = Mesh::two_bodies(Kind::Hex8, 1);
+    let mesh = Mesh::two_bodies(ElementKind::Hex8, 1);
     let case = Case::new(mesh, Material::STEEL);
     let mut raw = case.raw(Vec::new());
     raw.interfaces[0].nodes = vec![1];

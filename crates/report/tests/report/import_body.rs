@@ -11,7 +11,7 @@ use flexbody_formats::import::{
 };
 use flexbody_model::{FeModel, GeometricStiffness};
 use flexbody_report::{Tolerances, compare};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::{body_of, fixture};
 use oracle::mesh::{Mesh, grid};
 use oracle::random::Random;
@@ -20,7 +20,7 @@ use std::path::Path;
 /// A block without any symmetry, its model and its body.
 fn block(modes: usize) -> (FeModel, FlexBody) {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Kind::Hex8, &grid([4, 3, 2]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 3, 2]), |[x, y, z]| {
         [0.2 * x + 0.03 * y, 0.2 * y * (1.0 - 0.05 * x), 0.2 * z * (1.0 + 0.1 * y)]
     });
     let assembly = mesh.assemble(&rubber, MassRule::Consistent);

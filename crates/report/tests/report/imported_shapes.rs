@@ -12,7 +12,7 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_model::{FeModel, RawShapes, rigid_fields};
 use flexbody_report::{Tolerances, compare};
 use hdf5_metno::File;
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{DofOrder, Numbering, reordered};
 use oracle::mesh::Mesh;
 use oracle::random::Random;
@@ -22,8 +22,9 @@ const COUNT: usize = 12;
 
 /// A bracket whose matrix rows stand in no order at all.
 fn bracket() -> FeModel {
-    let raw =
-        Mesh::bracket(Kind::Hex8, 4, 2, 0.05).assemble(&Material::STEEL, MassRule::Consistent).raw_model();
+    let raw = Mesh::bracket(ElementKind::Hex8, 4, 2, 0.05)
+        .assemble(&Material::STEEL, MassRule::Consistent)
+        .raw_model();
     let raw = reordered(&raw, DofOrder::Shuffled(7), Numbering::Gaps(3));
     FeModel::from_raw(raw).expect("a sound model").model
 }

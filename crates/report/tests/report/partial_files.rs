@@ -2,7 +2,7 @@
 //! dropped, and no less.
 
 use flexbody_base::diagnostic::Code;
-use flexbody_body::flex_body::{FlexBody, Group, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_report::{Facts, Format, RunData, Tolerances, compare, dropped_text, render};
 use hdf5_metno as hdf5;
@@ -50,11 +50,11 @@ fn every_combination_of_groups_is_read_as_it_was_written() {
             for place in ["invariants", "lumped/groups/row-sum"] {
                 let there = names(&structure, place);
                 for (name, group) in [
-                    ("Ibar", Group::W1),
-                    ("W1", Group::W1),
-                    ("S", Group::W2),
-                    ("W2", Group::W2),
-                    ("W3", Group::W3),
+                    ("Ibar", TermGroup::W1),
+                    ("W1", TermGroup::W1),
+                    ("S", TermGroup::W2),
+                    ("W2", TermGroup::W2),
+                    ("W3", TermGroup::W3),
                 ] {
                     assert_eq!(
                         there.iter().any(|n| n == name),
@@ -90,10 +90,10 @@ proptest! {
 #[test]
 fn bounds_and_limits_that_are_not_known_are_absent() {
     let body = soft_block(3);
-    let mut terms = decisions(Groups::NONE);
+    let mut terms = decisions(TermGroups::NONE);
     (terms[0].bound, terms[0].limit, terms[1].tier) = (f64::INFINITY, f64::INFINITY, 2);
     terms.reverse(); // A body has them in the order of the groups.
-    let partial = body.reduced(&[0, 1, 2], Groups::NONE, terms).expect("a body");
+    let partial = body.reduced(&[0, 1, 2], TermGroups::NONE, terms).expect("a body");
     let (_folder, path) = written(&partial);
     let structure = flexbody_file::structure(&path).expect("a structure");
     let attributes = structure.pointer("/groups/terms/attributes").expect("attributes");
@@ -129,7 +129,7 @@ fn set_text(file: &hdf5::File, name: &str, value: &str) {
 #[test]
 fn files_that_keep_what_is_not_there_or_drop_what_is_are_refused() {
     let body = soft_block(3);
-    let partial = with_groups(&body, Groups { w1: false, ..Groups::ALL });
+    let partial = with_groups(&body, TermGroups { w1: false, ..TermGroups::ALL });
     let says = |error: String, text: &str| assert!(error.contains(text), "no {text:?} in\n{error}");
     let error = refused(&partial, |f| set_text(f, "W1", "kept"));
     says(error.clone(), "/invariants/W1: expected a dataset of 64-bit floats, found nothing");
@@ -168,7 +168,7 @@ fn files_that_keep_what_is_not_there_or_drop_what_is_are_refused() {
 #[test]
 fn reports_say_what_was_dropped() {
     let body = soft_block(4);
-    let partial = with_groups(&body, Groups { w2: true, ..Groups::NONE });
+    let partial = with_groups(&body, TermGroups { w2: true, ..TermGroups::NONE });
     let facts = Facts::new(&partial, &RunData::default());
     let text = render(&facts, Format::Text);
     assert!(text.contains("W1 dropped, error without it up to 0.0001 of 0.001 allowed: a test"), "{text}");
@@ -191,7 +191,8 @@ fn reports_say_what_was_dropped() {
     let html = render(&facts, Format::Html);
     assert!(html.contains("W3 dropped"));
     // Without W2 nobody says that the centrifugal term softens nothing.
-    let without = render(&Facts::new(&with_groups(&body, Groups::NONE), &RunData::default()), Format::Text);
+    let without =
+        render(&Facts::new(&with_groups(&body, TermGroups::NONE), &RunData::default()), Format::Text);
     assert!(!without.contains("soften"), "{without}");
     assert_eq!(
         dropped_text(&partial),
@@ -206,7 +207,7 @@ fn a_partial_body_compares_in_what_both_hold() {
             let partial = with_groups(&body, groups);
             let comparison = compare(&body, &partial, &Tolerances::default()).expect("comparable");
             assert!(comparison.passed(), "{groups:?}: {}", comparison.text());
-            for group in Group::ALL {
+            for group in TermGroup::ALL {
                 let note = format!("{} was dropped from the second body: it is not compared", group.name());
                 assert_eq!(comparison.notes().contains(&note), !groups.has(group), "{groups:?}");
             }
@@ -217,7 +218,7 @@ fn a_partial_body_compares_in_what_both_hold() {
     }
     // What is compared is seen when it differs.
     let body = soft_block(4);
-    let groups = Groups { w3: true, ..Groups::NONE };
+    let groups = TermGroups { w3: true, ..TermGroups::NONE };
     let mut parts = with_groups(&body, groups).into_parts();
     for (l, m, sign) in [(0, 1, 1.0), (1, 0, -1.0)] {
         parts.invariants.primary_mut().s[l][m][(0, 1)] += sign * 1e-6;

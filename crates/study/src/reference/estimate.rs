@@ -1,7 +1,7 @@
 //! What a body lacks of the model that it was made of, estimated along its motion in a scene.
 
 use super::grid::Grid;
-use super::lack::{Found, Lack, energy_scale};
+use super::lack::{Lack, LackErrors, energy_scale};
 use super::missed::Missed;
 use super::residual::NodalView;
 use super::resonance::Question;
@@ -225,7 +225,7 @@ impl Beside<'_> {
         };
         let missed = Missed::new(view, body, looked_at, grid, &question)?;
         let lack = Lack::new(view, body, &missed, looked_at, grid, scene.initial.settled);
-        let Found { errors, time } = lack.errors(scene, motion, watched);
+        let LackErrors { errors, time } = lack.errors(scene, motion, watched);
         let worst = errors.worst(tolerance);
         let modes = body.n_modes();
         let error = ReferenceError { modes, worst, time, errors, unknown: None, coupling: None };

@@ -34,7 +34,7 @@ pub(super) struct Lack<'a> {
 }
 
 /// Errors along the instants, and when that of the elastic energy is largest.
-pub(super) struct Found {
+pub(super) struct LackErrors {
     pub errors: OutputErrors,
     pub time: f64,
 }
@@ -85,7 +85,7 @@ impl<'a> Lack<'a> {
     }
 
     /// Errors relative to the motion of all nodes: that of the body, `motion`, with what it lacks.
-    pub(super) fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> Found {
+    pub(super) fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> LackErrors {
         let (stress, time) = self.stress(motion);
         let free = !scene.prescribes();
         let errors = OutputErrors {
@@ -94,7 +94,7 @@ impl<'a> Lack<'a> {
             stress: Some(stress),
             reaction: if free { None } else { self.reaction(scene, motion) },
         };
-        Found { errors, time }
+        LackErrors { errors, time }
     }
 
     /// sqrt(V(X y) / max V), with the elastic energy V, at its largest and when that is. What is missed is

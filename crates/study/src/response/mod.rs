@@ -12,7 +12,7 @@ mod study;
 pub use band::{Band, Resonance, Spacing};
 pub use errors::{At, Effectivity, PairErrors};
 pub use place::{Direction, Place};
-pub use study::{CouplingEffect, Function, Pair, Response, Settings, Solved, respond};
+pub use study::{CouplingEffect, Function, Pair, Response, ResponseSettings, Solved, respond};
 
 /// The complex numbers of a response: real part in phase with the force.
 pub use nalgebra::Complex;

@@ -27,7 +27,7 @@ const MODAL_MASS: f64 = 1e-4;
 
 /// What is asked for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct ResponseSettings {
     /// Frequencies.
     pub band: Band,
     /// About as many frequencies the curves have.
@@ -46,7 +46,7 @@ pub struct Settings {
     pub longest: Option<f64>,
 }
 
-impl Settings {
+impl ResponseSettings {
     /// Frequencies of the curves: more cannot be told apart in a plot.
     pub const POINTS: usize = 400;
     /// Solves: enough for two dozen resonances.
@@ -161,7 +161,7 @@ pub fn respond(
     body: &FlexBody,
     from: &[Place],
     to: &[Place],
-    settings: &Settings,
+    settings: &ResponseSettings,
     watch: Watch<'_>,
 ) -> Result<Response> {
     let mean = body.in_mean_axes()?;
@@ -202,8 +202,8 @@ pub fn respond(
 }
 
 /// The body with the damping ratio of the settings for its modes, where they state one.
-fn damped<'b>(body: &'b FlexBody, settings: &Settings) -> Result<Cow<'b, FlexBody>> {
-    let Settings { damping, replaces_damping, .. } = settings;
+fn damped<'b>(body: &'b FlexBody, settings: &ResponseSettings) -> Result<Cow<'b, FlexBody>> {
+    let ResponseSettings { damping, replaces_damping, .. } = settings;
     let stated = Requirements {
         damping: damping.clone(),
         replaces_damping: *replaces_damping,
@@ -272,7 +272,7 @@ impl<'m> Known<'m> {
         body: &FlexBody,
         [from, to]: [&[Place]; 2],
         damping: Option<&Mat<f64>>,
-        settings: &Settings,
+        settings: &ResponseSettings,
         watch: Watch<'_>,
     ) -> Result<Self> {
         watch(Event::Phase("estimate of the error"));

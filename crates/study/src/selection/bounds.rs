@@ -14,7 +14,7 @@
 
 use super::norms::Norms;
 use super::variation::{Rotation, Variation};
-use flexbody_body::flex_body::Groups;
+use flexbody_body::flex_body::TermGroups;
 
 /// A load on the modes that is a direction times a function of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -133,7 +133,7 @@ struct Operator {
 
 impl Operator {
     /// `None` where the spin takes all stiffness of some motion.
-    fn new(kept: Groups, norms: &Norms, driven: &Driven) -> Option<Self> {
+    fn new(kept: TermGroups, norms: &Norms, driven: &Driven) -> Option<Self> {
         let rotation = &driven.rotation;
         let softening = if kept.w2 { norms.softening } else { 0.0 };
         let coupling = if kept.w3 { norms.coupling } else { 0.0 };
@@ -171,7 +171,7 @@ impl Driven {
 
     /// Bounds of the motion of the body with the groups that are kept. `None` where the spin takes all
     /// stiffness of some motion.
-    pub fn amplitude(&self, kept: Groups, norms: &Norms) -> Option<Amplitude> {
+    pub fn amplitude(&self, kept: TermGroups, norms: &Norms) -> Option<Amplitude> {
         let operator = Operator::new(kept, norms, self)?;
         let mut loads = self.loads.clone();
         if kept.w1 {
@@ -211,7 +211,7 @@ impl Driven {
     }
 
     /// The load that the groups `dropped` are to the error, at motion within `own`.
-    pub fn residual(&self, dropped: Groups, norms: &Norms, own: &Amplitude) -> Vec<LoadSizes> {
+    pub fn residual(&self, dropped: TermGroups, norms: &Norms, own: &Amplitude) -> Vec<LoadSizes> {
         let r = &self.rotation;
         let mut loads = Vec::new();
         if dropped.w1 {
@@ -249,7 +249,7 @@ impl Driven {
     /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads.
     /// `None` where the spin may take all stiffness of some motion.
     pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<ErrorBound> {
-        let operator = Operator::new(Groups::ALL, norms, self)?;
+        let operator = Operator::new(TermGroups::ALL, norms, self)?;
         let r = &self.rotation;
         let energy: f64 = residual.iter().map(|load| operator.response(load)).sum();
         let root = operator.margin.sqrt();
@@ -267,7 +267,7 @@ impl Driven {
     }
 
     /// What the torque lacks without the groups `dropped`, at motion within `own`.
-    pub fn torque_defect(&self, dropped: Groups, norms: &Norms, own: &Amplitude) -> TorqueDefect {
+    pub fn torque_defect(&self, dropped: TermGroups, norms: &Norms, own: &Amplitude) -> TorqueDefect {
         let (w, turn) = (self.rotation.largest, self.rotation.acceleration + self.rotation.largest.powi(2));
         let (q, v, a) = (own.coordinate, own.rate, own.acceleration);
         let there = |group: bool, torque: f64| if group { torque } else { 0.0 };

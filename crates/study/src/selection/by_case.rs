@@ -5,7 +5,7 @@ use super::demand::Demand;
 use super::search::Choice;
 use super::trial::Trial;
 use crate::reference::ReferenceError;
-use flexbody_body::flex_body::Group;
+use flexbody_body::flex_body::TermGroup;
 use flexbody_motion::scene::Tolerance;
 
 /// What a selection for several load cases is for one of them.
@@ -18,7 +18,7 @@ pub struct CaseSelection {
     /// The selected model, measured against all that the body holds; none where nothing was integrated.
     pub chosen: Option<Trial>,
     /// Groups that are kept because of this case more than of any other.
-    pub binds_groups: Vec<Group>,
+    pub binds_groups: Vec<TermGroup>,
     /// Whether one mode fewer is furthest beyond the tolerances in this case.
     pub binds_modes: bool,
     /// What the body, and those before it that were enriched, lack of the model in this case.
@@ -40,10 +40,10 @@ pub(super) fn by_case(
         .iter()
         .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && trial.modes + 1 == choice.modes.len());
     let of_case = |(at, demand): (usize, &Demand<'_>)| {
-        let is_bound_here = |group: &Group, ground: &Option<Ground>| {
+        let is_bound_here = |group: &TermGroup, ground: &Option<Ground>| {
             choice.groups.has(*group) && ground.is_some_and(|ground| ground.case == Some(at))
         };
-        let grounds = Group::ALL.into_iter().zip(grounds);
+        let grounds = TermGroup::ALL.into_iter().zip(grounds);
         CaseSelection {
             name: demand.name.unwrap_or_default().to_owned(),
             tolerance: *demand.tolerance(),

@@ -5,7 +5,7 @@ use super::situation::Situation;
 use super::trial::{Trial, TrialRuns};
 use super::variation::Variation;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Group, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{OutputErrors, Range, Scene, points_of};
 use nalgebra::Vector3;
@@ -18,14 +18,14 @@ pub(super) const SLACK_OF_RANGE: f64 = 1.01;
 
 /// Sets of groups that a body may be left with, cheapest first. A body that is carried keeps all: dropped
 /// groups are those of its own modes, and what the interface takes from these needs them.
-pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = Groups> {
-    sets().filter(move |set| !carried || *set == Groups::ALL)
+pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = TermGroups> {
+    sets().filter(move |set| !carried || *set == TermGroups::ALL)
 }
 
 /// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size
 /// of K_ff, W3 two times three.
-pub(super) fn sets() -> impl Iterator<Item = Groups> {
-    (0..8).map(|bits| Groups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
+pub(super) fn sets() -> impl Iterator<Item = TermGroups> {
+    (0..8).map(|bits| TermGroups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
 }
 
 /// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays
@@ -112,8 +112,8 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     // Norms of the actual terms are eigenproblems of the size of the basis: once for every case.
     let norms: Vec<Vec<Norms>> = cases.iter().map(|case| case.norms(tier_1)).collect();
     let mut trials = Vec::new();
-    let only_w1 = Groups::NONE.with(Group::W1);
-    for kept in sets().filter(|set| *set != Groups::ALL) {
+    let only_w1 = TermGroups::NONE.with(TermGroup::W1);
+    for kept in sets().filter(|set| *set != TermGroups::ALL) {
         let by_tier = cases.iter().zip(&norms).map(|(case, norms)| -> Result<Vec<Trial>> {
             let runs = case.runs();
             let TrialRuns { body, scene, situation, .. } = runs;
@@ -121,7 +121,7 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             let is_of_run = driven.rotation.of_run;
             let follows_run = scene.spin.is_some() && scene.run.duration.is_some() && is_of_run;
             let held = body.invariants().groups();
-            let is_cheap = kept == Groups::NONE || kept == only_w1 && held.w1;
+            let is_cheap = kept == TermGroups::NONE || kept == only_w1 && held.w1;
             if follows_run && !is_cheap {
                 return Ok(Vec::new());
             }

@@ -3,13 +3,13 @@
 use super::basis::BEYOND_BAND;
 use super::cases::{SLACK_OF_RANGE, together, worst};
 use super::demand::Demand;
-use super::search::{Choice, Search, Tried, TriedCase};
+use super::search::{Choice, SelectionSearch, Tried, TriedCase};
 use super::trial::Trial;
 use super::warnings::{phase_drifts, resonances};
 use crate::reference::{PART_OF_REFERENCE, ReferenceError};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::Groups;
+use flexbody_body::flex_body::TermGroups;
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_motion::scene::{Measure, Trace};
 
@@ -40,7 +40,7 @@ impl<'s> Deciding<'s> {
             trials.extend(demand.bounds.iter().map(|trial| Trial { case, ..trial.clone() }));
         }
         let choice = Choice {
-            groups: demands.iter().fold(Groups::NONE, |groups, demand| groups.or(demand.groups())),
+            groups: demands.iter().fold(TermGroups::NONE, |groups, demand| groups.or(demand.groups())),
             modes: (0..demands[0].body.n_modes()).collect(),
             shares: Vec::new(),
             chosen: None,
@@ -86,9 +86,9 @@ impl<'s> Deciding<'s> {
         let cases: Vec<TriedCase<'_>> = both.map(|(demand, motions)| Self::tried(demand, motions)).collect();
         watch(Event::Phase("trials"));
         let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
-        let search = Search {
+        let search = SelectionSearch {
             cases: &cases,
-            fixed: fixed.fold(Groups::NONE, |fixed, (demand, _)| fixed.or(demand.groups())),
+            fixed: fixed.fold(TermGroups::NONE, |fixed, (demand, _)| fixed.or(demand.groups())),
             carried: demands.iter().any(|demand| demand.scene.carried.is_some()),
         };
         let reason = self.search(&search)?;
@@ -132,7 +132,7 @@ impl<'s> Deciding<'s> {
     }
 
     /// Drops terms and modes; gives the reason for the modes.
-    fn search(&mut self, search: &Search<'_>) -> Result<String> {
+    fn search(&mut self, search: &SelectionSearch<'_>) -> Result<String> {
         let (choice, trials) = (&mut self.choice, &mut self.trials);
         if let Some(most) = self.demands[0].scene.requirements.multiplications {
             return Ok(match search.within_cost(most, choice, trials)? {
@@ -151,7 +151,7 @@ impl<'s> Deciding<'s> {
     }
 
     /// Measures the chosen model in every scene, and says what may go wrong with it.
-    fn measure_choice(&mut self, search: &Search<'_>) -> Result<()> {
+    fn measure_choice(&mut self, search: &SelectionSearch<'_>) -> Result<()> {
         for (demand, case) in self.demands.iter().zip(search.cases) {
             let mut chosen = Vec::new();
             let mut growth = None;

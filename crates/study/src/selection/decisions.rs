@@ -4,7 +4,7 @@ use super::demand::Demand;
 use super::search::Choice;
 use super::situation::Input;
 use super::trial::Trial;
-use flexbody_body::flex_body::{Group, Groups, TermDecision};
+use flexbody_body::flex_body::{TermDecision, TermGroup, TermGroups};
 
 /// The error that a decision about a group rests on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,10 +35,10 @@ pub(super) struct Deliberation<'d> {
 impl Deliberation<'_> {
     /// The decision about every group, and the error that it rests on where there is one.
     pub(super) fn decisions(&self) -> Vec<(TermDecision, Option<Ground>)> {
-        Group::ALL.into_iter().map(|group| self.decide(group)).collect()
+        TermGroup::ALL.into_iter().map(|group| self.decide(group)).collect()
     }
 
-    fn decide(&self, group: Group) -> (TermDecision, Option<Ground>) {
+    fn decide(&self, group: TermGroup) -> (TermDecision, Option<Ground>) {
         let body = self.demands[0].body;
         let kept = self.choice.groups.has(group);
         if !body.invariants().groups().has(group) {
@@ -70,15 +70,15 @@ impl Deliberation<'_> {
     }
 
     /// The last trial of what is kept without `group`.
-    fn last_without(&self, group: Group) -> Option<&Trial> {
-        let kept = self.choice.groups.and(Groups::without(group));
+    fn last_without(&self, group: TermGroup) -> Option<&Trial> {
+        let kept = self.choice.groups.and(TermGroups::without(group));
         let without = || self.trials.iter().filter(move |trial| trial.kept == kept);
         without().rfind(|trial| self.is_of_all(trial)).or(without().rfind(|trial| !trial.passed()))
     }
 
     /// The first trial of what is kept that passed; where bounds of each load case decided, the largest of
     /// those without `group`.
-    fn first_that_passed(&self, group: Group) -> Option<&Trial> {
+    fn first_that_passed(&self, group: TermGroup) -> Option<&Trial> {
         let kept = self.choice.groups;
         let passed = || self.trials.iter().filter(|trial| trial.passed());
         let of_all = passed().find(|trial| trial.kept == kept && self.is_of_all(trial));
@@ -87,7 +87,7 @@ impl Deliberation<'_> {
     }
 }
 
-fn undecided(group: Group, kept: bool, reason: &str) -> TermDecision {
+fn undecided(group: TermGroup, kept: bool, reason: &str) -> TermDecision {
     TermDecision { group, kept, tier: 0, bound: 0.0, limit: 0.0, reason: reason.to_owned() }
 }
 
@@ -105,7 +105,7 @@ fn ground(trial: &Trial, demands: &[Demand<'_>]) -> Option<Ground> {
 
 /// The decision that a trial without `group` leads to; `rotation` is the one that it rests on.
 pub(super) fn decision(
-    group: Group,
+    group: TermGroup,
     kept: bool,
     trial: &Trial,
     demands: &[Demand<'_>],
@@ -132,7 +132,7 @@ pub(super) fn decision(
 }
 
 /// The guideline of \[WP19\] section 8 that a set of groups is nearest to.
-pub(super) fn guideline(groups: Groups) -> &'static str {
+pub(super) fn guideline(groups: TermGroups) -> &'static str {
     match (groups.w1, groups.w2, groups.w3) {
         (false, false, false) => "I: inertia of the undeformed body",
         (true, false, false) => "II: constant centrifugal load, and W1 in the inertia with it",

@@ -6,7 +6,7 @@ use super::trial::Trial;
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{PerQuantity, Scene, Stage, Tolerance, damped_once, points_of};
 use std::borrow::Cow;
@@ -45,7 +45,7 @@ pub(super) struct Demand<'c> {
     /// Trials by bounds.
     pub bounds: Vec<Trial>,
     /// The groups that bounds leave, where these rule out some.
-    pub by_bounds: Option<Groups>,
+    pub by_bounds: Option<TermGroups>,
     /// What the body, and those before it that were enriched, lack of the model.
     pub lacks: &'c [ReferenceError],
     /// The largest rotation of the runs and that which the scene allows, where the runs stay behind it.
@@ -81,7 +81,7 @@ impl<'c> Demand<'c> {
     }
 
     /// The groups that the body holds and bounds leave.
-    pub(super) fn groups(&self) -> Groups {
+    pub(super) fn groups(&self) -> TermGroups {
         let held = self.body.invariants().groups();
         self.by_bounds.map_or(held, |kept| kept.and(held))
     }

@@ -4,7 +4,7 @@ use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
 use super::first_order::{FirstOrder, ModalState, Oscillators};
 use super::norms::Norms;
 use faer::Mat;
-use flexbody_body::flex_body::{FlexBody, Group, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
 use flexbody_linalg::larger;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Orientation, Terms};
 use flexbody_motion::scene::{Recording, Scene};
@@ -36,7 +36,13 @@ struct Instant<'r> {
 
 impl DroppedTerms {
     /// Of the motion `run` of `body` in `scene` with the groups `kept`.
-    pub(super) fn new(body: &FlexBody, scene: &Scene, run: &Recording, kept: Groups, norms: &Norms) -> Self {
+    pub(super) fn new(
+        body: &FlexBody,
+        scene: &Scene,
+        run: &Recording,
+        kept: TermGroups,
+        norms: &Norms,
+    ) -> Self {
         let eigenvalues = &body.modes().eigenvalue;
         let root: Vec<f64> = eigenvalues.iter().map(|l| l.sqrt()).collect();
         let instants = instants(scene, run);
@@ -72,7 +78,7 @@ fn first_order(
     let (errors, mut first) = oscillators.respond(forces, scene.initial.settled);
     let along: Vec<Instant<'_>> =
         instants.iter().zip(&errors).map(|(instant, error)| instant.of_error(error)).collect();
-    let coupling = Groups::NONE.with(Group::W2).with(Group::W3);
+    let coupling = TermGroups::NONE.with(TermGroup::W2).with(TermGroup::W3);
     let (rest, _) = by_norms(&along, coupling, norms, oscillators.root());
     first.rest.impulse += rest.impulse;
     first.rest.begun += rest.begun;
@@ -166,7 +172,7 @@ struct TermNorms<'n> {
 
 fn by_norms(
     instants: &[Instant<'_>],
-    dropped: Groups,
+    dropped: TermGroups,
     norms: &Norms,
     root: &[f64],
 ) -> (LoadSizes, TorqueDefect) {
@@ -261,7 +267,7 @@ impl TermNorms<'_> {
 fn by_terms(
     body: &FlexBody,
     instants: &[Instant<'_>],
-    kept: Groups,
+    kept: TermGroups,
     root: &[f64],
 ) -> (LoadSizes, TorqueDefect, Vec<Vec<f64>>) {
     let groups = body.invariants().groups();

@@ -3,7 +3,7 @@
 use super::cases::{Case, sets_in, together, worst};
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_motion::scene::{Measure, Scene, Tolerance, Trace};
 
 /// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are
@@ -12,7 +12,7 @@ const PART_OF_TERMS: f64 = 0.5;
 
 /// Terms and modes that are chosen so far.
 pub(super) struct Choice {
-    pub groups: Groups,
+    pub groups: TermGroups,
     pub modes: Vec<usize>,
     pub shares: Vec<ModeShare>,
     pub chosen: Option<Trial>,
@@ -73,23 +73,23 @@ pub(super) struct TriedCase<'s> {
 }
 
 /// The search for a model that holds in all load cases.
-pub(super) struct Search<'s> {
+pub(super) struct SelectionSearch<'s> {
     /// One at least.
     pub cases: &'s [TriedCase<'s>],
     /// Groups that have to stay: a run that turns slower than its scene allows shows of no term that it may
     /// be dropped.
-    pub fixed: Groups,
+    pub fixed: TermGroups,
     /// Whether something carries the body in a case: all groups stay then.
     pub carried: bool,
 }
 
-impl Search<'_> {
+impl SelectionSearch<'_> {
     fn body(&self) -> &FlexBody {
         self.cases[0].tried[0].runs.body
     }
 
     /// A model tried in all load cases; it may spend `part` of what is left of the tolerances of each.
-    fn measured(&self, modes: &[usize], groups: Groups, part: f64) -> Result<Trial> {
+    fn measured(&self, modes: &[usize], groups: TermGroups, part: f64) -> Result<Trial> {
         let in_case = |case: &TriedCase<'_>| -> Result<Trial> {
             let measured = |Tried { runs, measure }: &Tried<'_>| -> Result<Trial> {
                 Ok(runs.measured(measure, modes, groups, part * case.budget)?.0)
@@ -183,7 +183,7 @@ impl Search<'_> {
         trials: &mut Vec<Trial>,
     ) -> Result<bool> {
         let ranked = self.ranked(choice);
-        let mut best: Option<(f64, Groups, Vec<usize>)> = None;
+        let mut best: Option<(f64, TermGroups, Vec<usize>)> = None;
         for groups in sets_in(self.carried) {
             if groups.and(choice.groups) != groups {
                 continue;

@@ -11,7 +11,7 @@ use super::trial::{ModeShare, Trial, multiplications};
 use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Groups, TermDecision};
+use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroups};
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_motion::scene::{LoadCases, PerQuantity};
 
@@ -35,7 +35,7 @@ pub struct Selection {
     /// The error that each of these decisions rests on.
     pub grounds: Vec<Option<Ground>>,
     /// Groups that are kept.
-    pub groups: Groups,
+    pub groups: TermGroups,
     /// Modes that the body has.
     pub n_modes: usize,
     /// Frequency of each of them in hertz.
@@ -95,7 +95,7 @@ pub fn rule_out(body: &FlexBody, cases: &LoadCases, memory: Option<u64>) -> Resu
     };
     let passed: Option<Vec<Trial>> = demands.iter().enumerate().map(passed).collect();
     let Some(trials) = passed else { return Ok(Vec::new()) };
-    let kept = trials.iter().fold(Groups::NONE, |kept, trial| kept.or(trial.kept));
+    let kept = trials.iter().fold(TermGroups::NONE, |kept, trial| kept.or(trial.kept));
     let largest = trials.iter().max_by(|a, b| a.worst.total_cmp(&b.worst)).expect("one scene at least");
     let rotation = &demands[largest.case.unwrap_or(0)].cases[0].situation.spin;
     Ok(kept.dropped().map(|group| decision(group, false, largest, &demands, rotation)).collect())

@@ -3,7 +3,7 @@
 
 use super::norms::Norms;
 use super::situation::Situation;
-use flexbody_body::flex_body::{FlexBody, Group};
+use flexbody_body::flex_body::{FlexBody, TermGroup};
 use nalgebra::Vector3;
 
 /// How large a term is beside what it stands next to.
@@ -16,7 +16,7 @@ pub struct Significance {
     /// The unit-free bound as a formula.
     pub formula: &'static str,
     /// Group of the kinetic energy that it belongs to.
-    pub group: Group,
+    pub group: TermGroup,
     /// Guideline of \[WP19\] section 8 that asks for it.
     pub guideline: &'static str,
     /// Bound from I0 and the frequencies (tier 0).
@@ -30,7 +30,7 @@ struct Term {
     name: &'static str,
     beside: &'static str,
     formula: &'static str,
-    group: Group,
+    group: TermGroup,
     guideline: &'static str,
 }
 
@@ -38,7 +38,7 @@ const fn term(
     name: &'static str,
     beside: &'static str,
     formula: &'static str,
-    group: Group,
+    group: TermGroup,
     guideline: &'static str,
 ) -> Term {
     Term { name, beside, formula, group, guideline }
@@ -46,36 +46,42 @@ const fn term(
 
 /// Every term, in the order of [`sizes`].
 const TERMS: [Term; 8] = [
-    term("linear inertia W1 Q", "I0", "2 eta", Group::W1, "III"),
-    term("quadratic inertia Q'W2 Q", "I0", "eta^2", Group::W2, "III, free slender bodies"),
-    term("inertia coupling Q'W3", "I0 (Schur complement)", "eta^2", Group::W3, "III, free slender bodies"),
+    term("linear inertia W1 Q", "I0", "2 eta", TermGroup::W1, "III"),
+    term("quadratic inertia Q'W2 Q", "I0", "eta^2", TermGroup::W2, "III, free slender bodies"),
+    term(
+        "inertia coupling Q'W3",
+        "I0 (Schur complement)",
+        "eta^2",
+        TermGroup::W3,
+        "III, free slender bodies",
+    ),
     term(
         "constant centrifugal load W1'w w / 2",
         "elastic forces at the largest amplitude",
         "w^2 sqrt(e'I0 e) / (Omega_1^2 |q|)",
-        Group::W1,
+        TermGroup::W1,
         "II",
     ),
     term(
         "centrifugal load that grows with q, W2 Q w w",
         "elastic forces",
         "(w / Omega_1)^2",
-        Group::W2,
+        TermGroup::W2,
         "III",
     ),
     term(
         "Coriolis force on modes 2 W3' Qd w",
         "inertia forces of the modes",
         "2 w / Omega_1",
-        Group::W3,
+        TermGroup::W3,
         "IV",
     ),
-    term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", Group::W3, "III"),
+    term("Euler force on modes Q'W3 alpha", "elastic forces", "alpha / Omega_1^2", TermGroup::W3, "III"),
     term(
         "Coriolis torque 2 w (sqrt(tr J) + |q|) |qd|",
         "I0 w Omega_1",
         "2 |q| (sqrt(tr J) + |q|) / I0",
-        Group::W1,
+        TermGroup::W1,
         "IV",
     ),
 ];

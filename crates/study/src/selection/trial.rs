@@ -8,7 +8,7 @@ use super::situation::Situation;
 use super::variation::Variation;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
     ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin, Trace,
@@ -34,7 +34,7 @@ const LEAST_INSTANTS: usize = 500;
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
     /// Groups that it has.
-    pub kept: Groups,
+    pub kept: TermGroups,
     /// Number of modes that it has.
     pub modes: usize,
     /// Multiplications of an evaluation of its equations.
@@ -84,7 +84,7 @@ impl TrialRuns<'_> {
     ///
     /// # Errors
     /// As [`trace`].
-    pub fn motion(&self, kept: Groups) -> Result<(Trace, Vec<Diagnostic>)> {
+    pub fn motion(&self, kept: TermGroups) -> Result<(Trace, Vec<Diagnostic>)> {
         let mut scene = self.scene.clone();
         scene.run.terms = Terms::ALL.held(kept);
         trace(self.body, &scene, self.memory, |_| ())
@@ -96,7 +96,7 @@ impl TrialRuns<'_> {
     ///
     /// # Errors
     /// As [`simulate`].
-    pub fn fine_motion(&self, kept: Groups) -> Result<Option<Recording>> {
+    pub fn fine_motion(&self, kept: TermGroups) -> Result<Option<Recording>> {
         let mut scene = self.scene.clone();
         let duration = self.situation.duration.value;
         let wanted = |rate: f64| (duration * rate / TAU * INSTANTS_PER_PERIOD).ceil();
@@ -150,7 +150,7 @@ impl TrialRuns<'_> {
         &self,
         measure: &Measure<'_>,
         modes: &[usize],
-        kept: Groups,
+        kept: TermGroups,
         budget: f64,
     ) -> Result<(Trial, Option<ErrorHistory>)> {
         let whole = measure.body();
@@ -192,7 +192,7 @@ impl TrialRuns<'_> {
     /// The trial by bounds of a model with the groups `kept`. With its motion `run`, the load that the
     /// dropped terms are to its error is taken along that, at its instants; without, at the largest motion
     /// that loads and rotation allow.
-    pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: Groups, budget: f64) -> Trial {
+    pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: TermGroups, budget: f64) -> Trial {
         let mut trial = Trial {
             kept,
             modes: self.body.n_modes(),
@@ -219,7 +219,7 @@ impl TrialRuns<'_> {
         &self,
         norms: &Norms,
         run: Option<&Recording>,
-        kept: Groups,
+        kept: TermGroups,
     ) -> std::result::Result<OutputErrors, String> {
         let driven = self.situation.driven.as_ref().map_err(String::clone)?;
         let dropped = kept.complement();
@@ -364,6 +364,6 @@ pub struct ModeShare {
 }
 
 /// Multiplications of an evaluation of the equations of `body` with `groups`.
-pub(super) fn multiplications(body: &FlexBody, groups: Groups) -> usize {
+pub(super) fn multiplications(body: &FlexBody, groups: TermGroups) -> usize {
     EquationsOfMotion::new(body, Terms::ALL.held(groups)).multiplications()
 }

@@ -2,7 +2,7 @@
 
 use super::Source;
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Group, Groups, Storage, TermDecision};
+use flexbody_body::flex_body::{FlexBody, Storage, TermDecision, TermGroup, TermGroups};
 
 /// Mode counts of a ladder: about three to a doubling of the work.
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
@@ -10,7 +10,7 @@ const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 2
 /// What sets a candidate apart: a series of the plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum CandidateKind {
     /// Some of the modes, all groups of the kinetic energy.
     Modes,
     /// Some groups.
@@ -21,9 +21,9 @@ pub enum Kind {
     Single,
 }
 
-impl Kind {
+impl CandidateKind {
     /// All kinds, in the order of plots.
-    pub const ALL: [Kind; 4] = [Self::Modes, Self::Groups, Self::Lumped, Self::Single];
+    pub const ALL: [CandidateKind; 4] = [Self::Modes, Self::Groups, Self::Lumped, Self::Single];
 
     /// Name in reports.
     pub fn name(self) -> &'static str {
@@ -72,7 +72,7 @@ pub struct Candidate {
     /// Modes of the source that it has (from 0), ascending.
     pub modes: Vec<usize>,
     /// Groups of the kinetic energy that it has.
-    pub groups: Groups,
+    pub groups: TermGroups,
     /// What was lumped of its mass.
     pub lumped: Option<LumpedMass>,
     /// Precision of its numbers.
@@ -81,22 +81,28 @@ pub struct Candidate {
 
 impl Candidate {
     fn whole(source: usize, nf: usize) -> Self {
-        Self { source, modes: (0..nf).collect(), groups: Groups::ALL, lumped: None, storage: Storage::F64 }
+        Self {
+            source,
+            modes: (0..nf).collect(),
+            groups: TermGroups::ALL,
+            lumped: None,
+            storage: Storage::F64,
+        }
     }
 
     /// The kind: in what it differs from the whole body of its source.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> CandidateKind {
         match self {
-            Self { lumped: Some(_), .. } => Kind::Lumped,
-            Self { storage: Storage::F32, .. } => Kind::Single,
-            Self { groups, .. } if *groups != Groups::ALL => Kind::Groups,
-            _ => Kind::Modes,
+            Self { lumped: Some(_), .. } => CandidateKind::Lumped,
+            Self { storage: Storage::F32, .. } => CandidateKind::Single,
+            Self { groups, .. } if *groups != TermGroups::ALL => CandidateKind::Groups,
+            _ => CandidateKind::Modes,
         }
     }
 
     /// Names of its groups.
     pub fn group_names(&self) -> Vec<&'static str> {
-        Group::ALL.into_iter().filter(|group| self.groups.has(*group)).map(Group::name).collect()
+        TermGroup::ALL.into_iter().filter(|group| self.groups.has(*group)).map(TermGroup::name).collect()
     }
 
     /// The body.
@@ -110,7 +116,7 @@ impl Candidate {
         };
         let all = self.modes.len() == body.n_modes();
         if !all || self.groups != body.groups() {
-            let decide = |group: Group| TermDecision {
+            let decide = |group: TermGroup| TermDecision {
                 group,
                 kept: false,
                 tier: 2,
@@ -128,7 +134,8 @@ impl Candidate {
 }
 
 /// Groups that a ladder of modes is tried with, the cheapest first.
-const SETS: [Groups; 3] = [Groups::NONE, Groups { w1: true, ..Groups::NONE }, Groups::ALL];
+const SETS: [TermGroups; 3] =
+    [TermGroups::NONE, TermGroups { w1: true, ..TermGroups::NONE }, TermGroups::ALL];
 
 /// Errors over their tolerances of a set of groups with all modes: beyond the first it is hopeless, and below
 /// the second dearer sets cannot be told from it.
@@ -151,7 +158,7 @@ pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candida
             continue;
         }
         let subsets =
-            (0..8).rev().map(|bits| Groups { w1: bits & 4 != 0, w2: bits & 2 != 0, w3: bits & 1 != 0 });
+            (0..8).rev().map(|bits| TermGroups { w1: bits & 4 != 0, w2: bits & 2 != 0, w3: bits & 1 != 0 });
         all.extend(subsets.map(|groups| Candidate { groups, ..whole.clone() }));
         let couplings = |scheme: &str| Some(LumpedMass::Couplings(scheme.to_owned()));
         all.extend(of.lumped().map(|scheme| Candidate { lumped: couplings(scheme), ..whole.clone() }));
@@ -166,13 +173,13 @@ pub(super) fn ladder(
     sources: &[Source],
     liveliest: &[usize],
     carried: bool,
-    worst_of: impl Fn(Groups) -> f64,
+    worst_of: impl Fn(TermGroups) -> f64,
 ) -> Vec<Candidate> {
     let body = sources[0].body();
     let mut sets = Vec::new();
     for groups in SETS {
         let worst = worst_of(groups.and(body.groups()));
-        sets.extend((worst <= HOPELESS || groups == Groups::ALL).then_some(groups));
+        sets.extend((worst <= HOPELESS || groups == TermGroups::ALL).then_some(groups));
         if worst <= PERFECT {
             break;
         }
@@ -181,7 +188,8 @@ pub(super) fn ladder(
     let mut all = Vec::new();
     for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
         for modes in [(0..count).collect(), first_of(liveliest, count)] {
-            let with = |groups: &Groups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
+            let with =
+                |groups: &TermGroups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
             all.extend(sets.iter().rev().map(with));
         }
     }

@@ -1,6 +1,6 @@
 //! The motion of a load case that candidates are measured against.
 
-use super::{Allowed, Candidate, InCase, NodalReference, Settings, Source, timing};
+use super::{Allowed, Candidate, InCase, NodalReference, Source, TradeSettings, timing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::refuse_beyond;
@@ -36,7 +36,7 @@ impl<'m> StudyCase<'m> {
         scene: &Scene,
         name: Option<String>,
         nodal: Option<&'m FeModel>,
-        settings: &Settings<'_>,
+        settings: &TradeSettings<'_>,
         reserved: f64,
         watch: Watch<'_>,
     ) -> Result<Self> {

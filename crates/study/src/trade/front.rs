@@ -1,6 +1,6 @@
 //! The best of the candidates.
 
-use super::{Measured, Row};
+use super::{Measured, TradeRow};
 
 /// The candidate to take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -24,7 +24,7 @@ impl Recommendation {
     }
 
     /// Of `rows`, with the multiplications that the scene allows instead of tolerances.
-    pub(super) fn new(rows: &[Row], allowed: Option<usize>) -> Self {
+    pub(super) fn new(rows: &[TradeRow], allowed: Option<usize>) -> Self {
         let points = points(rows);
         match allowed {
             Some(allowed) => {
@@ -38,7 +38,7 @@ impl Recommendation {
     }
 
     /// The cheapest of `rows` that is good enough.
-    pub(super) fn cheapest(rows: &[Row], is_enough: impl Fn(&Measured) -> bool) -> Self {
+    pub(super) fn cheapest(rows: &[TradeRow], is_enough: impl Fn(&Measured) -> bool) -> Self {
         let enough = |row: usize| rows[row].outcome.as_ref().is_ok_and(&is_enough);
         let cheapest = points(rows).into_iter().find(|point| enough(point.2));
         cheapest.map_or(Self::None, |point| Self::Cheapest(point.2))
@@ -49,7 +49,7 @@ impl Recommendation {
 /// multiplications per evaluation and the largest ratio of error to tolerance. Multiplications stand for the
 /// time of an evaluation, which is their number but for what clocks add: the front does not depend on the
 /// machine and its load.
-pub fn front(rows: &[Row]) -> Vec<usize> {
+pub fn front(rows: &[TradeRow]) -> Vec<usize> {
     let mut best = f64::INFINITY;
     let better = |point: &(usize, f64, usize)| {
         let better = point.1 < best;
@@ -63,8 +63,8 @@ pub fn front(rows: &[Row]) -> Vec<usize> {
 
 /// (multiplications, worst ratio, row) of what was measured, ascending. A lumped mass is there to be compared
 /// with: it costs what the consistent one does.
-fn points(rows: &[Row]) -> Vec<(usize, f64, usize)> {
-    let point = |(at, row): (usize, &Row)| {
+fn points(rows: &[TradeRow]) -> Vec<(usize, f64, usize)> {
+    let point = |(at, row): (usize, &TradeRow)| {
         let measured = row.outcome.as_ref().ok().filter(|_| row.candidate.lumped.is_none())?;
         Some((measured.multiplications, measured.worst(), at))
     };

@@ -11,11 +11,11 @@ mod source;
 mod study;
 mod timing;
 
-pub use candidate::{Candidate, Kind, LumpedMass};
+pub use candidate::{Candidate, CandidateKind, LumpedMass};
 pub use conversions::{Conversions, WantedBodies, conversions};
 pub use front::{Recommendation, front};
 pub use nodal::{Allowed, NodalIntegration, NodalReference};
-pub use row::{Failed, InCase, Measured, Row, Timed};
-pub use settings::{Settings, reserved};
+pub use row::{Failed, InCase, Measured, Timed, TradeRow};
+pub use settings::{TradeSettings, reserved};
 pub use source::Source;
 pub use study::{ReferenceChoice, ReferenceKind, Trade, TradeCase, trade};

@@ -69,7 +69,7 @@ pub struct Failed(pub Diagnostic);
 
 /// A candidate and its measurement.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct TradeRow {
     /// Modes, groups and precision of the body.
     pub candidate: Candidate,
     /// Name of the source that it is made of.

@@ -4,7 +4,7 @@ use crate::reference::ReferenceError;
 
 /// Settings of a study.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings<'s> {
+pub struct TradeSettings<'s> {
     /// Integrations whose median time counts; of those that take long, fewer.
     pub repeat: usize,
     /// Bytes that there are; `None` where it is not known.

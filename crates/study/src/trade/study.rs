@@ -3,13 +3,13 @@
 use super::candidate::{first_of, ladder, whole_candidates};
 use super::case::StudyCase;
 use super::{
-    Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Row, Settings,
-    Source, Timed, front,
+    Candidate, Failed, InCase, Measured, NodalIntegration, NodalReference, Recommendation, Source, Timed,
+    TradeRow, TradeSettings, front,
 };
 use crate::selection::liveliest_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
-use flexbody_body::flex_body::{FlexBody, Groups, Storage};
+use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
 use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::FeModel;
 use flexbody_motion::integration::Work;
@@ -71,7 +71,7 @@ pub struct Trade {
     /// Multiplications that the scene allows instead.
     pub allowed: Option<usize>,
     /// All candidates; the first is the whole body of the reference.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TradeRow>,
     /// Rows of the Pareto front, ascending in cost.
     pub front: Vec<usize>,
     /// The row to take.
@@ -121,7 +121,7 @@ pub fn trade(
     sources: &[Source],
     cases: &LoadCases,
     nodal: Option<&FeModel>,
-    settings: &Settings<'_>,
+    settings: &TradeSettings<'_>,
     watch: Watch<'_>,
 ) -> Result<Trade> {
     let Some(source) = sources.first() else {
@@ -156,7 +156,7 @@ pub fn trade(
 }
 
 impl TradeCase {
-    fn new(at: usize, case: &StudyCase<'_>, rows: &[Row], recommended: Recommendation) -> Self {
+    fn new(at: usize, case: &StudyCase<'_>, rows: &[TradeRow], recommended: Recommendation) -> Self {
         let is_within = |measured: &Measured, at: usize, most: f64| measured.by_case[at].worst <= most;
         let most = case.most();
         let taken = recommended.row().and_then(|row| rows[row].outcome.as_ref().ok());
@@ -213,12 +213,12 @@ impl Job<'_> {
 
     /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one
     /// after the other.
-    fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<Row>> {
+    fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<TradeRow>> {
         let carried = self.cases.iter().any(|case| case.scene.carried.is_some());
         let whole = whole_candidates(self.sources(), carried);
         let mut rows = self.errors(whole, "errors of whole bodies", watch)?;
-        let worst_of = |groups: Groups| {
-            let has_groups = |row: &&Row| {
+        let worst_of = |groups: TermGroups| {
+            let has_groups = |row: &&TradeRow| {
                 let own = &row.candidate;
                 own.source == 0 && own.groups == groups && own.lumped.is_none() && own.storage == Storage::F64
             };
@@ -236,7 +236,7 @@ impl Job<'_> {
 
     /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that
     /// is not, as a selection does.
-    fn refine(&self, liveliest: &[usize], rows: &mut Vec<Row>) -> Result<()> {
+    fn refine(&self, liveliest: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
         if self.allowed.is_some() {
             return Ok(());
         }
@@ -256,7 +256,7 @@ impl Job<'_> {
             return Ok(());
         }
         let with = |count: usize| Candidate { modes: first_of(order, count), ..best.clone() };
-        let is_rung = |row: &&Row| row.candidate == with(row.candidate.modes.len());
+        let is_rung = |row: &&TradeRow| row.candidate == with(row.candidate.modes.len());
         let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
         let (mut too_few, mut enough) =
             (fewer.map(|row| row.candidate.modes.len()).max().unwrap_or(0), count);
@@ -274,7 +274,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn time_what_is_worth_it(&self, rows: &mut [Row], repeat: usize, watch: Watch<'_>) -> Result<()> {
+    fn time_what_is_worth_it(&self, rows: &mut [TradeRow], repeat: usize, watch: Watch<'_>) -> Result<()> {
         let recommended = Recommendation::new(rows, self.allowed).row();
         let mut worth_it: Vec<usize> = front(rows).into_iter().chain(recommended).chain([0]).collect();
         worth_it.sort_unstable();
@@ -288,7 +288,7 @@ impl Job<'_> {
     }
 
     /// The rows of candidates, without times.
-    fn errors(&self, all: Vec<Candidate>, phase: &'static str, watch: Watch<'_>) -> Result<Vec<Row>> {
+    fn errors(&self, all: Vec<Candidate>, phase: &'static str, watch: Watch<'_>) -> Result<Vec<TradeRow>> {
         let progress = Progress::new(watch, phase, all.len());
         let measured = |candidate| {
             let row = self.measure(candidate);
@@ -299,7 +299,7 @@ impl Job<'_> {
     }
 
     /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
-    fn measure(&self, candidate: Candidate) -> Result<Row> {
+    fn measure(&self, candidate: Candidate) -> Result<TradeRow> {
         let source = &self.sources()[candidate.source];
         let last = candidate.modes.last().copied().unwrap_or(0);
         let outcome = match self.measured(&candidate) {
@@ -312,7 +312,7 @@ impl Job<'_> {
             }
             Err(error) => return Err(error),
         };
-        Ok(Row {
+        Ok(TradeRow {
             source: source.name().to_owned(),
             last_frequency_hz: source.body().frequencies_hz()[last],
             candidate,
@@ -349,7 +349,7 @@ impl Job<'_> {
         })
     }
 
-    fn time(&self, row: &mut Row, repeat: usize) -> Result<()> {
+    fn time(&self, row: &mut TradeRow, repeat: usize) -> Result<()> {
         let Ok(measured) = &mut row.outcome else { return Ok(()) };
         let mut all = Timed { evaluation: 0.0, integration: 0.0, work: Work::default() };
         for case in self.cases {

@@ -15,7 +15,7 @@ use flexbody_motion::scene::{
 use flexbody_study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
 use oracle::beams::{BeamMass, star};
-use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, grid};
 use oracle::scenes::nothing_happens;
@@ -68,7 +68,7 @@ fn with_ends(mut raw: RawModel) -> RawModel {
 /// A rubber beam of some bricks, askew.
 fn solid() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
-    let mesh = Mesh::from_cells(Element::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([3, 1, 1]), |[x, y, z]| {
         [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
     });
     with_ends(mesh.assemble(&rubber, MassRule::Consistent).raw_model())

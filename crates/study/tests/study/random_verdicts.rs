@@ -21,7 +21,7 @@ use flexbody_study::selection::select;
 use flexbody_study::tailoring::Tailoring;
 use flexbody_study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
-use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
 use oracle::mesh::{Mesh, grid};
 use oracle::plane::rectangle;
@@ -123,7 +123,7 @@ fn graded_block(random: &mut Random) -> RawModel {
     let cells = [3 + pick(random, 3) as i32, 1 + pick(random, 2) as i32, 1];
     let size = [between(random, 0.3, 0.7), between(random, 0.2, 0.5), between(random, 0.1, 0.4)];
     let [skew, taper] = [between(random, 0.0, 0.2), between(random, -0.1, 0.1)];
-    let mesh = Mesh::from_cells(Element::Hex8, &grid(cells), |[x, y, z]| {
+    let mesh = Mesh::from_cells(ElementKind::Hex8, &grid(cells), |[x, y, z]| {
         [size[0] * x + skew * y, size[1] * y * (1.0 - taper * x), size[2] * z * (1.0 + taper * y)]
     });
     let border = size[0] * between(random, 0.3, 0.7) * f64::from(cells[0]);

@@ -19,7 +19,7 @@ use flexbody_study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, Referen
 use flexbody_study::tailoring::{Tailoring, convert_for};
 use flexbody_study::trade::{Allowed, NodalReference};
 use nalgebra::Vector3;
-use oracle::elements::{Kind as Element, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Mesh, grid};
 use oracle::scenes::nothing_happens;
 use proptest::prelude::*;
@@ -30,22 +30,22 @@ fn model() -> FeModel {
 }
 
 fn beam(cells: [i32; 3]) -> FeModel {
-    beam_of(Element::Hex8, MassRule::Consistent, cells)
+    beam_of(ElementKind::Hex8, MassRule::Consistent, cells)
 }
 
-fn beam_of(element: Element, rule: MassRule, cells: [i32; 3]) -> FeModel {
+fn beam_of(element: ElementKind, rule: MassRule, cells: [i32; 3]) -> FeModel {
     rooted_beam(element, rule, cells, Coupling::Averaging)
 }
 
 fn raw_beam() -> RawModel {
-    raw_rooted_beam(Element::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Averaging)
+    raw_rooted_beam(ElementKind::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Averaging)
 }
 
-fn rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> FeModel {
+fn rooted_beam(element: ElementKind, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> FeModel {
     FeModel::from_raw(raw_rooted_beam(element, rule, cells, coupling)).expect("a sound model").model
 }
 
-fn raw_rooted_beam(element: Element, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> RawModel {
+fn raw_rooted_beam(element: ElementKind, rule: MassRule, cells: [i32; 3], coupling: Coupling) -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(element, &grid(cells), |[x, y, z]| {
         [0.5 * x + 0.06 * y, 0.4 * y * (1.0 - 0.05 * x), 0.3 * z * (1.0 + 0.1 * y)]
@@ -275,7 +275,7 @@ proptest! {
 /// A body with all modes lacks these motions and nothing else.
 #[test]
 fn motions_without_mass_follow_a_force_that_accelerates_the_body() {
-    let model = beam_of(Element::Tet10, MassRule::Reduced, [1, 1, 1]);
+    let model = beam_of(ElementKind::Tet10, MassRule::Reduced, [1, 1, 1]);
     let force = Vector3::new(1e-5, 2e-5, -1e-5);
     let scene = pulled(&model, 11, force, 0.4, Vector3::zeros());
     for modes in [9, 15, usize::MAX] {
@@ -475,7 +475,7 @@ fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Sce
 /// another one, by far.
 #[test]
 fn a_rigid_interface_is_rigid_in_the_model_that_the_body_is_compared_with() {
-    let model = rooted_beam(Element::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Rigid);
+    let model = rooted_beam(ElementKind::Hex8, MassRule::Consistent, [4, 1, 1], Coupling::Rigid);
     let basis = BasisChoice::CraigBampton(CraigBampton);
     let of = |modes: usize| {
         let settings = ConvertSettings { basis: basis.clone(), ..settings(modes) };

@@ -7,7 +7,7 @@ use flexbody_linalg::progress::SILENT;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
 use flexbody_study::selection::select;
-use flexbody_study::trade::{Settings, Source, trade};
+use flexbody_study::trade::{Source, TradeSettings, trade};
 use nalgebra::Vector3;
 use oracle::brackets::footed_block;
 use oracle::flexible::body_of;
@@ -134,7 +134,7 @@ fn selections_and_studies_do_not_know_the_frame() {
         }
     }
     let [_, _, (name, scene), _] = golden();
-    let settings = Settings { repeat: 1, memory: None, reserved: &[], longest: None };
+    let settings = TradeSettings { repeat: 1, memory: None, reserved: &[], longest: None };
     let studies = bodies.iter().map(|body| {
         let source = Source::new("body", body.clone(), None).expect("a body");
         trade(&[source], &scene.clone().into(), None, &settings, SILENT).expect("a study")

@@ -1,6 +1,6 @@
 //! Guaranteed bounds of the selection, and a random search for a motion that breaks them.
 
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use flexbody_motion::scene::{
     Axes, Interpolation, Load, Measure, OutputErrors, Point, Recording, Samples, Scene, Stage, Trace,
@@ -63,21 +63,21 @@ impl<'t> Tested<'t> {
     }
 
     /// The motion at the instants of the scene.
-    fn recording(&self, kept: Groups) -> Recording {
+    fn recording(&self, kept: TermGroups) -> Recording {
         simulate(self.body, &self.with(kept), None, |_| ()).expect("a motion").0
     }
 
     /// The continuous motion of the whole body.
     fn whole(&self) -> Trace {
-        self.runs().motion(Groups::ALL).expect("a motion").0
+        self.runs().motion(TermGroups::ALL).expect("a motion").0
     }
 
     /// That with some groups, where that of the whole body was looked at.
-    fn beside(&self, whole: &Trace, kept: Groups) -> Trace {
+    fn beside(&self, whole: &Trace, kept: TermGroups) -> Trace {
         trace_at(self.body, &self.with(kept), &whole.time, None).expect("a motion")
     }
 
-    fn with(&self, kept: Groups) -> Scene {
+    fn with(&self, kept: TermGroups) -> Scene {
         let mut scene = self.scene.clone();
         scene.run.terms = Terms::ALL.held(kept);
         scene
@@ -114,7 +114,7 @@ fn search(body: &FlexBody, scene: &Scene) -> Vec<String> {
     let driven = tested.situation.driven.as_ref().expect("bounds");
     let root: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
     let all: Vec<usize> = (0..body.n_modes()).collect();
-    let whole = tested.recording(Groups::ALL);
+    let whole = tested.recording(TermGroups::ALL);
     let continuous = tested.whole();
     let measure = Measure::new(body, &continuous);
     let mut found = Broken::default();

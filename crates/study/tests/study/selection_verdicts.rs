@@ -1,7 +1,7 @@
 //! What `select` decides holds when it is measured: the selected body against the whole one, in the scene and
 //! at the limits of it.
 
-use flexbody_body::flex_body::{FlexBody, Groups};
+use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::progress::SILENT;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
@@ -93,7 +93,7 @@ proptest! {
         let mut scene = doing.scene(whole, free);
         prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
         let cost = |body: &FlexBody| EquationsOfMotion::new(body, Terms::ALL).multiplications();
-        let least = cost(&whole.reduced(&[0], Groups::NONE, selected(whole, &scene).terms.iter().map(|term| {
+        let least = cost(&whole.reduced(&[0], TermGroups::NONE, selected(whole, &scene).terms.iter().map(|term| {
             let mut term = term.clone();
             term.kept = false;
             term
@@ -119,7 +119,7 @@ fn without_a_run_only_bounds_and_the_band_decide() {
     let body = &bodies()[0];
     let all: Vec<usize> = (0..body.n_modes()).collect();
     let selection = selected(body, &idle(Requirements::default()));
-    assert_eq!((selection.groups, &selection.modes), (Groups::ALL, &all));
+    assert_eq!((selection.groups, &selection.modes), (TermGroups::ALL, &all));
     assert!(
         selection.chosen.is_none() && selection.terms.iter().all(|term| term.kept && !term.reason.is_empty())
     );
@@ -127,7 +127,7 @@ fn without_a_run_only_bounds_and_the_band_decide() {
     let frequencies = body.frequencies_hz();
     let band = 0.5 * frequencies[3] * (1.0 + 1e-9);
     let selection = selected(body, &idle(Requirements { band: Some(band), ..Requirements::default() }));
-    assert_eq!((selection.groups, selection.modes), (Groups::ALL, vec![0, 1, 2, 3]));
+    assert_eq!((selection.groups, selection.modes), (TermGroups::ALL, vec![0, 1, 2, 3]));
 
     // Joints that turn the body slowly, and a deflection that is not looked at.
     let mut slow = Requirements::default();
@@ -135,10 +135,10 @@ fn without_a_run_only_bounds_and_the_band_decide() {
     slow.motion.angular_velocity = Some(Range::Any(1e-5 * body.modes().eigenvalue[0].sqrt()));
     slow.motion.angular_acceleration = Some(Range::Axes(Vector3::zeros()));
     let selection = selected(body, &idle(slow.clone()));
-    assert_eq!((selection.groups, &selection.modes), (Groups::NONE, &all));
+    assert_eq!((selection.groups, &selection.modes), (TermGroups::NONE, &all));
     assert!(selection.terms.iter().all(|term| !term.kept && term.tier == 0 && term.bound <= term.limit));
 
     slow.motion.angular_velocity = Some(Range::Any(0.5 * body.modes().eigenvalue[0].sqrt()));
     let selection = selected(body, &idle(slow));
-    assert_eq!(selection.groups, Groups::ALL, "half the first frequency is not slow");
+    assert_eq!(selection.groups, TermGroups::ALL, "half the first frequency is not slow");
 }

@@ -6,7 +6,7 @@ use super::*;
 /// above the limit of other bodies, and a mass that is wrong is still found.
 #[test]
 fn many_modes_of_a_slender_bar_hold_to_the_rounding_of_their_summands() {
-    let mesh = Mesh::block(Kind::Hex8, [60, 1, 1], [1.0, 2e-4, 2e-4]);
+    let mesh = Mesh::block(ElementKind::Hex8, [60, 1, 1], [1.0, 2e-4, 2e-4]);
     let end = |at: f64| -> Vec<i64> {
         let nodes = (1..).zip(&mesh.nodes);
         nodes.filter(|(_, x)| (x[0] - at).abs() < 1e-9).map(|(id, _)| id).collect()

@@ -2,7 +2,9 @@
 
 use super::bodies::{Body, assert_agree, random_matrix, stiffness};
 use faer::Mat;
-use flexbody_body::invariants::{BodyFrame, Frame, Groups, Invariants, PrimaryData, choose_frame, condense};
+use flexbody_body::invariants::{
+    BodyFrame, Frame, Invariants, PrimaryData, TermGroups, choose_frame, condense,
+};
 use nalgebra::Vector3;
 use oracle::models::symmetric;
 use oracle::random::Random;
@@ -117,7 +119,7 @@ fn units_scale_every_invariant_by_its_dimension() {
         s: a.s().unwrap().each_ref().map(|row| row.each_ref().map(|s| times(s, mass * shape * shape))),
         modal_stiffness: a.modal_stiffness().clone(),
         general: None,
-        groups: Groups::ALL,
+        groups: TermGroups::ALL,
     });
     assert_agree("units", &expected, &b, 1e-14);
 }

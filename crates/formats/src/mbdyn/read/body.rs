@@ -6,7 +6,7 @@ use crate::import::redundant::lacks_w2;
 use crate::import::{ImportedBody, ImportedFrame};
 use faer::Mat;
 use flexbody_body::flex_body::{GeometricStiffness, LoadKind, UnitLoad};
-use flexbody_body::invariants::{Groups, Numbered};
+use flexbody_body::invariants::{Numbered, TermGroups};
 use nalgebra::{Matrix3, Vector3};
 
 /// Groups of the invariants that couple rigid motion and modes.
@@ -106,7 +106,7 @@ fn file(records: &Records, order: Order) -> Numbered {
         i7: Matrix3::zeros(),
         i8: (0..nf).map(|j| Matrix3::from_fn(|a, b| at(16, a, 3 * j + b))).collect(),
         i9: records.has(18).then(|| Mat::from_fn(3 * nf, 3 * nf, i9)),
-        groups: Groups { w1: records.has(16), ..Groups::ALL },
+        groups: TermGroups { w1: records.has(16), ..TermGroups::ALL },
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::records::Records;
 use faer::Mat;
-use flexbody_body::invariants::{Groups, Numbered};
+use flexbody_body::invariants::{Numbered, TermGroups};
 use nalgebra::{Matrix3, Vector3};
 
 /// Masses and inertias of the nodes, and what follows from them.
@@ -30,7 +30,7 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
         i7: Matrix3::zeros(),
         i8: vec![Matrix3::zeros(); nf],
         i9: None,
-        groups: Groups::ALL,
+        groups: TermGroups::ALL,
     };
     let (mut i5, mut i9) = (Mat::zeros(3 * nf, nf), Mat::zeros(3 * nf, 3 * nf));
     let (mut negative, mut below, mut all) = (0, 0.0, 0.0);

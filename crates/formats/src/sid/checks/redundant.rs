@@ -14,7 +14,7 @@ use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 
 /// The checks of a file, and what they say of its Oe1.
-pub(crate) struct Found {
+pub(crate) struct RedundancyChecks {
     pub(crate) checks: Vec<AuditCheck>,
     /// Whether Oe1 holds more than Me does: geometric stiffness for spin, or inertia that does not belong to
     /// Me.
@@ -28,7 +28,7 @@ pub(crate) fn checks(
     frames: &[FrameArrays],
     layout: &Layout,
     declared: &Declared,
-) -> Found {
+) -> RedundancyChecks {
     let missing = Missing::find(arrays, layout, declared);
     let mut all = vec![digits(listed, arrays, frames), missing.check()];
     let identities = Identities { arrays, layout, declared, missing };
@@ -44,7 +44,7 @@ pub(crate) fn checks(
     all.push(identities.damping());
     all.extend(frame_checks(listed, frames));
     all.extend(frequencies(listed, arrays));
-    Found { checks: all, spin_in_oe: centrifugal.spin_in_oe }
+    RedundancyChecks { checks: all, spin_in_oe: centrifugal.spin_in_oe }
 }
 
 /// The arrays of the body, how they are to be read, and which of them are not there: identities of those are

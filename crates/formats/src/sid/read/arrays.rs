@@ -1,6 +1,6 @@
 //! The arrays of the body, dense, and how exactly they are written.
 
-use super::parse::{Frame, Listed};
+use super::parse::{Listed, ListedFrame};
 use super::taylor::Taylor;
 use crate::import::digits::Digits;
 use faer::Mat;
@@ -132,7 +132,7 @@ pub(crate) struct FrameArrays {
 }
 
 impl FrameArrays {
-    pub(crate) fn new(frame: &Frame, listed: &Listed<'_>, file: Digits) -> Self {
+    pub(crate) fn new(frame: &ListedFrame, listed: &Listed<'_>, file: Digits) -> Self {
         let array = |name: &str| Array::new(frame.object(name), listed, file, name);
         let known = |name: &str| frame.object(name).map(|_| array(name));
         Self { origin: array("origin"), phi: array("phi"), psi: known("psi"), ap: known("ap") }

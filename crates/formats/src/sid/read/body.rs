@@ -5,7 +5,7 @@ use super::parse::Listed;
 use crate::import::{ImportedBody, ImportedFrame};
 use faer::Mat;
 use flexbody_base::units::UnitSystem;
-use flexbody_body::invariants::{Groups, Numbered};
+use flexbody_body::invariants::{Numbered, TermGroups};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 use nalgebra::Vector3;
 
@@ -108,7 +108,7 @@ fn numbered(arrays: &Arrays, i5: Option<Mat<f64>>, i9: Option<Mat<f64>>) -> Numb
         i2: Vector3::from_fn(|a, _| arrays.first_moment.m0[(a, 0)]),
         i3: Mat::from_fn(3, nq, |a, k| arrays.ct.m0[(k, a)]),
         i4: Mat::from_fn(3, nq, |a, k| arrays.cr.m0[(k, a)]),
-        groups: Groups { w1, w2: i9.is_some(), w3: i5.is_some() },
+        groups: TermGroups { w1, w2: i9.is_some(), w3: i5.is_some() },
         i5,
         i6: arrays.me.m0.clone(),
         i7: arrays.j0(),

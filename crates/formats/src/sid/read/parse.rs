@@ -32,13 +32,13 @@ const MODES_OF_ANY_FILE: usize = 100;
 const NUMBERS_OF_ANY_FILE: usize = 1_000_000;
 
 /// A frame as it is listed; its objects in the order of [`FRAME_OBJECTS`].
-pub(crate) struct Frame {
+pub(crate) struct ListedFrame {
     pub(crate) label: String,
     line: usize,
     objects: [Option<Taylor>; 5],
 }
 
-impl Frame {
+impl ListedFrame {
     pub(crate) fn object(&self, name: &str) -> Option<&Taylor> {
         let at = FRAME_OBJECTS.iter().position(|known| *known == name)?;
         self.objects[at].as_ref().filter(|object| !object.is_empty())
@@ -55,7 +55,7 @@ pub(crate) struct Listed<'t> {
     pub(crate) nq: usize,
     /// (mode from 0, text).
     pub(crate) mode_texts: Vec<(usize, &'t str)>,
-    pub(crate) frames: Vec<Frame>,
+    pub(crate) frames: Vec<ListedFrame>,
     objects: [Option<Taylor>; 11],
     pub(crate) modes: ModeIndex,
 }
@@ -217,7 +217,7 @@ impl<'t> Listed<'t> {
 #[derive(Default)]
 struct Modal<'t> {
     refmod: Option<Refmod<'t>>,
-    frames: Option<Vec<Frame>>,
+    frames: Option<Vec<ListedFrame>>,
     objects: [Option<Taylor>; 11],
 }
 
@@ -305,7 +305,7 @@ impl<'t> Refmod<'t> {
     }
 }
 
-fn read_frames(lines: &mut Lines<'_>) -> Result<Vec<Frame>, Diagnostic> {
+fn read_frames(lines: &mut Lines<'_>) -> Result<Vec<ListedFrame>, Diagnostic> {
     let mut frames = Vec::new();
     loop {
         let line = lines.next("frame")?;
@@ -318,7 +318,7 @@ fn read_frames(lines: &mut Lines<'_>) -> Result<Vec<Frame>, Diagnostic> {
             }
         }
         let label = line.value.unwrap_or("").to_owned();
-        let mut frame = Frame { label, line: line.number, objects: Default::default() };
+        let mut frame = ListedFrame { label, line: line.number, objects: Default::default() };
         loop {
             let line = lines.next("new node")?;
             match line.key.as_str() {

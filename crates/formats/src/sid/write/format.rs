@@ -7,7 +7,7 @@ use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, plan
 use crate::export::{ExportFormat, ExportOptions, Exported};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_body::flex_body::{FlexBody, Group};
+use flexbody_body::flex_body::{FlexBody, TermGroup};
 use flexbody_body::invariants::CauchySchwarz;
 use flexbody_model::{LoadKind, UnitLoad};
 
@@ -186,7 +186,7 @@ fn comment(body: &FlexBody, dialect: &Dialect) -> String {
         facts.push("general mass".to_owned());
     }
     let groups = body.groups();
-    let without: Vec<&str> = Group::ALL.iter().filter(|g| !groups.has(**g)).map(|g| g.name()).collect();
+    let without: Vec<&str> = TermGroup::ALL.iter().filter(|g| !groups.has(**g)).map(|g| g.name()).collect();
     if !without.is_empty() {
         facts.push(format!("without {}", without.join(" ")));
     }

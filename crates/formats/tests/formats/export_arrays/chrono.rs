@@ -12,7 +12,7 @@ use flexbody_formats::{export, find_format};
 use flexbody_linalg::CscMatrix;
 use flexbody_model::{Coupling, NodeSet};
 use nalgebra::{DMatrix, DVector, Vector3};
-use oracle::elements::{Kind, MassRule, Material};
+use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::exported::{body_of, exported, jointed_bodies};
 use oracle::general::dense;
 use oracle::mesh::{Assembly, Mesh, entries};
@@ -213,7 +213,8 @@ impl Cantilever {
             ..steel
         };
         let size = [1.0, 0.04, 0.05].map(|v| v * per_metre);
-        let assembly = Mesh::block(Kind::Hex20, [8, 1, 1], size).assemble(&material, MassRule::Consistent);
+        let assembly =
+            Mesh::block(ElementKind::Hex20, [8, 1, 1], size).assemble(&material, MassRule::Consistent);
         Self { assembly, size }
     }
 

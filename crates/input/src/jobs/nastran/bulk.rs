@@ -4,7 +4,7 @@ use super::assigned::Assigned;
 use super::constraints::Constraints;
 use super::elements;
 use super::sets::SetLines;
-use super::systems::{Definition, Grid, Kind, SystemCard};
+use super::systems::{Definition, Grid, SystemCard, SystemKind};
 use crate::bulk_cards::{Card, Item, components, read_deck, whole};
 use crate::coordinates::excerpt;
 use crate::dmig::Dmigs;
@@ -318,11 +318,11 @@ impl Bulk {
     }
 }
 
-fn kind(card: &Card) -> Option<Kind> {
+fn kind(card: &Card) -> Option<SystemKind> {
     match card.name.as_bytes().last()? {
-        b'R' => Some(Kind::Rectangular),
-        b'C' => Some(Kind::Cylindrical),
-        b'S' => Some(Kind::Spherical),
+        b'R' => Some(SystemKind::Rectangular),
+        b'C' => Some(SystemKind::Cylindrical),
+        b'S' => Some(SystemKind::Spherical),
         _ => None,
     }
 }

@@ -27,12 +27,12 @@ pub(super) struct Followers {
 }
 
 /// Places of grids and the axes of their rows.
-pub(super) struct Places<'b> {
+pub(super) struct GridPlaces<'b> {
     positions: HashMap<i64, Vector3<f64>>,
     axes: &'b HashMap<i64, Axes>,
 }
 
-impl<'b> Places<'b> {
+impl<'b> GridPlaces<'b> {
     pub(super) fn new(nodes: &Nodes, axes: &'b HashMap<i64, Axes>) -> Self {
         let own = nodes.ids.iter().zip(&nodes.positions);
         Self { positions: own.map(|(id, x)| (*id, Vector3::from(*x))).collect(), axes }
@@ -83,7 +83,7 @@ impl Followers {
     ///
     /// # Errors
     /// FB111 for constraints that are not read, make a point follow twice, or follow one another in a circle.
-    pub(super) fn new(constraints: &[&Constraint], places: &Places<'_>) -> Result<Self, Diagnostic> {
+    pub(super) fn new(constraints: &[&Constraint], places: &GridPlaces<'_>) -> Result<Self, Diagnostic> {
         let mut direct: BTreeMap<Point, (Sum, &Constraint)> = BTreeMap::new();
         for constraint in constraints {
             for (point, sum) in sums(constraint, places)? {
@@ -195,7 +195,7 @@ fn named((grid, component): Point) -> String {
 }
 
 /// Returns the points that follow by one constraint, each with its sum.
-fn sums(of: &Constraint, places: &Places<'_>) -> Result<Vec<(Point, Sum)>, Diagnostic> {
+fn sums(of: &Constraint, places: &GridPlaces<'_>) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     match &of.relation {
         Relation::Rigid { independent, dependent } => rigid(of, independent, dependent, places),
         Relation::Rod { grids, dependent } => rod(of, *grids, *dependent, places),
@@ -216,7 +216,7 @@ fn rigid(
     of: &Constraint,
     independent: &[Point],
     dependent: &[Point],
-    places: &Places<'_>,
+    places: &GridPlaces<'_>,
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     let &[first, .., _] = independent else {
         return Err(of.refused("six independent components are needed"));
@@ -246,7 +246,7 @@ fn rod(
     of: &Constraint,
     [a, b]: [i64; 2],
     dependent: Point,
-    places: &Places<'_>,
+    places: &GridPlaces<'_>,
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     let line = places.position(b, of)? - places.position(a, of)?;
     let along = |grid: i64, sign: f64| {
@@ -268,7 +268,7 @@ fn average(
     reference: i64,
     components: &[u8],
     weighted: &[(Point, f64)],
-    places: &Places<'_>,
+    places: &GridPlaces<'_>,
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     let origin = places.position(reference, of)?;
     let grids: std::collections::BTreeSet<i64> = weighted.iter().map(|((grid, _), _)| *grid).collect();
@@ -301,7 +301,7 @@ fn longest<'p>(
     points: impl Iterator<Item = &'p Point>,
     origin: Vector3<f64>,
     of: &Constraint,
-    places: &Places<'_>,
+    places: &GridPlaces<'_>,
 ) -> Result<f64, Diagnostic> {
     let mut longest = 0.0f64;
     for (grid, _) in points {

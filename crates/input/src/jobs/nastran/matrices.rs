@@ -2,7 +2,7 @@
 
 use super::Axes;
 use super::bulk::Bulk;
-use super::elimination::{Elimination, Followers, Places};
+use super::elimination::{Elimination, Followers, GridPlaces};
 use super::outputs::{Outputs, Read, choose_pair, no_files, no_pair};
 use crate::dmig::{Dmigs, Point, label};
 use crate::jobs::{Found, JobFile, both, siblings};
@@ -33,7 +33,7 @@ pub(super) struct Matrices {
 
 impl Matrices {
     /// The matrices of the deck, else those of the files beside it: either of punch files or of OUTPUT4.
-    pub(super) fn of(bulk: &Bulk, dmigs: Dmigs, job: &JobFile, places: &Places<'_>) -> Found<Self> {
+    pub(super) fn of(bulk: &Bulk, dmigs: Dmigs, job: &JobFile, places: &GridPlaces<'_>) -> Found<Self> {
         let (path, stated) = (&job.path, job.matrices.as_ref());
         let names = dmigs.names();
         // Beside elements they are a part of the model that its own matrices contain.
@@ -61,7 +61,12 @@ impl Matrices {
         }
     }
 
-    fn of_dmigs(bulk: &Bulk, mut dmigs: Dmigs, (k, m): (usize, usize), places: &Places<'_>) -> Found<Self> {
+    fn of_dmigs(
+        bulk: &Bulk,
+        mut dmigs: Dmigs,
+        (k, m): (usize, usize),
+        places: &GridPlaces<'_>,
+    ) -> Found<Self> {
         let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
         // Rows that others follow have to be there, also where they are zero.
         let followers = followers(bulk, |point| points.contains(point), places)?;
@@ -79,7 +84,7 @@ impl Matrices {
         Self::new(bulk, Read { stiffness, mass, points, files }, places)
     }
 
-    fn new(bulk: &Bulk, read: Read, places: &Places<'_>) -> Found<Self> {
+    fn new(bulk: &Bulk, read: Read, places: &GridPlaces<'_>) -> Found<Self> {
         let Read { stiffness, mass, points, files } = read;
         let followers = followers(bulk, |point| points.binary_search(point).is_ok(), places)?;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(&stiffness.path)];
@@ -251,7 +256,7 @@ fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>
 
 /// Returns the points that follow by constraints which matrices do not contain; `has` tells of which points they
 /// have rows.
-fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &Places<'_>) -> Found<Option<Followers>> {
+fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &GridPlaces<'_>) -> Found<Option<Followers>> {
     let one = |diagnostic| vec![diagnostic];
     let open = bulk.constraints.open(has).map_err(one)?;
     if open.is_empty() {

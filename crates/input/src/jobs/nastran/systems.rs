@@ -14,7 +14,7 @@ const ON_THE_AXIS: f64 = 1e-12;
 
 /// What the coordinates of a system are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum SystemKind {
     /// x, y, z.
     Rectangular,
     /// Radius, angle in degrees, z.
@@ -42,7 +42,7 @@ pub(super) struct Grid {
 /// The card of a system.
 #[derive(Debug, Clone)]
 pub(super) struct SystemCard {
-    kind: Kind,
+    kind: SystemKind,
     definition: Definition,
     path: PathBuf,
     line: usize,
@@ -71,7 +71,7 @@ impl SystemCard {
         self.kind == other.kind && self.definition == other.definition
     }
 
-    pub(super) fn new(kind: Kind, definition: Definition, path: &Path, line: usize) -> Self {
+    pub(super) fn new(kind: SystemKind, definition: Definition, path: &Path, line: usize) -> Self {
         Self { kind, definition, path: path.to_path_buf(), line }
     }
 }
@@ -79,14 +79,14 @@ impl SystemCard {
 /// A system in the basic one.
 #[derive(Debug, Clone, Copy)]
 struct System {
-    kind: Kind,
+    kind: SystemKind,
     origin: [f64; 3],
     /// Unit vectors along x, y, z.
     axes: [[f64; 3]; 3],
 }
 
 const BASIC: System = System {
-    kind: Kind::Rectangular,
+    kind: SystemKind::Rectangular,
     origin: [0.0; 3],
     axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
 };
@@ -176,7 +176,7 @@ impl<'b> Systems<'b> {
 
 impl System {
     /// Origin, a point of the z axis, a point of the plane of x and z; `None` where they lie on one line.
-    fn through(kind: Kind, [origin, on_z, in_plane]: [[f64; 3]; 3]) -> Option<Self> {
+    fn through(kind: SystemKind, [origin, on_z, in_plane]: [[f64; 3]; 3]) -> Option<Self> {
         let z = unit(minus(on_z, origin))?;
         let across = unit(minus(in_plane, origin))?;
         let normal = cross(z, across);
@@ -188,12 +188,12 @@ impl System {
     fn point(&self, x: [f64; 3]) -> [f64; 3] {
         let [a, b, c] = x;
         let local = match self.kind {
-            Kind::Rectangular => x,
-            Kind::Cylindrical => {
+            SystemKind::Rectangular => x,
+            SystemKind::Cylindrical => {
                 let (sin, cos) = sin_cos(b);
                 [a * cos, a * sin, c]
             }
-            Kind::Spherical => {
+            SystemKind::Spherical => {
                 let ((sin, cos), (sin_about, cos_about)) = (sin_cos(b), sin_cos(c));
                 [a * sin * cos_about, a * sin * sin_about, a * cos]
             }
@@ -207,14 +207,14 @@ impl System {
         let from = minus(x, self.origin);
         let [u, v, w] = self.axes.map(|axis| dot(axis, from));
         let radius = u.hypot(v);
-        if self.kind == Kind::Rectangular || radius <= ON_THE_AXIS * length(from) {
+        if self.kind == SystemKind::Rectangular || radius <= ON_THE_AXIS * length(from) {
             return self.axes;
         }
         let (cos, sin) = (u / radius, v / radius);
         let [e, f, z] = self.axes;
         let mix = |a: f64, b: f64, c: f64| [0, 1, 2].map(|k| a * e[k] + b * f[k] + c * z[k]);
         match self.kind {
-            Kind::Spherical => {
+            SystemKind::Spherical => {
                 let whole = radius.hypot(w);
                 let (down, up) = (radius / whole, w / whole);
                 [mix(down * cos, down * sin, up), mix(up * cos, up * sin, -down), mix(-sin, cos, 0.0)]
@@ -260,7 +260,7 @@ fn unit(a: [f64; 3]) -> Option<[f64; 3]> {
 mod tests {
     use super::*;
 
-    fn card(kind: Kind, reference: i64, points: [[f64; 3]; 3]) -> SystemCard {
+    fn card(kind: SystemKind, reference: i64, points: [[f64; 3]; 3]) -> SystemCard {
         SystemCard::new(kind, Definition::Points { reference, points }, Path::new("job.bdf"), 1)
     }
 
@@ -270,11 +270,11 @@ mod tests {
         let upright = [[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
         let lying = [[1.0, 2.0, 3.0], [2.0, 2.0, 3.0], [1.0, 3.0, 3.0]];
         let cards = HashMap::from([
-            (1, card(Kind::Cylindrical, 0, lying)),
-            (2, card(Kind::Spherical, 1, [[2.0, 90.0, 5.0], [2.0, 90.0, 6.0], [3.0, 90.0, 5.0]])),
-            (3, card(Kind::Rectangular, 4, upright)),
-            (4, card(Kind::Rectangular, 3, upright)),
-            (5, card(Kind::Rectangular, 0, [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])),
+            (1, card(SystemKind::Cylindrical, 0, lying)),
+            (2, card(SystemKind::Spherical, 1, [[2.0, 90.0, 5.0], [2.0, 90.0, 6.0], [3.0, 90.0, 5.0]])),
+            (3, card(SystemKind::Rectangular, 4, upright)),
+            (4, card(SystemKind::Rectangular, 3, upright)),
+            (5, card(SystemKind::Rectangular, 0, [[0.0; 3], [0.0, 0.0, 1.0], [0.0, 0.0, 2.0]])),
         ]);
         let grids = BTreeMap::new();
         let mut systems = Systems::new(&cards, &grids);

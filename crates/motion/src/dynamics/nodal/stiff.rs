@@ -28,7 +28,7 @@ pub(super) struct Stiff<'m> {
     equations: &'m NodalEquations<'m>,
     /// Step that the factors are for.
     step: f64,
-    factors: Vec<Factor>,
+    factors: Vec<StepFactor>,
     /// Corrections of u and w of every stage.
     corrected: Vec<Vec<f64>>,
     /// Lacks and products in an eigenvalue: real and imaginary parts.
@@ -40,7 +40,7 @@ pub(super) struct Stiff<'m> {
 
 /// M + z D + z^2 K.
 #[derive(Debug)]
-enum Factor {
+enum StepFactor {
     Real(SparseLdl),
     Complex(SparseLdl<Complex<f64>>),
 }
@@ -94,8 +94,8 @@ impl<'m> Stiff<'m> {
         for mode in modes {
             let z = mode.value * h;
             let factor = match mode.paired {
-                true => factored(&self.sum(z), self.equations).map(Factor::Complex),
-                false => factored(&self.sum(z.re), self.equations).map(Factor::Real),
+                true => factored(&self.sum(z), self.equations).map(StepFactor::Complex),
+                false => factored(&self.sum(z.re), self.equations).map(StepFactor::Real),
             };
             self.factors.push(factor.ok_or(SINGULAR)?);
         }
@@ -146,7 +146,7 @@ impl<'m> Stiff<'m> {
     fn solve(&mut self, at: usize, z: Complex<f64>) -> f64 {
         let Self { equations, factors, parts: [a_re, a_im, b_re, b_im], product, real, complex, .. } = self;
         match &factors[at] {
-            Factor::Real(factor) => {
+            StepFactor::Real(factor) => {
                 let [x, scratch] = real;
                 weigh_damped(equations, z.re, a_re, product, [x, scratch]);
                 x.iter_mut().zip(&*product).zip(&*b_re).for_each(|((x, m), b)| *x = z.re * b + m);
@@ -158,7 +158,7 @@ impl<'m> Stiff<'m> {
                 equations.take_rigid(a_re);
                 kinetic + equations.elastic_energy(a_re)
             }
-            Factor::Complex(factor) => {
+            StepFactor::Complex(factor) => {
                 let [x, scratch] = complex;
                 let [more, other] = real;
                 for ((x, re), im) in x.iter_mut().zip(&*b_re).zip(&*b_im) {

@@ -1,0 +1,54 @@
+//! The class of flexible bodies, below the studies that return bodies; its methods that Python sees are in
+//! `body.rs`.
+
+use crate::arrays::{Kept, matrix, vector};
+use flexbody::{Diagnostic, FlexBody, Matrix};
+use pyo3::prelude::*;
+use std::sync::Arc;
+
+/// A flexible body with n nodes and nf modes: modes, and the constant invariants that the equations of motion
+/// of its floating frame are made of. Vectors are along the axes of the body frame, about its origin, in the
+/// units of the model. Arrays are read-only and made once: copy what you change.
+///
+/// `flexbody.convert` makes one, `flexbody.read` reads one.
+#[pyclass(frozen, eq, module = "flexbody")]
+pub struct Body {
+    pub inner: Arc<FlexBody>,
+    pub diagnostics: Vec<Diagnostic>,
+    /// Arrays that Python has asked for.
+    pub kept: Kept,
+}
+
+impl PartialEq for Body {
+    fn eq(&self, other: &Self) -> bool {
+        self.inner == other.inner
+    }
+}
+
+impl Body {
+    pub fn new(inner: FlexBody, diagnostics: Vec<Diagnostic>) -> Self {
+        Self { inner: Arc::new(inner), diagnostics, kept: Kept::default() }
+    }
+
+    pub fn numbers<'py>(
+        &self,
+        py: Python<'py>,
+        name: &'static str,
+        of: &[f64],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, name, || Ok(vector(py, of)))
+    }
+
+    /// A matrix, or None where the body has none of that name.
+    pub fn matrix<'py>(
+        &self,
+        py: Python<'py>,
+        name: &'static str,
+        of: impl FnOnce(&FlexBody) -> Option<Matrix>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        self.kept.get(py, name, || match of(&self.inner) {
+            Some(own) => matrix(py, &own),
+            None => Ok(py.None().into_bound(py)),
+        })
+    }
+}
