@@ -24,7 +24,7 @@ use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
 use flexbody_linalg::progress::Event;
-use flexbody_model::{CheckedModel, FeModel, RawModel};
+use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
 use flexbody_study::checkpoint::resume;
@@ -77,7 +77,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
         threads,
     };
     if !arguments.split {
-        let done = job.convert(job.checked(raw)?, &places, reserved, &watcher)?;
+        let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
         return Ok(done.outcome);
     }
@@ -133,13 +133,6 @@ struct Done {
 }
 
 impl Job<'_> {
-    /// The model, checked; with the order of elimination where its own modes are to be computed here.
-    fn checked(&self, raw: RawModel) -> Result<CheckedModel> {
-        let Self { arguments, .. } = self;
-        let searched = arguments.engine.engine == EngineName::BuiltIn && arguments.basis == BasisKind::Free;
-        if searched { FeModel::from_raw_ordered(raw) } else { FeModel::from_raw(raw) }
-    }
-
     fn convert(
         &self,
         checked: CheckedModel,

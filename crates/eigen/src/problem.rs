@@ -3,7 +3,9 @@
 use super::failure::EigenFailure;
 use super::resume::Resume;
 use faer::{Mat, MatRef};
-use flexbody_linalg::{Analysis, Cholesky, Pencil, Solve, gram, subtract_combination, uniform};
+use flexbody_linalg::{
+    Analysis, Cholesky, EliminationOrder, Pencil, Solve, gram, subtract_combination, uniform,
+};
 use std::sync::Arc;
 
 /// Part of tr K / tr M by which a pencil of which nothing is known is shifted: far above the rounding of a factor in double
@@ -24,8 +26,8 @@ pub struct EigenProblem<'a> {
     pub first_estimate: f64,
     /// Relative error of the entries of K: half a unit of the last digit that the input carries.
     pub input_error: f64,
-    /// The order of elimination, where it is known already.
-    pub order: Option<&'a Arc<Analysis>>,
+    /// The elimination order that all problems of this pencil share; `None`: each solver computes its own.
+    pub order: Option<&'a EliminationOrder>,
     /// Where an iterative search starts, and who keeps how far it came.
     pub resume: Resume<'a>,
 }
@@ -75,7 +77,7 @@ impl EigenProblem<'_> {
     /// The order of elimination and the structure of the factor; `None` when memory runs out.
     pub(super) fn analysis(&self) -> Option<Arc<Analysis>> {
         match self.order {
-            Some(order) => Some(Arc::clone(order)),
+            Some(order) => order.of(&self.pencil),
             None => Analysis::new(&self.pencil).map(Arc::new),
         }
     }

@@ -1,7 +1,7 @@
 //! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu,
 //! SIAM Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
 
-use super::assembly_tree::{AssemblyTree, Graph};
+use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
 use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
@@ -11,37 +11,21 @@ use faer::prelude::ReborrowMut;
 use faer::{MatMut, MatRef};
 use rayon::prelude::*;
 use std::convert::Infallible;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-/// Which rows of a pencil are coupled: all that an elimination is ordered by. It outlives the matrices, so that
-/// these can be looked at while the ordering library, which has one thread, is at work.
-pub struct CoupledRows {
-    graph: Graph,
-    /// Rows per vertex.
-    rows: usize,
-}
+/// Elimination order of one pencil: computed when the first factor needs it, and kept for all later ones.
+#[derive(Debug, Clone, Default)]
+pub struct EliminationOrder(OnceLock<Arc<Analysis>>);
 
-impl CoupledRows {
-    /// Those of a pencil; `None` when they are too many for the ordering library.
-    pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        let (graph, rows) = smallest_graph(pencil)?;
-        Some(Self { graph, rows })
-    }
-
-    /// Those of K and M, node by node; `None` as above.
-    ///
-    /// # Panics
-    /// When the sizes disagree, or a node has not one, two or three rows.
-    pub fn of_nodes(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: usize) -> Option<Self> {
-        let graph = vertex_graph(&Pencil::new(stiffness, mass, 1), rows)?;
-        Some(Self { graph, rows })
-    }
-
-    /// Orders and analyses them; `None` when memory runs out.
-    pub fn analyse(self) -> Option<Analysis> {
-        let Self { mut graph, rows } = self;
-        let order = nested_dissection(&mut graph)?;
-        Some(Analysis::with_tree(Arc::new(AssemblyTree::new(&graph, &order, rows)), rows))
+impl EliminationOrder {
+    /// Returns the analysis of `pencil`, which must be the same at every call; `None` when memory runs out.
+    pub fn of(&self, pencil: &Pencil<'_>) -> Option<Arc<Analysis>> {
+        if let Some(known) = self.0.get() {
+            return Some(Arc::clone(known));
+        }
+        // Not inside `get_or_init`: a thread that waits there could hold up the tasks that the analysis consists of.
+        let found = Arc::new(Analysis::new(pencil)?);
+        Some(Arc::clone(self.0.get_or_init(|| found)))
     }
 }
 
@@ -59,7 +43,9 @@ pub struct Analysis {
 impl Analysis {
     /// Orders and analyses the pencil; `None` when memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
-        CoupledRows::new(pencil)?.analyse()
+        let (mut graph, rows) = smallest_graph(pencil)?;
+        let order = nested_dissection(&mut graph)?;
+        Some(Self::with_tree(Arc::new(AssemblyTree::new(&graph, &order, rows)), rows))
     }
 
     fn with_tree(tree: Arc<AssemblyTree>, block: usize) -> Self {

@@ -46,7 +46,7 @@ pub use dense::{
     SymmetricEigen, dense_cholesky, dense_inverse, full_qr, solve_lower, solve_upper, symmetric_eigen,
 };
 pub use elimination::{Dependents, Elimination, ReducedPencil};
-pub use factor::{Analysis, Cholesky, CoupledRows, Peaks, Solve, is_positive_semidefinite};
+pub use factor::{Analysis, Cholesky, EliminationOrder, Peaks, Solve, is_positive_semidefinite};
 pub use front::Real;
 pub use indefinite::Indefinite;
 pub use inertia::Inertia;

@@ -18,7 +18,7 @@ use super::wording::name_some;
 use super::{BodyNumber, Damping, DofLabel, FeModel, Nodes, RawModel};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
-use flexbody_linalg::{CoupledRows, Pencil, SymmetricMatrix, largest};
+use flexbody_linalg::{SymmetricMatrix, largest};
 
 /// A model that passed, with the warnings and notes on the way.
 #[derive(Debug, Clone)]
@@ -54,15 +54,6 @@ impl FeModel {
     pub fn from_raw(raw: RawModel) -> Result<CheckedModel> {
         check(raw)
     }
-
-    /// The same for a model whose modes are to be computed: the order of elimination, which takes as long as
-    /// the checks but has one thread, is looked for beside them.
-    ///
-    /// # Errors
-    /// See [`check`].
-    pub fn from_raw_ordered(raw: RawModel) -> Result<CheckedModel> {
-        check_with(raw, Ordering::Beside)
-    }
 }
 
 /// Checks `raw` and brings it into the internal order.
@@ -71,53 +62,12 @@ impl FeModel {
 /// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and
 /// rigid motion.
 pub fn check(raw: RawModel) -> Result<CheckedModel> {
-    check_with(raw, Ordering::Later)
-}
-
-fn check_with(raw: RawModel, ordering: Ordering) -> Result<CheckedModel> {
     let (assembled, found) = assemble(raw)?;
-    finish(assembled, None, found, ordering)
+    check_body(assembled, None, found)
 }
 
-/// When the order of elimination is looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ordering {
-    /// Beside the checks.
-    Beside,
-    /// When it is needed.
-    Later,
-}
-
-/// The checks of a body: its mass, its connections, its rigid motion; and beside them the order of elimination.
-pub(super) fn finish(
-    body: Assembled,
-    number: Option<BodyNumber>,
-    found: Vec<Diagnostic>,
-    ordering: Ordering,
-) -> Result<CheckedModel> {
-    let coupled = match ordering {
-        Ordering::Beside => coupled_rows(&body),
-        Ordering::Later => None,
-    };
-    let (elimination, checked) =
-        rayon::join(|| coupled.and_then(CoupledRows::analyse), || check_body(body, number, found));
-    let mut checked = checked?;
-    checked.model.set_elimination(elimination);
-    Ok(checked)
-}
-
-/// Which rows the pencil of a body couples; `None` where they are too many to be ordered.
-fn coupled_rows(body: &Assembled) -> Option<CoupledRows> {
-    let (stiffness, mass) = (&body.stiffness, &body.mass);
-    if body.rows.are_plain() {
-        CoupledRows::of_nodes(stiffness, mass, body.rows.dimension)
-    } else {
-        CoupledRows::new(&Pencil::new(stiffness, mass, 1))
-    }
-}
-
-/// The checks alone.
-fn check_body(
+/// Checks a body: its mass, its connections, its rigid motion.
+pub(super) fn check_body(
     mut body: Assembled,
     number: Option<BodyNumber>,
     mut found: Vec<Diagnostic>,
@@ -155,7 +105,7 @@ fn check_body(
     found.extend(kept.map(|note| note.in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     stop_on_error(&mut found)?;
-    // Now, while the ordering library has not ended; the files need not stay open.
+    // Now, so that the files need not stay open.
     model.find_sources()?;
     Ok(CheckedModel { model, diagnostics: found, plausibility })
 }

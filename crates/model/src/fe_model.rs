@@ -11,7 +11,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{SourceFile, Sources};
 use flexbody_base::units::UnitSystem;
-use flexbody_linalg::{Analysis, CscMatrix, Pencil, SymmetricMatrix, larger};
+use flexbody_linalg::{CscMatrix, EliminationOrder, Pencil, SymmetricMatrix, larger};
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
@@ -46,7 +46,7 @@ pub struct FeModel {
     row_to_internal: Option<Vec<u32>>,
     given_rows: Arc<GivenRows>,
     number: Option<BodyNumber>,
-    elimination: Option<Arc<Analysis>>,
+    elimination: EliminationOrder,
     /// M on points and directors, once somebody needs it.
     director_mass: OnceLock<Option<Arc<DirectorMass>>>,
 }
@@ -84,7 +84,7 @@ impl FeModel {
             row_to_internal: body.row_to_internal,
             given_rows: Arc::new(raw.given_rows),
             number,
-            elimination: None,
+            elimination: EliminationOrder::default(),
             director_mass: OnceLock::new(),
         }
     }
@@ -141,7 +141,7 @@ impl FeModel {
             mass_deviation: 0.0,
             fixed_mass_share: 0.0,
             diagonal_mass: true,
-            elimination: None,
+            elimination: EliminationOrder::default(),
             director_mass: OnceLock::new(),
             ..self.clone()
         }
@@ -194,14 +194,9 @@ impl FeModel {
         &self.geometric_stiffness
     }
 
-    /// Keeps the order of elimination of its pencil.
-    pub(super) fn set_elimination(&mut self, elimination: Option<Analysis>) {
-        self.elimination = elimination.map(Arc::new);
-    }
-
-    /// The order of elimination of [`pencil`](Self::pencil), where it was looked for during the checks.
-    pub fn elimination(&self) -> Option<&Arc<Analysis>> {
-        self.elimination.as_ref()
+    /// The elimination order that all factors of [`pencil`](Self::pencil) share.
+    pub fn elimination(&self) -> &EliminationOrder {
+        &self.elimination
     }
 
     /// K and M.

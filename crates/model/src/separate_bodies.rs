@@ -3,7 +3,7 @@
 
 use super::assemble::assemble;
 use super::assembled::Assembled;
-use super::checks::{CheckedModel, Ordering, finish};
+use super::checks::{CheckedModel, check_body};
 use super::connections::groups;
 use super::wording::{in_words, name_some};
 use super::{BodyNumber, Damping, FeModel, GeometricStiffness, NodeSet, Nodes, RawModel, Rows, rigid_count};
@@ -44,7 +44,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     let (mut checked, mut failed) = (Vec::new(), Vec::new());
     for (i, body) in bodies.into_iter().enumerate() {
         let number = BodyNumber { number: i + 1, of: count };
-        match finish(body, Some(number), Vec::new(), Ordering::Later) {
+        match check_body(body, Some(number), Vec::new()) {
             Ok(mut one) => {
                 let own = one.diagnostics.into_iter().map(|diagnostic| diagnostic.about(number));
                 one.diagnostics = shared.iter().cloned().chain(own).collect();

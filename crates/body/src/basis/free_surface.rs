@@ -80,7 +80,7 @@ pub fn free_surface_resumed(
         rigid: rigid.as_ref(),
         first_estimate,
         input_error: input_error(model),
-        order: model.elimination(),
+        order: Some(model.elimination()),
         resume,
     };
     let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;

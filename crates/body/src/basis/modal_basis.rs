@@ -95,7 +95,7 @@ pub(super) fn problem_of_span<'a>(
     resume: Resume<'a>,
 ) -> EigenProblem<'a> {
     let first_estimate = f64::INFINITY;
-    let order = model.elimination();
+    let order = Some(model.elimination());
     EigenProblem {
         pencil: model.pencil(),
         rigid,
