@@ -52,7 +52,7 @@ fn losses_are_those_of_the_format_and_the_body() {
     assert_losses("satellite, ratio", "simscape", &[SMALL]);
     assert_losses("satellite, ratio", "chrono", &[SMALL, WEIGHT]);
     assert_losses("car_frame, jointed", "chrono", &[SMALL, TURNS, WEIGHT]);
-    let partial = |groups: &str| format!("soft block with Groups {{ {groups} }}");
+    let partial = |groups: &str| format!("soft block with TermGroups {{ {groups} }}");
     assert_losses(&partial("w1: false, w2: false, w3: false"), "openradioss", &[]);
     let of_w3 = "how the deformation changes the inertia (W3): OpenRadioss";
     assert_losses(&partial("w1: false, w2: false, w3: true"), "openradioss", &[of_w3]);
