@@ -26,9 +26,9 @@ def metadata(manifest, target):
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
 
 
-def compiled(manifest, target):
+def compiled(manifest, target, package):
     """Names and versions of what is compiled into the program. The graph of the metadata also has what no feature asks for."""
-    command = ["cargo", "tree", "--locked", "--edges", "normal,no-proc-macro", "--prefix", "none", "--target", target, "--format", "{p}", "--manifest-path", manifest]
+    command = ["cargo", "tree", "--locked", "--edges", "normal,no-proc-macro", "--prefix", "none", "--target", target, "--format", "{p}", "--manifest-path", manifest, "--package", package]
     lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
     return {tuple(line.split()[:2]) for line in lines if line.strip()}
 
@@ -128,7 +128,8 @@ def main():
     told = metadata(str(args.manifest), args.target)
     lock = tomllib.loads((Path(told["workspace_root"]) / "Cargo.lock").read_text())
     checksums = {(one["name"], one["version"]): one.get("checksum") for one in lock["package"]}
-    wanted = compiled(str(args.manifest), args.target)
+    root = next(package["name"] for package in told["packages"] if package["id"] == told["resolve"]["root"])
+    wanted = compiled(str(args.manifest), args.target, root)
     document, packages = bill(told, wanted, checksums)
     if len(packages) < 20 or len(packages) != len(wanted):
         sys.exit(f"{len(packages)} packages of {len(wanted)}: the graph was not read")

@@ -198,7 +198,7 @@ def test_texts_of_errors_move_no_terminal() -> None:
 
 def test_no_mode_at_all_is_no_body(cube: Given) -> None:
     with pytest.raises(flexbody.InputError, match="no mode is asked for") as caught:
-        cube.convert(modes=0)
+        cube.model().convert(modes=0)
     assert caught.value.codes == ("FB512",)
 
 
