@@ -8,7 +8,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::BasisKind;
 use flexbody_cluster::{Prepared, read_prepared};
-use flexbody_eigen::{Accuracy, FactorChoice};
+use flexbody_eigen::FactorChoice;
 
 pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     let prepared = read_prepared(&arguments.folder)?;
@@ -45,10 +45,7 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         basis: BasisKind::Free,
         shapes: None,
         residual_vectors: Some(String::new()),
-        accuracy: match prepared.accuracy() {
-            Accuracy::Fast => Accuracy::Fast,
-            _ => Accuracy::Standard,
-        },
+        accuracy: prepared.accuracy(),
         factor: FactorChoice::Auto,
         storage: arguments.storage,
         memory_limit: arguments.memory_limit,

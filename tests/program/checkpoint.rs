@@ -12,7 +12,7 @@ use std::process::{Command, Output};
 use std::sync::Mutex;
 
 fn manifest(name: &str) -> PathBuf {
-    oracle::root().join("fixtures/models").join(name).join("model.toml")
+    oracle::fixtures().join("models").join(name).join("model.toml")
 }
 
 fn model(name: &str) -> FeModel {

@@ -55,7 +55,7 @@ fn done(folder: &Path, line: &str) -> Run {
 }
 
 fn fixture(name: &str) -> PathBuf {
-    oracle::root().join("fixtures/models").join(name)
+    oracle::fixtures().join("models").join(name)
 }
 
 fn block() -> Assembly {

@@ -159,7 +159,7 @@ fn programs_that_it_waits_for_end_with_it() {
 /// The program that converts the cube of the fixtures to `new.flex.h5` with a report, over older files of
 /// these names.
 fn small_convert(out: &Path) -> Command {
-    let model = oracle::root().join("fixtures/models/cube_hex8/model.toml");
+    let model = oracle::fixtures().join("models/cube_hex8/model.toml");
     let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
     command.arg("convert").arg(model).args(["--output", "new.flex.h5", "--report", "new.json"]);
     command.current_dir(out).stdout(Stdio::null()).stderr(Stdio::null());

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 fn fixture(name: &str) -> PathBuf {
-    oracle::root().join("fixtures/models").join(name).join("model.toml")
+    oracle::fixtures().join("models").join(name).join("model.toml")
 }
 
 /// Runs the program in `folder` under `limit`, which the shell sets.

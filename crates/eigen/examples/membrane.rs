@@ -9,7 +9,7 @@
 use faer::Mat;
 use flexbody_eigen::{EigenFailure, EigenProblem, EigenSettings, Wanted, solve};
 use flexbody_linalg::progress::SILENT;
-use flexbody_linalg::{CscMatrix, Pencil, SymmetricMatrix};
+use flexbody_linalg::{CscMatrix, EliminationOrder, Pencil, SymmetricMatrix};
 
 /// Masses along a side.
 const SIDE: usize = 300;
@@ -33,7 +33,8 @@ fn membrane() -> [SymmetricMatrix; 2] {
 fn main() -> Result<(), EigenFailure> {
     let [k, m] = membrane();
     let constant = Mat::from_fn(k.n(), 1, |_, _| (k.n() as f64).sqrt().recip());
-    let problem = EigenProblem::new(Pencil::new(&k, &m, 1), constant.as_ref())?;
+    let order = EliminationOrder::default();
+    let problem = EigenProblem::new(Pencil::new(&k, &m, 1), constant.as_ref(), &order)?;
     let settings = EigenSettings { wanted: Wanted::Lowest(12), ..EigenSettings::default() };
     let modes = solve(&problem, &settings, SILENT)?;
     println!("{:?}", modes.eigenvalues);

@@ -28,7 +28,7 @@ pub struct EigenProblem<'a> {
     pub input_error: f64,
     /// The elimination order that all problems of this pencil share; `None`: each solver computes its own.
     pub order: Option<&'a EliminationOrder>,
-    /// Where an iterative search starts, and who keeps how far it came.
+    /// Start of an iterative search, and the listener that keeps its snapshots.
     pub resume: Resume<'a>,
 }
 
@@ -38,6 +38,7 @@ impl<'a> EigenProblem<'a> {
     ///
     /// The first eigenvalue is estimated by one factor of K + tau M with tau = 1e-8 tr K / tr M: fixed numbers, multiplied twice
     /// by (K + tau M)^-1 M and freed of `rigid`, have a Rayleigh quotient that is no lower than it. K and M are taken as exact.
+    /// The search finds its elimination order in `order`, which this factor fills.
     ///
     /// # Errors
     /// [`TooLarge`](EigenFailure::TooLarge), or [`NotPositiveDefinite`](EigenFailure::NotPositiveDefinite) when K + tau M has no
@@ -45,18 +46,27 @@ impl<'a> EigenProblem<'a> {
     ///
     /// # Panics
     /// When `rigid` has another number of rows than the pencil.
-    pub fn new(pencil: Pencil<'a>, rigid: MatRef<'a, f64>) -> Result<Self, EigenFailure> {
+    pub fn new(
+        pencil: Pencil<'a>,
+        rigid: MatRef<'a, f64>,
+        order: &'a EliminationOrder,
+    ) -> Result<Self, EigenFailure> {
         assert_eq!(rigid.nrows(), pencil.n(), "rows of the rigid modes");
-        let first_estimate = rayleigh_estimate(&pencil, rigid)?;
-        Ok(Self { pencil, rigid, first_estimate, input_error: 0.0, order: None, resume: Resume::default() })
+        let first_estimate = rayleigh_estimate(&pencil, rigid, order)?;
+        let (order, resume) = (Some(order), Resume::default());
+        Ok(Self { pencil, rigid, first_estimate, input_error: 0.0, order, resume })
     }
 }
 
 /// An upper bound of the first eigenvalue beside those of `rigid`, by inverse iteration from fixed numbers.
-fn rayleigh_estimate(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> Result<f64, EigenFailure> {
+fn rayleigh_estimate(
+    pencil: &Pencil<'_>,
+    rigid: MatRef<'_, f64>,
+    order: &EliminationOrder,
+) -> Result<f64, EigenFailure> {
     let trace = |diagonal: Vec<f64>| diagonal.into_iter().sum::<f64>();
     let shift = UNKNOWN_SHIFT * trace(pencil.stiffness().diagonal()) / trace(pencil.mass_diagonal());
-    let analysis = Analysis::new(pencil).ok_or(EigenFailure::TooLarge)?;
+    let analysis = order.of(pencil).ok_or(EigenFailure::TooLarge)?;
     let factor = Cholesky::<f64>::new(&analysis, pencil, shift);
     let factor = factor.ok_or(EigenFailure::NotPositiveDefinite { shift })?;
     let mut field = Mat::from_fn(pencil.n(), 1, |row, _| uniform(SEED, row as u64, 0));

@@ -11,7 +11,7 @@ use super::reader::{MatrixSource, Reader};
 use columns::{Columns, Heads};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result as Outcome};
-use flexbody_base::text::compression::Compression;
+use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_model::{DofLabel, RawMatrix};
 use rayon::prelude::*;

@@ -5,7 +5,7 @@ use super::reader::{MatrixRole, MatrixSource, Reader};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::hdf5_file::{by_utf8_name, without_plugins};
-use flexbody_base::text::compression::Compression;
+use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, is_hdf5};
 use flexbody_model::RawMatrix;
 use hdf5_metno::{File, Group};

@@ -3,8 +3,8 @@
 use super::matrix_market::read_array;
 use super::tables::read_dofs;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::compression::Compression;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::Compression;
+use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 use std::path::Path;

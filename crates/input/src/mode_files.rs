@@ -9,7 +9,7 @@ mod table;
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::provenance::SourceFile;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_model::RawModes;
 use table::ModeTable;
 

@@ -13,7 +13,7 @@ use super::tables::{read_masses, read_node_list};
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::{SourceFile, Sources};
-use flexbody_base::text::compression::Compression;
+use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::quotes::without_foreign_quotes;
 use flexbody_model::{

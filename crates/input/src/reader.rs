@@ -2,8 +2,8 @@
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::text::compression::Compression;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::Compression;
+use flexbody_base::text::InputFile;
 use flexbody_model::RawMatrix;
 use std::path::Path;
 

@@ -10,8 +10,8 @@ use super::reader::{HEAD, Reader};
 use super::scipy_npz::ScipyNpz;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_base::text::compression::Compression;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::Compression;
+use flexbody_base::text::InputFile;
 use std::path::Path;
 
 /// Every matrix format that is understood.

@@ -12,8 +12,8 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::SourceFile;
-use flexbody_base::text::compression::Compression;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::Compression;
+use flexbody_base::text::InputFile;
 use flexbody_model::{RawModes, RawShapes};
 
 /// Shapes as a file has them.

@@ -1,7 +1,7 @@
 //! The three tables: nodes, labels of the matrix rows, nodes of an interface.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_base::text::table::{BadRows, Column, Table, integer, printable};
 use flexbody_model::{DofLabel, Nodes};
 use std::collections::HashMap;

@@ -31,7 +31,7 @@ pub fn body_of(raw: RawModel, modes: usize, frame: BodyFrame) -> FlexBody {
 
 /// What flexbody makes of a model of the fixtures.
 pub fn fixture(name: &str, modes: usize, frame: BodyFrame) -> FlexBody {
-    let folder = crate::root().join("fixtures/models").join(name);
+    let folder = crate::fixtures().join("models").join(name);
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
     body_of(raw, modes, frame)
 }

@@ -23,7 +23,7 @@ pub const FIXTURES: [&str; 8] = [
 
 /// A model of `fixtures/models`, not yet checked.
 pub fn raw_fixture(name: &str) -> RawModel {
-    let folder = crate::root().join("fixtures/models").join(name);
+    let folder = crate::fixtures().join("models").join(name);
     read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable")
 }
 

@@ -1,4 +1,4 @@
-//! What tests judge the library by: exact small finite element models, rational arithmetic, dense reference solutions and
+//! Oracles of the tests: exact small finite element models, rational arithmetic, dense reference solutions and
 //! equations of motion written from definitions; and the fixtures. Nothing here is part of what users get.
 //!
 //! Each feature adds what stands on one crate more, so that the tests of a crate build nothing above it.
@@ -37,6 +37,8 @@ pub mod turned_energy;
 pub mod turning;
 
 #[cfg(feature = "body")]
+pub mod craig_bampton;
+#[cfg(feature = "body")]
 pub mod file_bodies;
 #[cfg(feature = "body")]
 pub mod jobs;
@@ -67,6 +69,12 @@ use std::path::{Path, PathBuf};
 /// The folder of the workspace.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The folder of shared models and sample files beside the workspace, or the one that `FLEXBODY_SHARED` names; tests that use it
+/// do without where it is missing.
+pub fn shared() -> PathBuf {
+    std::env::var_os("FLEXBODY_SHARED").map_or_else(|| root().join("../shared"), PathBuf::from)
 }
 
 /// The folder of the fixtures.

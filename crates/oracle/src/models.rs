@@ -83,7 +83,7 @@ pub fn symmetric(n: usize, triplets: &[(u32, u32, f64)]) -> SymmetricMatrix {
 
 /// The four bodies that belong to the project.
 pub fn own() -> Vec<Model> {
-    let folder = crate::root().join("fixtures/models");
+    let folder = crate::fixtures().join("models");
     ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8"]
         .iter()
         .map(|name| Model::read(&folder.join(name), "expected.json"))
@@ -92,8 +92,7 @@ pub fn own() -> Vec<Model> {
 
 /// Larger solid bodies that lie beside the project on some machines; none elsewhere.
 pub fn shared() -> Vec<Model> {
-    let root =
-        std::env::var_os("FLEXBODY_SHARED").map_or_else(|| crate::root().join("../shared"), PathBuf::from);
+    let root = crate::shared();
     ["a_beam_c3d20", "b_conrod_30k", "e_bracket_near", "f_cube_c3d8", "g_two_1e6", "k_c3d8r_singularM"]
         .iter()
         .map(|name| root.join("models").join(name))

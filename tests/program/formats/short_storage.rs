@@ -26,7 +26,7 @@ use std::process::Command;
 const UNIT: f64 = 0.5 * f32::EPSILON as f64;
 
 fn manifest(name: &str) -> PathBuf {
-    oracle::root().join("fixtures/models").join(name).join("model.toml")
+    oracle::fixtures().join("models").join(name).join("model.toml")
 }
 
 fn converted(name: &str, modes: usize) -> (FeModel, FlexBody) {

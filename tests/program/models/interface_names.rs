@@ -9,7 +9,7 @@ const NAMES: [&str; 7] = ["left/right", "50%", "%2F", "..", ".", "Lager außen",
 /// A folder with a manifest of the cube of the fixtures, with an interface of each name.
 fn model(names: &[&str]) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
-    let cube = oracle::root().join("fixtures/models/cube_hex8");
+    let cube = oracle::fixtures().join("models/cube_hex8");
     for entry in std::fs::read_dir(&cube).expect("the fixture") {
         let entry = entry.expect("an entry");
         std::fs::copy(entry.path(), folder.path().join(entry.file_name())).expect("a copy");

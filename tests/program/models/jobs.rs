@@ -319,7 +319,7 @@ fn regions_hold_their_nodes_in_the_order_of_the_model() {
 /// Jobs of the programs themselves, where they are there; frequencies as CalculiX has printed them.
 #[test]
 fn jobs_of_the_programs_give_what_the_programs_say() {
-    let samples = oracle::root().join("../shared/samples");
+    let samples = oracle::shared().join("samples");
     let calculix = samples.join("calculix/beam_c3d20.inp");
     if !calculix.exists() {
         return;

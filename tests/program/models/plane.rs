@@ -16,7 +16,6 @@ use flexbody_model::{FeModel, GeometricStiffness, LoadKind, NodeSet, RawMatrix, 
 use nalgebra::{Matrix2, Vector2};
 use oracle::plane::{DENSITY, HEIGHT, LENGTH, YOUNGS, rectangle};
 use oracle::random::Random;
-use std::path::PathBuf;
 
 fn model(raw: RawModel) -> FeModel {
     check(raw).expect("a sound body").model
@@ -249,8 +248,7 @@ fn geometric_stiffness_of_a_plane_body_is_about_z_and_in_its_plane() {
 /// A plate with two holes that scikit-fem meshed and assembled, where it lies beside the project.
 #[test]
 fn plane_stress_plate_agrees_with_its_reference() {
-    let shared =
-        std::env::var_os("FLEXBODY_SHARED").map_or_else(|| oracle::root().join("../shared"), PathBuf::from);
+    let shared = oracle::shared();
     let folder = shared.join("models/i_plane_stress");
     let Ok(text) = std::fs::read_to_string(folder.join("ref.json")) else { return };
     let reference: serde_json::Value = serde_json::from_str(&text).expect("JSON");

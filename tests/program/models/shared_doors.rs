@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 const BLOCK: [f64; 4] = [5005.576, 5296.268, 6116.486, 9072.517];
 
 fn case(name: &str) -> Option<PathBuf> {
-    let folder = oracle::root().join("../shared/cases/doors").join(name);
+    let folder = oracle::shared().join("cases/doors").join(name);
     folder.is_dir().then_some(folder)
 }
 

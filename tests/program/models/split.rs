@@ -99,7 +99,7 @@ fn assert_same(a: &FlexBody, b: &FlexBody) {
 
 #[test]
 fn two_cubes_dealt_out_in_turn_are_converted_as_each_alone() {
-    let manifest = oracle::root().join("fixtures/models/cube_hex8/model.toml");
+    let manifest = oracle::fixtures().join("models/cube_hex8/model.toml");
     let first = read_model(&read_manifest(manifest).unwrap()).unwrap();
     let mut second = first.clone();
     let scale = |m: &CscMatrix, factor: f64| {

@@ -33,7 +33,7 @@ const FAST: &str = "[run]\nduration = 0.002\noutputs = 100\n\
 const MODES: usize = 6;
 
 fn manifest() -> PathBuf {
-    oracle::root().join("fixtures/models/connecting_rod/model.toml")
+    oracle::fixtures().join("models/connecting_rod/model.toml")
 }
 
 fn folder_with(scene: &str) -> TempDir {

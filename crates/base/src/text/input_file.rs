@@ -282,7 +282,7 @@ impl Seek for FileReader<'_> {
 /// A file that was read.
 #[derive(Debug, Clone)]
 pub struct SeenFile {
-    /// Where the file lies.
+    /// Path of the file.
     pub path: PathBuf,
     /// SHA-256 of its bytes, lowercase hex.
     pub sha256: String,

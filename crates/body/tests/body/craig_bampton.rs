@@ -9,20 +9,16 @@ mod without_mass;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::Code;
-use flexbody_base::error::Result;
-use flexbody_body::basis::{
-    Basis, BasisChoice, CraigBampton, CraigChang, Loads, ModalBasis, ModeSettings, Task,
-};
-use flexbody_body::convert::{Conversion, ConvertSettings, convert};
+use flexbody_body::basis::{BasisChoice, CraigBampton, CraigChang, Loads, ModalBasis, ModeSettings};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_body::verification::{own_identities, verify};
-use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
+use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
 use flexbody_linalg::{CscMatrix, gram};
-use flexbody_model::{Coupling, FeModel, NodeSet, RawModel, Reference};
+use flexbody_model::{Coupling, NodeSet, RawModel, Reference};
 use oracle::brackets::{bracket, strip};
+use oracle::craig_bampton::{body, close, converted, craig_bampton, fixed, lowest, model, modes_of};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
 use oracle::reference::{dense, symmetric_eigen};
@@ -188,50 +184,11 @@ fn rigid(x: &[[f64; 3]], d: usize, about: [f64; 3]) -> Mat<f64> {
     })
 }
 
-fn model(raw: RawModel) -> FeModel {
-    FeModel::from_raw(raw).expect("a sound model").model
-}
-
-fn lowest(count: usize) -> ModeSettings {
-    ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() }
-}
-
-fn modes_of(model: &FeModel, basis: &dyn Basis, settings: &ModeSettings) -> Result<ModalBasis> {
-    basis.modes(&Task { model, settings, resume: Resume::default(), watch: SILENT })
-}
-
-fn craig_bampton(model: &FeModel, count: usize) -> ModalBasis {
-    modes_of(model, &CraigBampton, &lowest(count)).expect("a basis")
-}
-
-fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
-    let settings =
-        ConvertSettings { modes: lowest(count), basis, frame: frame.into(), ..ConvertSettings::default() };
-    convert(model, &settings, SILENT).expect("a body")
-}
-
-fn body(model: &FeModel, count: usize) -> FlexBody {
-    converted(model, BasisChoice::CraigBampton(CraigBampton), count, BodyFrame::Principal).body
-}
-
-fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
-    assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found}, expected {expected}");
-}
-
 /// Psi Lambda^-1 Psi' F.
 fn modal_responses(basis: &ModalBasis, forces: MatRef<'_, f64>) -> Mat<f64> {
     let (vectors, lambda) = (&basis.solution.vectors, &basis.solution.eigenvalues);
     let modal = vectors.transpose() * forces;
     vectors * Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p])
-}
-
-/// Eigenvalues of the fixed-interface modes.
-fn fixed(basis: &ModalBasis) -> Vec<f64> {
-    let coordinates = &basis.coordinates.as_ref().expect("a Craig-Bampton basis").coordinates;
-    let all = coordinates.names.iter().enumerate();
-    all.filter(|(_, name)| name.starts_with("fixed-interface mode "))
-        .map(|(i, _)| coordinates.stiffness[(i, i)])
-        .collect()
 }
 
 #[test]
@@ -434,7 +391,7 @@ fn few_digits_of_a_slender_body_do_not_reach_its_rigid_motion() {
 /// out and told, and what stays keeps its digits.
 #[test]
 fn motions_without_mass_are_left_out_and_told() {
-    let folder = oracle::root().join("fixtures/models/bar_c3d8r");
+    let folder = oracle::fixtures().join("models/bar_c3d8r");
     let files = read_manifest(folder.join("model.toml")).expect("a fixture");
     let mut raw = read_model(&files).expect("a fixture");
     let along = |axis: usize| {

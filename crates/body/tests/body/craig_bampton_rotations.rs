@@ -14,7 +14,7 @@ use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
 use oracle::reference::symmetric_eigen;
 
 fn fixture(name: &str) -> RawModel {
-    let folder = oracle::root().join("fixtures/models").join(name);
+    let folder = oracle::fixtures().join("models").join(name);
     read_model(&read_manifest(folder.join("model.toml")).expect("a fixture")).expect("a fixture")
 }
 

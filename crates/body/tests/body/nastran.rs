@@ -319,7 +319,7 @@ fn matrices_of_a_file_are_named_or_found_by_their_role() {
 /// Files that another writer has made, with matrices that are not square: found, named, and refused as K.
 #[test]
 fn public_files_are_understood() {
-    let folder = oracle::root().join("../shared/samples/nastran");
+    let folder = oracle::shared().join("samples/nastran");
     if !folder.exists() {
         return;
     }

@@ -20,7 +20,7 @@ fn settings() -> ConvertSettings {
 }
 
 fn fixture(name: &str) -> FeModel {
-    let folder = oracle::root().join("fixtures/models").join(name);
+    let folder = oracle::fixtures().join("models").join(name);
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
     FeModel::from_raw(raw).expect("a body").model
 }

@@ -58,7 +58,7 @@ const SOLIDS: [&str; 10] = [
 
 /// The bodies that belong to the project.
 fn own() -> Vec<Case> {
-    let folder = oracle::root().join("fixtures/models");
+    let folder = oracle::fixtures().join("models");
     let case = |name: &str| {
         let reference = json(&folder.join(name).join("expected.json"));
         let rigid = &reference["rigid_body"];
@@ -82,9 +82,7 @@ fn own() -> Vec<Case> {
 
 /// Where larger bodies lie beside the project on some machines.
 fn shared_folder() -> PathBuf {
-    std::env::var_os("FLEXBODY_SHARED")
-        .map_or_else(|| oracle::root().join("../shared"), PathBuf::from)
-        .join("models")
+    oracle::shared().join("models")
 }
 
 /// Larger solid bodies that lie beside the project on some machines; none elsewhere.

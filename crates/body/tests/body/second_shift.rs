@@ -11,7 +11,7 @@ use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh};
 
 fn fixture(name: &str) -> FeModel {
-    let manifest = oracle::root().join("fixtures/models").join(name).join("model.toml");
+    let manifest = oracle::fixtures().join("models").join(name).join("model.toml");
     let raw = read_model(&read_manifest(&manifest).expect("a manifest")).expect("readable files");
     FeModel::from_raw(raw).expect("a sound model").model
 }

@@ -20,7 +20,7 @@ const DOUBLE: FactorChoice = FactorChoice::Always(Precision::Double);
 /// The fixture models, and some that lie beside the project on some machines.
 fn models() -> Vec<(String, FeModel)> {
     let root = oracle::root();
-    let shared = std::env::var_os("FLEXBODY_SHARED").map_or_else(|| root.join("../shared"), PathBuf::from);
+    let shared = oracle::shared();
     let own = ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8"]
         .map(|m| root.join("fixtures/models").join(m));
     let others = ["a_beam_c3d20", "b_conrod_30k", "k_c3d8r_singularM"].map(|m| shared.join("models").join(m));

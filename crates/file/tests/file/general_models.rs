@@ -16,7 +16,6 @@ use nalgebra::{Matrix3, Vector3};
 use oracle::general::{FIXTURES, raw_fixture as raw};
 use oracle::random::Random;
 use serde_json::Value;
-use std::path::PathBuf;
 
 fn settings(modes: usize, method: Method) -> ConvertSettings {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), method, ..ModeSettings::default() };
@@ -35,8 +34,7 @@ fn refused(raw: RawModel) -> Error {
 /// Two frames of beams, 6 DOF per node, whose references come from scipy.
 #[test]
 fn frames_of_beams_agree_with_their_references() {
-    let root =
-        std::env::var_os("FLEXBODY_SHARED").map_or_else(|| oracle::root().join("../shared"), PathBuf::from);
+    let root = oracle::shared();
     for name in ["j_frame_own", "j_frame_ops_cmass"] {
         let folder = root.join("models").join(name);
         if !folder.is_dir() {
@@ -81,7 +79,7 @@ fn frames_of_beams_agree_with_their_references() {
 /// A larger frame of the project, with masses on its nodes; its reference is scipy's in extended precision.
 #[test]
 fn the_car_frame_agrees_with_its_reference() {
-    let path = oracle::root().join("fixtures/models/car_frame/expected.json");
+    let path = oracle::fixtures().join("models/car_frame/expected.json");
     let reference: Value =
         serde_json::from_str(&std::fs::read_to_string(path).expect("reference")).expect("JSON");
     let lambda = reference["flexible_eigenvalues"].as_array().expect("a list");

@@ -55,7 +55,7 @@ pub trait ExportFormat: Sync {
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported>;
 }
 
-/// What can be asked of an export. What a format does not have is refused by [`export`](crate::export()).
+/// Options of an export. Those that a format does not have are refused by [`export`](crate::export()).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExportOptions {
     /// Variant of the format, one of [`ExportFormat::dialects`]; none: the usual one.

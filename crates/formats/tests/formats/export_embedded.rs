@@ -286,7 +286,7 @@ fn assert_same(name: &str, body: &FlexBody, dialect: &str, flags: &[&str]) {
 }
 
 fn all_fixtures() -> Vec<String> {
-    let folder = oracle::root().join("fixtures/models");
+    let folder = oracle::fixtures().join("models");
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .expect("models")
         .map(|entry| entry.expect("a folder").file_name().into_string().expect("a name"))
@@ -408,7 +408,7 @@ fn frames_turn_by_any_angle() {
 
 #[test]
 fn craig_bampton_bodies_have_frames_at_their_interfaces() {
-    let manifest = oracle::root().join("fixtures/models/robot_link/model.toml");
+    let manifest = oracle::fixtures().join("models/robot_link/model.toml");
     let raw = read_model(&read_manifest(&manifest).expect("manifest")).expect("readable");
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(6), ..ModeSettings::default() };

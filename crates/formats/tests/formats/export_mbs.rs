@@ -51,7 +51,7 @@ fn read(bytes: &[u8], format: &str) -> ImportedFile {
 }
 
 fn models() -> Vec<String> {
-    let folder = oracle::root().join("fixtures/models");
+    let folder = oracle::fixtures().join("models");
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .expect("models")
         .map(|entry| entry.expect("a model").file_name().into_string().expect("a name"))

@@ -21,7 +21,7 @@ const MOTION: [LoadKind; 3] = [LoadKind::Spin, LoadKind::Acceleration, LoadKind:
 const MODES: usize = 5;
 
 fn models() -> Vec<String> {
-    let folder = oracle::root().join("fixtures/models");
+    let folder = oracle::fixtures().join("models");
     let mut names: Vec<String> = std::fs::read_dir(folder)
         .expect("fixtures")
         .map(|entry| entry.expect("entry").file_name().to_string_lossy().into_owned())

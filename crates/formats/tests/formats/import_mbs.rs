@@ -510,7 +510,7 @@ proptest! {
 /// read and written again.
 #[test]
 fn a_clamped_public_body_keeps_its_frame() {
-    let shared = oracle::root().join("../shared/cases/targets/mbsim/modal_reduced_beam.h5");
+    let shared = oracle::shared().join("cases/targets/mbsim/modal_reduced_beam.h5");
     if !shared.exists() {
         return;
     }

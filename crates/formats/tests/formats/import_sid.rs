@@ -545,8 +545,7 @@ fn unreadable_files_are_told_with_their_line() {
 
 #[test]
 fn samples_of_other_programs_have_the_findings_that_they_are_known_for() {
-    let root =
-        std::env::var_os("FLEXBODY_SHARED").map_or_else(|| oracle::root().join("../shared"), Into::into);
+    let root = oracle::shared();
     for (name, dialect, modes, expected) in [
         // Columns 4 to 6 of Oe1 are not symmetric; rotational inertia of the nodes is in Me and Cr, not in Oe
         // and Gr.

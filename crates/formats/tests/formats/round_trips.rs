@@ -18,7 +18,7 @@ use std::path::Path;
 /// Bodies of the fixtures: all models in the principal frame, some in that of the model, where the origin is
 /// not the centre of mass.
 fn bodies() -> Vec<(String, FlexBody)> {
-    let models = oracle::root().join("fixtures/models");
+    let models = oracle::fixtures().join("models");
     let mut names: Vec<String> = std::fs::read_dir(models)
         .expect("fixtures")
         .map(|entry| entry.expect("an entry").file_name().to_string_lossy().into_owned())

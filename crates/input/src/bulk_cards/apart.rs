@@ -3,7 +3,7 @@
 use super::{Card, Line, Lines, bare, card_fields, without_comment};
 use crate::coordinates::excerpt;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,7 @@
 //! DMIG cards that stand one below the other in a deck, cut into parts that can be read by themselves.
 
 use super::{Line, is_begin, is_include, without_comment};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use std::ops::Range;
 
 /// Bytes of cards that one thread reads before it takes others.

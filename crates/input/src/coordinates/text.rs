@@ -1,7 +1,7 @@
 //! Text in blocks that end at line ends, so that no more of a file than two blocks need be in memory.
 
 use super::{Compression, Read};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 
 /// Bytes per block. Larger blocks would be fresh pages each time.
 const BLOCK: usize = 8 << 20;

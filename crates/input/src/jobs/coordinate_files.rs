@@ -4,7 +4,7 @@ use super::{Found, FromFile};
 use crate::assemble::{Entry, Sides, StoredEntries, assemble, check_size};
 use crate::coordinates::{Blocks, Coordinates, Limits};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::compression::Compression;
+use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use rayon::prelude::*;
 use std::path::Path;

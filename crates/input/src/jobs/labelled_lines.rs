@@ -8,7 +8,7 @@ use crate::coordinates::{Blocks, excerpt, line_aligned, lines, most_entries, rea
 use crate::digits::{COUNTED, written_digits};
 use crate::recent::Recent;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::compression::Compression;
+use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::table::integer;
 use flexbody_model::{DofLabel, RawMatrix};

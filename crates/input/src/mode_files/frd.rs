@@ -4,7 +4,7 @@
 use super::table::ModeTable;
 use super::{Found, lines, syntax, unreadable};
 use crate::coordinates::{excerpt, real};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 use std::f64::consts::TAU;

@@ -5,7 +5,7 @@
 
 use super::table::ModeTable;
 use super::{Found, unreadable};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_model::DofLabel;
 
 /// Whether a file begins with a key of 32 or 64 bits.

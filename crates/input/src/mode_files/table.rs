@@ -4,7 +4,7 @@ use super::{Found, unreadable};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::provenance::SourceFile;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_model::{DofLabel, RawModes};
 use std::collections::HashMap;
 

@@ -4,7 +4,7 @@
 use super::ansys_axes::axes;
 use super::{Found, NodeFile, syntax};
 use crate::coordinates::{excerpt, real};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 
 /// Whether the text begins with a header between tabs that has an X, or with the listing of NLIST.

@@ -6,7 +6,7 @@ mod eblock;
 use super::ansys_axes::axes;
 use super::{Found, NodeFile, syntax};
 use crate::coordinates::{excerpt, real};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 
 /// Whether the text is an archive.

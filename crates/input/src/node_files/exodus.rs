@@ -3,7 +3,7 @@
 
 use super::{Found, NodeFile, refused};
 use crate::hdf5::read_exodus;
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 
 /// Whether a file is HDF5 or of classic netCDF.
 pub(super) fn recognises(head: &str) -> bool {

@@ -3,7 +3,7 @@
 
 use super::{Found, NodeFile, syntax};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_model::{ElementShape, Elements};
 use std::collections::{BTreeSet, HashMap};
 

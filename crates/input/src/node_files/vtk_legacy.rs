@@ -3,7 +3,7 @@
 
 use super::vtk_numbers::NumberType;
 use super::{Found, NodeFile, syntax};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 
 const BANNER: &str = "# vtk DataFile Version";
 

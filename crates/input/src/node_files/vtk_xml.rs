@@ -6,7 +6,7 @@ use super::vtk_cells::elements_of;
 use super::vtk_numbers::{Base64, NumberType, Packing, Unpacked};
 use super::xml_elements::{Element, elements};
 use super::{Found, NodeFile, refused};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 use flexbody_model::{Elements, Nodes};
 
 const HELP: &str = "write one mesh of points and cells (.vtu) in double precision, as it is or compressed by zlib, or give a table of nodes";

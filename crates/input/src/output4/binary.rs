@@ -3,7 +3,7 @@
 
 use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 
 /// How the numbers of a file are stored.
 #[derive(Debug, Clone, Copy)]

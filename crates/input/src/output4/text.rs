@@ -6,7 +6,7 @@ use crate::bulk_cards::whole;
 use crate::coordinates::{excerpt, real};
 use crate::digits::written_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
-use flexbody_base::text::input_file::InputFile;
+use flexbody_base::text::InputFile;
 
 /// Whether a file begins with the header of a matrix.
 pub(super) fn begins(head: &[u8]) -> bool {

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 
 fn fixture(path: &str) -> PathBuf {
-    oracle::root().join("fixtures").join(path)
+    oracle::fixtures().join(path)
 }
 
 /// Reads a model of which one file is replaced by `bytes`.

@@ -40,7 +40,7 @@ fn reference() -> CscMatrix {
 fn every_registered_reader_reads_its_fixtures_and_nobody_elses() {
     for reader in READERS {
         let folder = reader.name().to_lowercase().replace(' ', "-");
-        let folder = oracle::root().join("fixtures/readers").join(folder);
+        let folder = oracle::fixtures().join("readers").join(folder);
         let files: Vec<PathBuf> = std::fs::read_dir(&folder)
             .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
             .map(|entry| entry.unwrap().path())
@@ -398,7 +398,6 @@ fn real_models_are_read_with_the_digits_they_have() {
 }
 
 fn shared_models() -> Option<PathBuf> {
-    let shared =
-        std::env::var_os("FLEXBODY_SHARED").map_or_else(|| oracle::root().join("../shared"), PathBuf::from);
+    let shared = oracle::shared();
     Some(shared.join("models")).filter(|models| models.is_dir())
 }

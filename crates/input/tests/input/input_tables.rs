@@ -10,7 +10,7 @@ use std::path::PathBuf;
 const K: &str = "%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 1\n2 1 -1\n2 2 1\n";
 
 fn tet4() -> PathBuf {
-    oracle::root().join("fixtures/small/tet4")
+    oracle::fixtures().join("small/tet4")
 }
 
 /// Writes a model with these tables and reads it.
@@ -301,7 +301,7 @@ fn a_whole_model_is_read_with_its_fingerprints() {
 
 #[test]
 fn one_file_in_two_roles_is_fingerprinted_in_both_and_blamed_once() {
-    let folder = oracle::root().join("fixtures/readers/hdf5");
+    let folder = oracle::fixtures().join("readers/hdf5");
     let both = folder.join("stiffness_and_mass.h5");
     let files = ModelFiles::from_arguments(&both, &both, tet4().join("nodes.csv"), None, None).unwrap();
     let model = read_model(&files).unwrap();

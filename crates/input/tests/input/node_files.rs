@@ -189,7 +189,7 @@ fn mappings_of_ansys_label_the_rows() {
 /// that rows and places belong together.
 #[test]
 fn the_rotor_of_ansys_is_read_as_it_was_written() {
-    let folder = oracle::root().join("../shared/samples/ansys");
+    let folder = oracle::shared().join("samples/ansys");
     let file = |name: &str| folder.join(format!("rotorAnsys{name}.txt"));
     if !file("StiffnessMatrixSparse").exists() {
         return;

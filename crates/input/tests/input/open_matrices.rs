@@ -16,7 +16,7 @@ fn read(name: &str, bytes: &[u8], group: Option<&str>, role: MatrixRole) -> Resu
 }
 
 fn fixture(name: &str) -> Vec<u8> {
-    let path = oracle::root().join("fixtures/readers").join(name);
+    let path = oracle::fixtures().join("readers").join(name);
     std::fs::read(path).expect("a fixture")
 }
 

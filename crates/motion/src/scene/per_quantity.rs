@@ -61,7 +61,7 @@ impl<T> PerQuantity<T> {
 }
 
 impl<T: Clone> PerQuantity<T> {
-    /// The same value for every quantity.
+    /// Returns one value for all quantities.
     pub fn all(value: T) -> Self {
         Self { attitude: value.clone(), deflection: value.clone(), stress: value.clone(), reaction: value }
     }

@@ -89,7 +89,7 @@ struct Fixture {
 }
 
 fn fixture(name: &str, modes: usize) -> Fixture {
-    let folder = oracle::root().join("fixtures/models").join(name);
+    let folder = oracle::fixtures().join("models").join(name);
     let raw = raw_fixture(name);
     let text = std::fs::read_to_string(folder.join("expected.json")).expect("reference");
     let reference: Value = serde_json::from_str(&text).expect("JSON");

@@ -20,7 +20,6 @@ use oracle::equations::State;
 use oracle::general::{FIXTURES, dense, raw_fixture, to_faer};
 use oracle::random::Random;
 use oracle::unreduced::{Unreduced, configuration, holding, soft_block, soft_plate, times};
-use std::path::PathBuf;
 
 /// What rounding may do: conditions at nodes amplify it, and so do null vectors of M.
 const LIMIT: f64 = 1e-11;
@@ -318,8 +317,7 @@ fn projected_on_modes_they_are_the_reduced_equations() {
 #[test]
 #[ignore = "slow"]
 fn real_models_have_the_reduced_equations() {
-    let root =
-        std::env::var_os("FLEXBODY_SHARED").map_or_else(|| oracle::root().join("../shared"), PathBuf::from);
+    let root = oracle::shared();
     for name in
         ["a_beam_c3d20", "e_bracket_near", "f_cube_c3d8", "g_two_1e6", "i_plane_stress", "k_c3d8r_singularM"]
     {

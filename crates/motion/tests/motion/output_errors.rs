@@ -194,7 +194,7 @@ fn bodies(model: &FeModel) -> [FlexBody; 2] {
 
 #[test]
 fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacements() {
-    let folder = oracle::root().join("fixtures/models/cube_hex8");
+    let folder = oracle::fixtures().join("models/cube_hex8");
     let files = flexbody_input::read_manifest(folder.join("model.toml")).expect("a manifest");
     let raw = flexbody_input::read_model(&files).expect("a model");
     let model = FeModel::from_raw(raw).expect("a body").model;

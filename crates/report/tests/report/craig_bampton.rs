@@ -1,54 +1,11 @@
-//! What reports and files say of a Craig-Bampton body.
+//! Craig-Bampton bodies in reports and files.
 
-use flexbody_body::basis::{Basis, BasisChoice, CraigBampton, CraigChang, ModalBasis, ModeSettings, Task};
-use flexbody_body::convert::{Conversion, ConvertSettings, convert};
-use flexbody_body::flex_body::{FixedInterface, FlexBody};
+use flexbody_body::basis::{BasisChoice, CraigChang};
 use flexbody_body::invariants::BodyFrame;
-use flexbody_eigen::{Resume, Wanted};
-use flexbody_linalg::progress::SILENT;
-use flexbody_model::{Coupling, FeModel, RawModel};
+use flexbody_model::Coupling;
 use flexbody_report::{Facts, Format, RunData, render};
 use oracle::brackets::bracket;
-
-fn model(raw: RawModel) -> FeModel {
-    FeModel::from_raw(raw).expect("a sound model").model
-}
-
-fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
-    let modes = lowest(count);
-    let settings = ConvertSettings { modes, basis, frame: frame.into(), ..ConvertSettings::default() };
-    convert(model, &settings, SILENT).expect("a body")
-}
-
-fn body(model: &FeModel, count: usize) -> FlexBody {
-    converted(model, BasisChoice::CraigBampton(CraigBampton), count, BodyFrame::Principal).body
-}
-
-fn record(body: &FlexBody) -> &FixedInterface {
-    body.certificate().fixed_interface.as_ref().expect("a Craig-Bampton body")
-}
-
-fn lowest(count: usize) -> ModeSettings {
-    ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() }
-}
-
-/// Eigenvalues of the fixed-interface modes.
-fn fixed(basis: &ModalBasis) -> Vec<f64> {
-    let coordinates = &basis.coordinates.as_ref().expect("a Craig-Bampton basis").coordinates;
-    let all = coordinates.names.iter().enumerate();
-    all.filter(|(_, name)| name.starts_with("fixed-interface mode "))
-        .map(|(i, _)| coordinates.stiffness[(i, i)])
-        .collect()
-}
-
-fn craig_bampton(model: &FeModel, count: usize) -> ModalBasis {
-    let settings = &lowest(count);
-    CraigBampton.modes(&Task { model, settings, resume: Resume::default(), watch: SILENT }).expect("a basis")
-}
-
-fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
-    assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found}, expected {expected}");
-}
+use oracle::craig_bampton::{body, close, converted, craig_bampton, fixed, model, record};
 
 #[test]
 fn reports_call_a_healthy_body_healthy() {
@@ -100,7 +57,8 @@ fn reports_call_a_healthy_body_healthy() {
     assert!(json["modes"]["worst_residual"].as_f64().expect("a number") < 1e-8);
 }
 
-/// What is recorded stands in the file, in other units as in its own, and stays with the modes that are kept.
+/// The record of the fixed-interface modes stands in the file, follows a change of units, and stays with the modes that are
+/// kept.
 #[test]
 fn the_record_goes_with_the_body() {
     let body = body(&model(bracket([Coupling::Rigid, Coupling::Rigid])), 5);

@@ -231,7 +231,7 @@ fn shapes_that_do_not_fit_are_refused() {
 
 /// scipy's eigenvectors of a fixture model, as numpy saved them.
 fn bar() -> (FeModel, PathBuf) {
-    let folder = oracle::root().join("fixtures/models/bar_c3d8r");
+    let folder = oracle::fixtures().join("models/bar_c3d8r");
     let files = read_manifest(folder.join("model.toml")).expect("manifest");
     let model = FeModel::from_raw(read_model(&files).expect("files")).expect("model").model;
     (model, folder.join("scipy_modes.npy"))

@@ -2,14 +2,10 @@
 //! frequencies are to those of the free body, and static condensation.
 
 use super::*;
-use flexbody_body::flex_body::FixedInterface;
+use oracle::craig_bampton::record;
 
 /// Eigenvalues below this part of the first that is left out are estimated well.
 const FAR_BELOW: f64 = 0.25;
-
-fn record(body: &FlexBody) -> &FixedInterface {
-    body.certificate().fixed_interface.as_ref().expect("a Craig-Bampton body")
-}
 
 /// lower <= lambda <= estimate <= theta for every mode, and the estimate has found nearly all of theta -
 /// lambda far below the cut; the smallest part that it found there, and the largest ratio of the bound to the
