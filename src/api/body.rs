@@ -12,7 +12,6 @@ use flexbody_body::verification::own_identities;
 use flexbody_file::RecordedMotion;
 use flexbody_formats::export::ExportOptions;
 use flexbody_formats::{FORMATS, export, find_format};
-use flexbody_linalg::progress::Event;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{Point, body_point, simulate, unsettled_rate};
 use flexbody_study::selection::select;
@@ -238,7 +237,7 @@ impl FlexBody {
     /// # Errors
     /// As [`FlexBody::select`]; FB605 where the listener stops it.
     pub fn select_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
-        heard(listener, |watch| select(&self.0, &[], &scene.0, None, watch)).map(Selection)
+        heard(listener, |context| select(&self.0, &[], &scene.0, context)).map(Selection)
     }
 
     /// The equations of motion of the body, with all terms that it holds.
@@ -304,10 +303,10 @@ impl FlexBody {
     /// As [`FlexBody::simulate`]; FB605 where the listener stops it.
     pub fn simulate_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
         let scene = scene.0.single()?;
-        let (recording, diagnostics) = heard(listener, |watch| {
-            watch(Event::Phase("simulation"));
-            let (recording, mut found) = simulate(&self.0, scene, None, |part| watch(Event::Fraction(part)))?;
-            found.extend(unsettled_rate(&self.0, scene, &recording, None)?);
+        let (recording, diagnostics) = heard(listener, |context| {
+            context.phase("simulation");
+            let (recording, mut found) = simulate(&self.0, scene, context)?;
+            found.extend(unsettled_rate(&self.0, scene, &recording, context)?);
             Ok((recording, found))
         })?;
         let (units, extent) = (self.0.units().clone(), self.0.extent());

@@ -7,7 +7,7 @@ use flexbody_base::error::Result;
 use flexbody_body::convert::{self, ConvertSettings, Lumping, MeshChoice, convert};
 use flexbody_body::invariants::FrameChoice;
 use flexbody_body::verification::accept;
-use flexbody_eigen::{Accuracy, Resume, Wanted};
+use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_motion::scene::LoadCases;
 use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
 
@@ -127,7 +127,7 @@ impl Model {
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let settings = options.settings(self, None)?;
-        let conversion = heard(listener, |watch| convert(&self.checked, &settings, watch))?;
+        let conversion = heard(listener, |context| convert(&self.checked, &settings, context))?;
         accepted(conversion)
     }
 
@@ -152,9 +152,8 @@ impl Model {
         let settings = options.settings(self, Some(&scene.0))?;
         let by_band = options.modes.is_none() && options.highest.is_none() && options.basis.follows_scene();
         let tailoring = Tailoring { settings, by_band, of_motion: options.basis == Basis::Scene };
-        let (conversion, selection) = heard(listener, |watch| {
-            convert_for(&self.checked, &tailoring, &scene.0, Resume::default(), watch)
-        })?;
+        let (conversion, selection) =
+            heard(listener, |context| convert_for(&self.checked, &tailoring, &scene.0, context))?;
         Ok((accepted(conversion)?, Selection(selection)))
     }
 }

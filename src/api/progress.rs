@@ -2,7 +2,7 @@
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::{Context, Event};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
@@ -34,7 +34,7 @@ struct Stopped;
 ///
 /// A computation is stopped by unwinding, on whichever thread it told its progress, without a message of a
 /// panic: all that it works on is its own.
-pub(super) fn heard<T>(listener: Listener<'_>, work: impl FnOnce(Watch<'_>) -> Result<T>) -> Result<T> {
+pub(super) fn heard<T>(listener: Listener<'_>, work: impl FnOnce(&Context<'_>) -> Result<T>) -> Result<T> {
     let watch = |event: Event<'_>| {
         let progress = match event {
             Event::Phase(name) => Progress::Phase(name),
@@ -45,7 +45,7 @@ pub(super) fn heard<T>(listener: Listener<'_>, work: impl FnOnce(Watch<'_>) -> R
             resume_unwind(Box::new(Stopped));
         }
     };
-    match catch_unwind(AssertUnwindSafe(|| work(&watch))) {
+    match catch_unwind(AssertUnwindSafe(|| work(&Context::heard_by(&watch)))) {
         Ok(done) => done,
         Err(payload) if payload.is::<Stopped>() => {
             Err(Diagnostic::new(Code::Stopped, "the computation was stopped").into())

@@ -5,11 +5,10 @@ use super::{FlexBody, Model, ReportFormat, Scene, report};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::ModeSettings;
-use flexbody_linalg::progress::Watch;
 use flexbody_report::{TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    self, Allowed, ReferenceChoice, ReferenceKind, Source, TradeSettings, WantedBodies, conversions,
+    self, ReferenceChoice, ReferenceKind, Source, TradeSettings, WantedBodies, conversions,
 };
 
 /// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
@@ -66,15 +65,14 @@ impl Model {
     /// As [`Model::convert`]; FB212 where the scene does not fit the body; FB540 when its motion cannot be
     /// integrated; FB605 where the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
-        heard(listener, |watch| {
+        heard(listener, |context| {
             let fine = options.reference == ReferenceChoice::Fine;
             let wanted = WantedBodies { modes: options.modes, fine };
-            let made = conversions(&self.checked, &scene.0, wanted, Allowed::default(), watch)?;
+            let made = conversions(&self.checked, &scene.0, wanted, context)?;
             let nodal = (options.reference == ReferenceChoice::Nodal).then_some(&self.checked);
             let reserved = trade::reserved(&made.lacks, nodal.is_some());
-            let settings =
-                TradeSettings { repeat: options.repeat, memory: None, reserved: &reserved, longest: None };
-            let study = trade::trade(&made.sources, &scene.0, nodal, &settings, watch)?;
+            let settings = TradeSettings { repeat: options.repeat, reserved: &reserved };
+            let study = trade::trade(&made.sources, &scene.0, nodal, &settings, context)?;
             let diagnostics = [made.diagnostics, study.diagnostics.clone()].concat();
             Ok(Trade { study, sources: made.sources, lacks: made.lacks, diagnostics })
         })
@@ -95,9 +93,8 @@ impl FlexBody {
             return Err(Diagnostic::new(Code::Usage, message).into());
         }
         let sources = vec![Source::new("file", self.0.clone(), None)?];
-        let settings = TradeSettings { repeat: options.repeat, memory: None, reserved: &[], longest: None };
-        let measure = |watch: Watch<'_>| trade::trade(&sources, &scene.0, None, &settings, watch);
-        let study = heard(listener, measure)?;
+        let settings = TradeSettings { repeat: options.repeat, reserved: &[] };
+        let study = heard(listener, |context| trade::trade(&sources, &scene.0, None, &settings, context))?;
         let diagnostics = study.diagnostics.clone();
         Ok(Trade { study, sources, lacks: Vec::new(), diagnostics })
     }

@@ -353,7 +353,7 @@ pub struct ConvertArguments {
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
     /// Take the body of a file of another program instead of making one
-    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "checkpoint", "split", "format", "matrices", "dimension", "interface"])]
+    #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "split", "format", "matrices", "dimension", "interface"])]
     pub from: Option<String>,
     /// The job of an FE program.
     #[command(flatten)]
@@ -444,12 +444,8 @@ pub struct ConvertArguments {
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Keep the search for modes in this file; a run that was interrupted or asks for more modes goes on from
-    /// it
-    #[arg(long, value_name = "FILE")]
-    pub checkpoint: Option<PathBuf>,
-    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports and
-    /// checkpoint likewise)
+    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports
+    /// likewise)
     #[arg(long, conflicts_with = "shapes")]
     pub split: bool,
     /// Who finds the modes.

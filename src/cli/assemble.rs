@@ -59,7 +59,6 @@ fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<C
         case: None,
         allow_unjudged: false,
         report: arguments.report.clone(),
-        checkpoint: None,
         split: false,
         engine: EngineArguments::default(),
         threads: arguments.threads,

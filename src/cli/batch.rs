@@ -17,7 +17,7 @@ use flexbody_cluster::{
     BatchBody, BatchList, Budget, Ledger, conversion_bytes, inputs_fingerprint, read_batch_list,
 };
 use flexbody_input::read_model;
-use flexbody_linalg::progress::Event;
+use flexbody_linalg::context::Event;
 use flexbody_model::FeModel;
 use flexbody_report::{BatchFacts, BatchRow, Format};
 use serde_json::Value;

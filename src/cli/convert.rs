@@ -6,7 +6,7 @@ use super::import;
 use super::models::of_manifest_or_job;
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{BodyOutputs, Reserved, format_of, refuse_replacing, refuse_replacing_read};
-use super::resources::{longest, memory_left, peak_memory_bytes, resident_bytes, use_threads};
+use super::resources::{context, peak_memory_bytes, resident_bytes, use_threads};
 use super::terminal::body_text;
 use super::unjudged::refuse_unjudged;
 use super::watcher::Watcher;
@@ -15,19 +15,18 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{BasisChoice, BasisKind, ImportedShapes, ModeSettings};
-use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert_resuming};
+use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, convert};
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::LumpedScheme;
 use flexbody_body::verification::accept;
-use flexbody_eigen::{Accuracy, Method, Snapshot, Wanted};
+use flexbody_eigen::{Accuracy, Method, Wanted};
 use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
-use flexbody_linalg::progress::Event;
+use flexbody_linalg::context::Event;
 use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
-use flexbody_study::checkpoint::resume;
 use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
@@ -66,16 +65,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     // Before the work: what a deck includes or assigns is known now.
     refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
-    let job = Job {
-        arguments,
-        files: &files,
-        lumped: &lumped,
-        loads: &loads,
-        formats: &formats,
-        cases,
-        elsewhere,
-        threads,
-    };
+    let job = Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, elsewhere, threads };
     if !arguments.split {
         let done = job.convert(FeModel::from_raw(raw)?, &places, reserved, &watcher)?;
         OutputSlot::commit_all(done.slots)?;
@@ -116,7 +106,6 @@ fn watcher(arguments: &ConvertArguments, first: &str) -> Watcher {
 /// What every body of a run has in common.
 struct Job<'a> {
     arguments: &'a ConvertArguments,
-    files: &'a ModelFiles,
     lumped: &'a [Lumping],
     loads: &'a [LoadSource],
     formats: &'a [Format],
@@ -163,21 +152,19 @@ impl Job<'_> {
         watcher: &Watcher,
     ) -> Result<Done> {
         let Self { arguments, .. } = *self;
-        let checkpoint = reserved.checkpoint.map(|file| file.for_model(self.files, model)).transpose()?;
         let mut settings = self.settings(model, BasisChoice::default());
         let watch = |event: Event<'_>| watcher.hear(event);
-        settings.basis = match self.elsewhere.modes(model, &settings.modes, &watch)? {
+        let context = context(arguments.memory_limit, arguments.allow_long, &watch);
+        settings.basis = match self.elsewhere.modes(model, &settings.modes, &context)? {
             Some(found) => found,
             None => basis(arguments, self.loads, model)?,
         };
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
-        let save = |snapshot: &Snapshot| checkpoint.iter().for_each(|file| file.save(snapshot));
-        let resume = resume(checkpoint.as_ref(), &save);
         let (mut conversion, selection) = match arguments.scene.as_ref().zip(self.cases) {
-            Some((path, cases)) => convert_for(model, &self.of_band(settings), cases, resume, &watch)
+            Some((path, cases)) => convert_for(model, &self.of_band(settings), cases, &context)
                 .map_err(|error| error.in_file(path))
                 .map(|(conversion, selection)| (conversion, Some(selection))),
-            None => convert_resuming(model, &settings, resume, &watch).map(|conversion| (conversion, None)),
+            None => convert(model, &settings, &context).map(|conversion| (conversion, None)),
         }?;
         let selected = selection.as_ref().map(|selection| selection.diagnostics.iter().cloned());
         conversion.diagnostics.extend(selected.into_iter().flatten());
@@ -191,9 +178,7 @@ impl Job<'_> {
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
         let output = (places.body.display().to_string(), size);
         let phases = watcher.finish();
-        let taken_up = conversion.counters.taken_up;
-        let late = checkpoint.into_iter().flat_map(|file| file.diagnostics(taken_up));
-        let found = conversion.diagnostics.iter().cloned().chain(late);
+        let found = conversion.diagnostics.iter().cloned();
         diagnostics.extend(found.map(|diagnostic| match model.number() {
             Some(number) => diagnostic.about(number),
             None => diagnostic,
@@ -201,7 +186,8 @@ impl Job<'_> {
         refuse_warnings(arguments.printing, &diagnostics)?;
         let mut run = run_data(output, &conversion, diagnostics.clone(), phases, self.threads);
         // Reading may have taken more than the work will.
-        run.memory_estimate_bytes = conversion.plan.map(|plan| peak.unwrap_or(0).max(resident + plan.bytes));
+        run.memory_estimate_bytes =
+            conversion.plan.as_ref().map(|plan| peak.unwrap_or(0).max(resident + plan.bytes()));
         let facts = Facts::new(&conversion.body, &run);
         for (slot, format) in reserved.reports.iter().zip(self.formats) {
             slot.fill(render(&facts, *format).as_bytes())?;
@@ -234,8 +220,6 @@ impl Job<'_> {
                 accuracy: arguments.accuracy,
                 method: Method::Auto,
                 factor: arguments.factor,
-                memory: memory_left(arguments.memory_limit),
-                longest: longest(arguments.allow_long),
                 ..ModeSettings::default()
             },
             basis,
@@ -321,14 +305,8 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
         _ if slepc && residual => "residual vectors need the factor of --engine built-in",
         ConvertArguments { scene: Some(_), .. } if slepc => "--scene chooses modes of --engine built-in",
         ConvertArguments { split: true, .. } if slepc => "--engine slepc takes one body: --split has several",
-        ConvertArguments { checkpoint: Some(_), .. } if slepc => {
-            "--checkpoint is for --engine built-in: that of slepc lies in its folder"
-        }
         ConvertArguments { accuracy: Accuracy::Certified, .. } if slepc => {
             "--accuracy certified needs --engine built-in"
-        }
-        ConvertArguments { checkpoint: Some(_), .. } if !searches_free_modes => {
-            "--checkpoint keeps a search for free modes: it needs --basis free or craig-chang"
         }
         _ if residual && !searches_free_modes => "residual vectors need --basis free or craig-chang",
         ConvertArguments { split: true, .. } if loads.iter().any(|set| set.file().is_some()) => {
@@ -469,7 +447,7 @@ fn run_data(
     phases: Vec<Phase>,
     threads: usize,
 ) -> RunData {
-    let work = &conversion.counters;
+    let work = &conversion.work;
     let counters = [
         ("factorizations", work.factorizations),
         ("solved_columns", work.solved_columns),

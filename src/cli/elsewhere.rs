@@ -6,7 +6,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::output::code_of;
 use flexbody_body::basis::{BasisChoice, ModeSettings};
 use flexbody_cluster::{Engine, ModelReference, PrepareSettings, Prepared, prepare, read_found};
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use std::path::{Path, PathBuf};
 
@@ -58,17 +58,17 @@ impl Elsewhere {
         &self,
         model: &FeModel,
         settings: &ModeSettings,
-        watch: Watch<'_>,
+        context: &Context<'_>,
     ) -> Result<Option<BasisChoice>> {
         let found = match self {
             Self::Nowhere => return Ok(None),
             Self::Cluster { folder, prepared, prove } => {
-                watch(Event::Phase("modes of the cluster"));
+                context.phase("modes of the cluster");
                 read_found(folder, prepared, model, *prove)?
             }
             Self::Slepc { engine, folder, .. } => {
                 let python = engine.check()?;
-                watch(Event::Phase("preparing"));
+                context.phase("preparing");
                 let asked = PrepareSettings {
                     wanted: settings.wanted,
                     accuracy: settings.accuracy,
@@ -76,7 +76,7 @@ impl Elsewhere {
                     model: ModelReference::default(),
                 };
                 let prepared = in_made_folder(folder, || prepare(model, &asked, folder)?.keep())?;
-                watch(Event::Phase("SLEPc"));
+                context.phase("SLEPc");
                 engine.run(&python, folder)?;
                 read_found(folder, &prepared, model, false)?
             }

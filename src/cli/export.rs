@@ -13,6 +13,7 @@ use flexbody_file::read_simulation;
 use flexbody_formats::export::{ExportOptions, Exported, InertiaInScene, Points};
 use flexbody_formats::{export, find_format};
 use flexbody_input::parse_units;
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, inertia_share};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -74,7 +75,11 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
 fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScene>> {
     let mut largest: Option<InertiaInScene> = None;
     for scene in LoadCases::read(path, None)?.iter() {
-        let Some(share) = inertia_share(body, scene, memory_left(None))? else { continue };
+        let Some(share) =
+            inertia_share(body, scene, &Context { memory: memory_left(None), ..Context::QUIET })?
+        else {
+            continue;
+        };
         if largest.as_ref().is_none_or(|known| known.share < share) {
             largest = Some(InertiaInScene { scene: scene.name.clone(), share });
         }

@@ -6,44 +6,36 @@ use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_base::read_files::{FileIdentity, refuse_read, replaces};
 use flexbody_report::Format;
-use flexbody_study::checkpoint::CheckpointFile;
 use std::path::{Path, PathBuf};
 
 /// Output files of one body.
 pub(super) struct BodyOutputs {
     pub body: PathBuf,
     pub reports: Vec<PathBuf>,
-    pub checkpoint: Option<PathBuf>,
 }
 
 /// The same, reserved.
 pub(super) struct Reserved {
     pub body: OutputSlot,
     pub reports: Vec<OutputSlot>,
-    pub checkpoint: Option<CheckpointFile>,
 }
 
 impl BodyOutputs {
     /// What the command line names, with a number in every name for one of several bodies.
     pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
         let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| marked(path, number));
-        Self {
-            body: place(&arguments.output),
-            reports: arguments.report.iter().map(place).collect(),
-            checkpoint: arguments.checkpoint.as_ref().map(place),
-        }
+        Self { body: place(&arguments.output), reports: arguments.report.iter().map(place).collect() }
     }
 
     /// Every file.
     pub(super) fn all(&self) -> impl Iterator<Item = &PathBuf> {
-        std::iter::once(&self.body).chain(&self.reports).chain(&self.checkpoint)
+        std::iter::once(&self.body).chain(&self.reports)
     }
 
     pub(super) fn reserve(&self) -> Result<Reserved> {
         Ok(Reserved {
             body: flexbody_file::prepare_output(&self.body)?,
             reports: self.reports.iter().map(OutputSlot::prepare).collect::<Result<_>>()?,
-            checkpoint: self.checkpoint.as_deref().map(CheckpointFile::open).transpose()?,
         })
     }
 }

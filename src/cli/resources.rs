@@ -1,5 +1,6 @@
 //! What the process has used so far, where the system tells (Linux).
 
+use flexbody_linalg::context::{Context, Watch};
 use std::sync::{Once, mpsc};
 
 /// Ticks per second of the CPU times in /proc: fixed for user space on Linux.
@@ -77,9 +78,11 @@ fn start(wanted: usize) {
 /// Seconds that a search for modes may take by its estimate, unless the user says that it may be long.
 const LONGEST: f64 = 1800.0;
 
-/// How long a search for modes may take.
-pub(super) fn longest(allow_long: bool) -> Option<f64> {
-    (!allow_long).then_some(LONGEST)
+/// Returns the context of work that `watch` listens to: the memory that is left, `memory_limit` at most, and the time that
+/// it may take.
+pub(super) fn context(memory_limit: Option<u64>, allow_long: bool, watch: Watch<'_>) -> Context<'_> {
+    let longest = (!allow_long).then_some(LONGEST);
+    Context { memory: memory_left(memory_limit), longest, ..Context::heard_by(watch) }
 }
 
 /// Whether another thread can be started.

@@ -5,7 +5,7 @@ use super::convert::load_sources;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
-use super::resources::{longest, memory_left, use_threads};
+use super::resources::{context, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -15,7 +15,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_input::LoadSource;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::{Context, Event};
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Point, Scene};
 use flexbody_report::{Format, ResponseFacts, RunData, response_csv};
@@ -40,7 +40,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     refuse_replacing_read(outputs(arguments))?;
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let (model, body, diagnostics) = if is_model {
-        let (model, body, diagnostics) = model_and_body(arguments, asked, &watch)?;
+        let (model, body, diagnostics) =
+            model_and_body(arguments, asked, &context(None, arguments.allow_long, &watch))?;
         (Some(model), body, diagnostics)
     } else {
         let (body, notes) = flexbody_file::read_with_notes(&arguments.model)?;
@@ -48,7 +49,8 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     };
     let settings = settings(arguments, scene.as_ref(), &body)?;
     let [from, to] = places(arguments, scene.as_ref())?;
-    let response = respond(model.as_ref(), &body, &from, &to, &settings, &watch)?;
+    let context = context(None, arguments.allow_long, &watch);
+    let response = respond(model.as_ref(), &body, &from, &to, &settings, &context)?;
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;
     let facts = ResponseFacts::new(&response, &settings, &run);
@@ -101,7 +103,7 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
 fn model_and_body(
     arguments: &ResponseArguments,
     asked: Option<Vec<LoadSource>>,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<(FeModel, FlexBody, Vec<Diagnostic>)> {
     let (files, checked) = read_checked(&arguments.model, &arguments.job, outputs(arguments))?;
     let (model, mut diagnostics) = (checked.model, checked.diagnostics);
@@ -117,15 +119,13 @@ fn model_and_body(
             wanted: Wanted::Lowest(
                 arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize),
             ),
-            memory: memory_left(None),
-            longest: longest(arguments.allow_long),
             ..ModeSettings::default()
         },
         basis,
         lumped: Vec::new(),
         ..ConvertSettings::default()
     };
-    let made = convert(&model, &settings, watch)?;
+    let made = convert(&model, &settings, context)?;
     diagnostics.extend(made.diagnostics);
     Ok((model, made.body, diagnostics))
 }
@@ -149,8 +149,6 @@ fn settings(
         replaces_damping: arguments.damping.is_none()
             && scene.is_some_and(|scene| scene.requirements.replaces_damping),
         tolerance: arguments.tolerance,
-        memory: memory_left(None),
-        longest: longest(arguments.allow_long),
     })
 }
 

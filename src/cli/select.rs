@@ -4,7 +4,7 @@ use super::arguments::SelectArguments;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
-use super::resources::{longest, memory_left, use_threads};
+use super::resources::{context, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -12,8 +12,8 @@ use flexbody_base::output::OutputSlot;
 use flexbody_body::basis::{BasisKind, ModeSettings};
 use flexbody_body::convert::ConvertSettings;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_eigen::{Resume, Wanted};
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_eigen::Wanted;
+use flexbody_linalg::context::{Context, Event};
 use flexbody_model::CheckedModel;
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, SelectionFacts};
@@ -35,13 +35,13 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     refuse_replacing_read(arguments.report.iter())?;
     let watch = |event: Event<'_>| watcher.hear(event);
     let (body, lacks, mut diagnostics) = if is_model {
-        converted(arguments, &cases, &watch)?
+        converted(arguments, &cases, &context(None, arguments.allow_long, &watch))?
     } else {
         refuse_modes(arguments)?;
         let (body, notes) = flexbody_file::read_with_notes(&arguments.body)?;
         (body, Vec::new(), notes)
     };
-    let selection = select(&body, &lacks, &cases, memory_left(None), &watch)
+    let selection = select(&body, &lacks, &cases, &context(None, arguments.allow_long, &watch))
         .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(selection.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
@@ -63,27 +63,21 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
 fn converted(
     arguments: &SelectArguments,
     cases: &LoadCases,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<(FlexBody, Vec<Vec<ReferenceError>>, Vec<Diagnostic>)> {
     let (files, checked) = read_checked(&arguments.body, &arguments.job, arguments.report.iter())?;
     let CheckedModel { model, mut diagnostics, .. } = checked;
     let loads = loads_for(Some(cases), &files.residual_vectors);
     let wanted = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
     let settings = ConvertSettings {
-        modes: ModeSettings {
-            wanted: Wanted::Lowest(wanted),
-            memory: memory_left(None),
-            longest: longest(arguments.allow_long),
-            ..ModeSettings::default()
-        },
+        modes: ModeSettings { wanted: Wanted::Lowest(wanted), ..ModeSettings::default() },
         basis: computed_basis(BasisKind::Free, &loads, &model)?,
         lumped: Vec::new(),
         ..ConvertSettings::default()
     };
     let tailoring = Tailoring { settings, by_band: arguments.modes.is_none(), of_motion: false };
-    let Enriched { made, rounds } = tailoring
-        .convert(&model, cases, Resume::default(), watch)
-        .map_err(|error| error.in_file(&arguments.scene))?;
+    let Enriched { made, rounds } =
+        tailoring.convert(&model, cases, context).map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(made.diagnostics);
     Ok((made.body, rounds, diagnostics))
 }

@@ -3,13 +3,13 @@
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, marked, refuse_replacing, refuse_replacing_read};
-use super::resources::{memory_left, use_threads};
+use super::resources::{context, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_linalg::progress::Event;
+use flexbody_linalg::context::Event;
 use flexbody_motion::scene::{LoadCases, Scene, simulate, unsettled_rate};
 use flexbody_report::{Format, RunData, SimulationFacts, simulation_csv};
 use std::path::{Path, PathBuf};
@@ -85,9 +85,10 @@ impl Job<'_> {
     ) -> Result<Outcome> {
         watcher.hear(Event::Phase("simulation"));
         let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
-        let hear = |part| watcher.hear(Event::Fraction(part));
-        let run = simulate(self.body, scene, memory_left(None), hear).and_then(|(recording, mut found)| {
-            found.extend(unsettled_rate(self.body, scene, &recording, memory_left(None))?);
+        let watch = |event: Event<'_>| watcher.hear(event);
+        let left = || context(None, true, &watch);
+        let run = simulate(self.body, scene, &left()).and_then(|(recording, mut found)| {
+            found.extend(unsettled_rate(self.body, scene, &recording, &left())?);
             Ok((recording, found))
         });
         let (recording, found) = run.map_err(|error| {

@@ -4,19 +4,18 @@ use super::arguments::TradeArguments;
 use super::models::{is_model, read_checked};
 use super::outcome::{Outcome, refuse_warnings};
 use super::places::{format_of, refuse_replacing, refuse_replacing_read};
-use super::resources::{longest, memory_left, use_threads};
+use super::resources::{context, memory_left, use_threads};
 use super::watcher::Watcher;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::basis::ModeSettings;
-use flexbody_linalg::progress::Event;
+use flexbody_linalg::context::{Context, Event};
 use flexbody_motion::scene::LoadCases;
 use flexbody_report::{Format, RunData, TradeFacts, trade_csv};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{
-    Allowed, ReferenceChoice, Source, Trade, TradeRow, TradeSettings, WantedBodies, conversions, reserved,
-    trade,
+    ReferenceChoice, Source, Trade, TradeRow, TradeSettings, WantedBodies, conversions, reserved, trade,
 };
 use std::path::{Path, PathBuf};
 
@@ -35,16 +34,15 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let series = cases.iter().flat_map(|scene| &scene.series);
     refuse_replacing(series.map(|file| &file.path), outputs())?;
     refuse_replacing_read(outputs())?;
-    let memory = memory_left(None);
+    let watch = |event: Event<'_>| watcher.hear(event);
+    let context = context(None, arguments.allow_long, &watch);
     let mut diagnostics = Vec::new();
     let (model, sources, lacks) = if is_model {
         let (_, checked) = read_checked(&arguments.body, &arguments.job, outputs())?;
         diagnostics.extend(checked.diagnostics);
         let modes = arguments.modes.map_or(ModeSettings::DEFAULT_COUNT, |modes| modes as usize);
         let wanted = WantedBodies { modes, fine: arguments.reference == ReferenceChoice::Fine };
-        let allowed = Allowed { memory, longest: longest(arguments.allow_long) };
-        let watch = |event: Event<'_>| watcher.hear(event);
-        let made = conversions(&checked.model, &cases, wanted, allowed, &watch)
+        let made = conversions(&checked.model, &cases, wanted, &context)
             .map_err(|error| error.in_file(&arguments.scene))?;
         diagnostics.extend(made.diagnostics);
         (Some(checked.model), made.sources, made.lacks)
@@ -55,15 +53,11 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     };
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
     let reserved = reserved(&lacks, nodal.is_some());
-    let settings = TradeSettings {
-        repeat: arguments.repeat.into(),
-        memory: memory_left(None),
-        reserved: &reserved,
-        longest: longest(arguments.allow_long),
-    };
-    let watch = |event: Event<'_>| watcher.hear(event);
-    let study =
-        trade(&sources, &cases, nodal, &settings, &watch).map_err(|error| error.in_file(&arguments.scene))?;
+    let settings = TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved };
+    // What was converted takes memory too.
+    let context = Context { memory: memory_left(None), ..context };
+    let study = trade(&sources, &cases, nodal, &settings, &context)
+        .map_err(|error| error.in_file(&arguments.scene))?;
     diagnostics.extend(study.diagnostics.iter().cloned());
     let run = RunData { phases: watcher.finish(), diagnostics, threads, ..RunData::default() };
     refuse_warnings(arguments.printing, &run.diagnostics)?;

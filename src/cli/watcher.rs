@@ -1,7 +1,7 @@
 //! Progress on a terminal with the time that is left of each phase, and the time that each phase took.
 
 use super::resources::{cpu_seconds, has_thread};
-use flexbody_linalg::progress::Event;
+use flexbody_linalg::context::Event;
 use flexbody_report::Phase;
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use std::fmt::Write;

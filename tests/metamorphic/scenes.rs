@@ -6,6 +6,7 @@ use crate::subject::{Basis, Subject};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
+use flexbody_linalg::context::Context;
 use flexbody_model::RawModel;
 use flexbody_motion::dynamics::RotationVector;
 use flexbody_motion::scene::{
@@ -295,7 +296,7 @@ fn scale_loads(scene: &mut Scene, probe: &FlexBody) -> Result<()> {
     alone.run.scheme = Scheme::Adaptive { tolerance: 1e-6 };
     let small = 1e-9 * probe.modes().eigenvalue[0] * probe.invariants().mass() * probe.extent();
     alone.loads.iter_mut().for_each(|load| *load = scaled(load, small));
-    let (motion, _) = trace(probe, &alone, None, |_| ())?;
+    let (motion, _) = trace(probe, &alone, &Context::QUIET)?;
     let factor = small * DEFLECTION / motion.extremes.deflection.value.max(f64::MIN_POSITIVE);
     scene.loads.iter_mut().for_each(|load| *load = scaled(load, factor));
     Ok(())

@@ -7,7 +7,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
 use flexbody_motion::scene::{LoadCases, Scene};
 
@@ -78,7 +78,7 @@ impl Subject {
     /// # Errors
     /// Errors of the conversion, and of the file.
     pub fn body(&self) -> Result<FlexBody> {
-        let body = convert(&self.model()?, &self.settings(), SILENT)?.body;
+        let body = convert(&self.model()?, &self.settings(), &Context::QUIET)?.body;
         if !self.stored {
             return Ok(body);
         }

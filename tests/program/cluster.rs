@@ -9,7 +9,7 @@ use flexbody_body::basis::{ModeSettings, free_surface, rigid_modes};
 use flexbody_cluster::Budget;
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use nalgebra::Vector3;
 use oracle::{fixtures, members};
@@ -84,7 +84,7 @@ impl Job {
         let raw = read_model(&read_manifest(manifest(model)).expect("a manifest")).expect("a model");
         let model = FeModel::from_raw(raw).expect("a model").model;
         let settings = ModeSettings { wanted: Wanted::Lowest(MODES), ..ModeSettings::default() };
-        let found = free_surface(&model, &settings, SILENT).expect("modes").solution;
+        let found = free_surface(&model, &settings, &Context::QUIET).expect("modes").solution;
         let prepared = content(&place.path().join("job/prepared.jsonl"));
         let completeness = found.completeness;
         let result = json!({

@@ -177,8 +177,6 @@ fn no_output_replaces_an_input_or_another_output() {
         "-o b.h5 --report left.json",
         "-o same.json --report same.json",
         "-o b.h5 --report r.json --report ./r.json",
-        "-o b.h5 --checkpoint K.mtx",
-        "-o b.h5 --checkpoint ./b.h5",
     ] {
         let run = flexbody(path, &format!("convert model.toml {line}"));
         assert_eq!(run.code, 2, "{line}: {}", run.err);

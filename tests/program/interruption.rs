@@ -94,40 +94,6 @@ fn signals_that_are_ignored_from_the_start_stay_ignored() {
     }
 }
 
-#[test]
-#[ignore = "slow"]
-fn an_interrupted_convert_goes_on_from_its_checkpoint() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let (model, out) = (folder.path().join("model"), folder.path().join("out"));
-    std::fs::create_dir(&model).expect("a folder");
-    std::fs::create_dir(&out).expect("a folder");
-    let raw = Mesh::block(ElementKind::Hex8, [16; 3], [1.0, 0.9, 0.8])
-        .assemble(&Material::STEEL, MassRule::Consistent)
-        .raw_model();
-    let manifest = write_model(&model, &raw, Triangle::Lower);
-    let convert = || {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_flexbody"));
-        command.arg("convert").arg(&manifest).args(["--modes", "120", "--json"]).current_dir(&out);
-        command.args(["--output", "body.flex.h5", "--checkpoint", "search.h5"]);
-        command
-    };
-    let mut child = convert().stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program");
-    let began = Instant::now();
-    while !out.join("search.h5").exists() {
-        assert!(child.try_wait().expect("a child").is_none(), "the program ended without a checkpoint");
-        assert!(began.elapsed() < Duration::from_secs(120), "no checkpoint appeared");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    let sent = Command::new("kill").arg("-INT").arg(child.id().to_string()).status();
-    assert!(sent.expect("kill").success());
-    assert_eq!(child.wait().expect("a child").code(), Some(ExitCode::Interrupted as i32));
-    assert_eq!(members(&out), ["search.h5"]);
-    let output = convert().output().expect("the program");
-    assert!(output.status.success(), "{output:?}");
-    assert!(String::from_utf8_lossy(&output.stdout).contains("FB711"), "{output:?}");
-    assert_eq!(members(&out), ["body.flex.h5", "search.h5"]);
-}
-
 /// A queue ends the program that it has started, not those that this one has started.
 #[test]
 fn programs_that_it_waits_for_end_with_it() {

@@ -4,7 +4,7 @@ use crate::program::flexbody;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
 use hdf5_metno as hdf5;
 use oracle::{fixtures, members};
@@ -184,7 +184,7 @@ fn a_body_of_kept_matrices_is_that_of_others() {
     let [held, kept] = [false, true].map(|keep| {
         let model = FeModel::from_raw(read(folder.path(), keep)).expect("a model").model;
         assert_eq!(model.stiffness().as_csc().is_lent(), keep);
-        convert(&model, &ConvertSettings::default(), SILENT).expect("a body").body
+        convert(&model, &ConvertSettings::default(), &Context::QUIET).expect("a body").body
     });
     assert_eq!(held, kept);
 }

@@ -5,7 +5,6 @@
 
 mod bad_input;
 mod bodies;
-mod checkpoint;
 mod cluster;
 mod command_line;
 mod docs_generated;

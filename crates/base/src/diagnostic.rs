@@ -31,7 +31,7 @@ impl Severity {
 macro_rules! codes {
     ($($variant:ident = $id:literal, $severity:ident, $exit:ident, $title:literal, $help:literal;)*) => {
         /// A diagnostic's identity. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model,
-        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files and checkpoints, FB8xx usage.
+        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files, FB8xx usage.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Code {
             $(#[doc = $title] $variant,)*
@@ -217,14 +217,13 @@ codes! {
     RateUnsettled = "FB554", Warning, Done, "a rate that still changes with the steps of the integration", "give a smaller `tolerance` (a shorter `step`) in [run], and take the rate for settled when it no longer changes";
     SelectionUnjudged = "FB557", Error, CheckFailed, "a body for a scene that it does not hold, or where nothing can be said of it", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body all the same";
     CouplingEffect = "FB558", Note, Done, "rigid interfaces that the body and the model it is compared with have in common", "nothing to do where a stiff part is mounted at the interface; else state coupling = \"averaging\", which lets it deform";
-    // FB6xx: resources
+    // FB6xx: resources; FB603 was that of checkpoints, and stays free
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
-    CheckpointUnwritten = "FB603", Warning, Done, "checkpoint cannot be written", "check the folder, its permissions and the free space; the run itself goes on";
     WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
     Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
     Forked = "FB606", Error, Resources, "process has none of the threads that it computes with", "start processes by `spawn` or `forkserver`, or fork before the first work";
-    // FB7xx: flex-body files and checkpoints
+    // FB7xx: flex-body files; FB708 to FB711 were those of checkpoints, and stay free
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
     BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
@@ -232,10 +231,6 @@ codes! {
     BodiesDiffer = "FB705", Error, CheckFailed, "flexible bodies differ", "see the table of quantities and tolerances";
     BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
     BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
-    CheckpointUnreadable = "FB708", Error, BadInput, "not a checkpoint, or a damaged one", "remove the file or name another one: the run then starts anew";
-    CheckpointVersion = "FB709", Error, BadInput, "checkpoint of another format version", "read it with the flexbody version named in the file, or name another file";
-    CheckpointForeign = "FB710", Error, BadInput, "checkpoint of another model", "name another file for this model";
-    CheckpointTakenUp = "FB711", Note, Done, "search for modes goes on from a checkpoint", "nothing to do";
     BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/format.md says how a program that changes files states new digests";
     BodyWithoutDigest = "FB713", Note, Done, "flex-body file without a digest: a change since it was written cannot be seen", "convert the model again to get one";
     BodyUntrustworthy = "FB714", Error, Untrustworthy, "body that was made breaks what must hold for every body; nothing is written", "ask for fewer modes, or look for parts that are joined too weakly or for masses that no body has; report the model to us if it stays";

@@ -339,8 +339,8 @@ impl OutputSlot {
         Self::commit_all([self])
     }
 
-    /// Does the work of [`OutputSlot::commit_all`] for files that stay however the run ends: a checkpoint, the ledger of
-    /// a batch, the folder of a cluster.
+    /// Does the work of [`OutputSlot::commit_all`] for files that stay however the run ends: the ledger
+    /// of a batch, the folder of a cluster.
     ///
     /// # Errors
     /// Every error of [`OutputSlot::commit_all`].

@@ -1,7 +1,7 @@
 //! Files that a run has read. An output must not replace one of them, under whatever name it is given.
 //!
 //! Whoever opens a file of an input notes it here ([`note_read`]); before the outputs of a run get their names, each is
-//! held to what was read. Files that a run keeps for itself and reads again (a checkpoint, the ledger of a batch) are
+//! held to what was read. Files that a run keeps for itself and reads again (the ledger of a batch) are
 //! opened without a note.
 
 use crate::diagnostic::{Code, Diagnostic};

@@ -2,8 +2,8 @@
 //! front does not hold up small ones; none passes it for ever, since only so many run beside it.
 
 use flexbody_base::error::Result;
-use flexbody_body::basis::{ModeSettings, memory_estimate};
-use flexbody_linalg::progress::SILENT;
+use flexbody_body::basis::{ModeSettings, search_plan};
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 
 /// Bytes of a process before it has read anything.
@@ -20,7 +20,7 @@ const ENTRY: u64 = 40;
 pub fn conversion_bytes(model: &FeModel, settings: &ModeSettings) -> Result<u64> {
     let pencil = model.pencil();
     let entries = pencil.stiffness().as_csc().nnz() + pencil.mass().as_csc().nnz();
-    Ok(PROCESS + ENTRY * entries as u64 + memory_estimate(model, settings, SILENT)?)
+    Ok(PROCESS + ENTRY * entries as u64 + search_plan(model, settings, &Context::QUIET)?.bytes())
 }
 
 /// What may be given out at the same time.

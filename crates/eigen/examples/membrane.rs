@@ -8,7 +8,7 @@
 
 use faer::Mat;
 use flexbody_eigen::{EigenFailure, EigenProblem, EigenSettings, Wanted, solve};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, EliminationOrder, Pencil, SymmetricMatrix};
 
 /// Masses along a side.
@@ -36,7 +36,7 @@ fn main() -> Result<(), EigenFailure> {
     let order = EliminationOrder::default();
     let problem = EigenProblem::new(Pencil::new(&k, &m, 1), constant.as_ref(), &order)?;
     let settings = EigenSettings { wanted: Wanted::Lowest(12), ..EigenSettings::default() };
-    let modes = solve(&problem, &settings, SILENT)?;
+    let modes = solve(&problem, &settings, &Context::QUIET)?;
     println!("{:?}", modes.eigenvalues);
     println!(
         "{:?}: {} modes lie below {:e}",

@@ -9,11 +9,11 @@
 
 use super::canonical::clusters;
 use super::completeness::count_below;
-use super::counters::Counters;
 use super::failure::EigenFailure;
-use super::problem::EigenProblem;
+use super::problem::Task;
 use super::solution::EigenvalueBounds;
 use faer::{Mat, MatRef};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Analysis, Cholesky, CompensatedBlock, DoubleDouble, LANES, Pencil, Solve, gram_compensated, largest,
     multiply_compensated, small_pencil, sum_length,
@@ -46,28 +46,27 @@ const SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 /// [`EigenFailure::NotCertified`] when K + tau M cannot be proved positive definite in f64 or the counts are
 /// wrong.
 pub(super) fn enclose(
-    problem: &EigenProblem<'_>,
-    analysis: &Analysis,
+    task: &Task<'_>,
     vectors: MatRef<'_, f64>,
     eigenvalues: &[f64],
     high: f64,
     gap: f64,
-    counters: &mut Counters,
 ) -> Result<EigenvalueBounds, EigenFailure> {
+    let Task { problem, analysis, context, .. } = *task;
     let pencil = &problem.pencil;
     let low = PART_BELOW * eigenvalues[0];
-    let (rigid, pivots_below) = (problem.rigid.ncols(), count_below(problem, analysis, low, counters)?);
+    let (rigid, pivots_below) = (problem.rigid.ncols(), count_below(problem, analysis, low, context)?);
     if pivots_below != rigid {
         let counted = pivots_below.saturating_sub(rigid);
         return Err(EigenFailure::CountDiffers { found: 0, counted, shift: low });
     }
     let factor = SHIFTS
         .iter()
-        .find_map(|part| ProvedFactor::new(analysis, pencil, part * eigenvalues[0], counters))
+        .find_map(|part| ProvedFactor::new(analysis, pencil, part * eigenvalues[0], context))
         .ok_or(EigenFailure::NotCertified { why: "K + tau M is positive definite by less than rounding" })?;
     let tau = factor.tau;
     let omega: Vec<f64> = eigenvalues.iter().map(|lambda| lambda + tau).collect();
-    let trial = Trial::new(&factor, vectors, omega, counters);
+    let trial = Trial::new(&factor, vectors, omega, context);
     let shift = |sigma: f64| DoubleDouble::sum(sigma, tau);
     let lambda = |omega: DoubleDouble| omega - DoubleDouble::from(tau);
     let below = trial.lehmann(shift(high), Side::Above);
@@ -118,7 +117,7 @@ impl<'a> ProvedFactor<'a> {
     /// matrix whose entries differ by at most gamma sqrt(d_i d_j) with gamma = (k + 2) u and k entries in the
     /// row of L (S. M. Rump, *Verification of positive definiteness*, BIT 46, 2006). Relative to D that is at
     /// most u times the entries of L.
-    fn new(analysis: &'a Analysis, pencil: &Pencil<'a>, tau: f64, counters: &mut Counters) -> Option<Self> {
+    fn new(analysis: &'a Analysis, pencil: &Pencil<'a>, tau: f64, context: &Context<'_>) -> Option<Self> {
         let (k, m, block) = (pencil.stiffness(), pencil.mass(), pencil.block());
         let n = pencil.n();
         let (k_diagonal, m_diagonal) = (k.diagonal(), m.diagonal());
@@ -143,7 +142,7 @@ impl<'a> ProvedFactor<'a> {
         let rounding = 2.0 * U * (analysis.factor_len() + 3 * n) as f64 + 8.0 * U * size;
         let alpha = 3.0 * rounding;
         let lowered = k.with_diagonal(|i, value| value - alpha * diagonal[i])?;
-        counters.factorizations += 1;
+        context.count(|work| work.factorizations += 1);
         let factor = Cholesky::new(analysis, &Pencil::new(&lowered, m, block), tau)?;
         let margin = 1.9 * rounding;
         Some(Self { pencil: *pencil, factor, tau, diagonal, margin, size, row: row as f64 })
@@ -168,7 +167,7 @@ impl<'a> ProvedFactor<'a> {
     /// Upper bounds of |r|^2 in the norm of A^-1 for the columns r of a block.
     ///
     /// For any z, r = A z + e gives |r| <= sqrt(z'Az) + |e|, and |e|^2 <= |e|^2_(D^-1) / margin.
-    fn residual_norms(&self, r: MatRef<'_, f64>, counters: &mut Counters) -> Vec<f64> {
+    fn residual_norms(&self, r: MatRef<'_, f64>, context: &Context<'_>) -> Vec<f64> {
         let (n, count) = (r.nrows(), r.ncols());
         let mut z = r.to_owned();
         self.factor.solve_in_place(z.as_mut());
@@ -184,9 +183,11 @@ impl<'a> ProvedFactor<'a> {
             z += correction;
         }
         let e = rest(&z);
-        counters.solved_columns += 3 * count as u64;
-        counters.stiffness_columns += 3 * count as u64;
-        counters.mass_columns += 3 * count as u64;
+        context.count(|work| {
+            work.solved_columns += 3 * count as u64;
+            work.stiffness_columns += 3 * count as u64;
+            work.mass_columns += 3 * count as u64;
+        });
         (0..count)
             .map(|c| {
                 let (z, r, e) = (z.col(c), r.col(c), e.col(c));
@@ -226,7 +227,7 @@ struct Trial {
 }
 
 impl Trial {
-    fn new(factor: &ProvedFactor<'_>, x: MatRef<'_, f64>, omega: Vec<f64>, counters: &mut Counters) -> Self {
+    fn new(factor: &ProvedFactor<'_>, x: MatRef<'_, f64>, omega: Vec<f64>, context: &Context<'_>) -> Self {
         let (n, count, tau) = (x.nrows(), x.ncols(), factor.tau);
         let zero = vec![vec![DoubleDouble::default(); count]; count];
         let mut trial =
@@ -235,8 +236,8 @@ impl Trial {
         for start in (0..count).step_by(LANES) {
             let width = LANES.min(count - start);
             let block = x.subcols(start, width);
-            counters.stiffness_columns += width as u64;
-            counters.mass_columns += width as u64;
+            context.count(|work| work.stiffness_columns += width as u64);
+            context.count(|work| work.mass_columns += width as u64);
             let (kx, mx) = factor.products(block);
             let (gk, gm) = (gram_compensated(x, &kx), gram_compensated(x, &mx));
             for c in 0..width {
@@ -251,7 +252,7 @@ impl Trial {
             let shifts: Vec<DoubleDouble> =
                 (0..width).map(|c| DoubleDouble::sum(tau, -trial.omega[start + c])).collect();
             let r = Mat::from_fn(n, width, |i, c| (kx.get(i, c) + mx.get(i, c) * shifts[c]).hi);
-            let norms = factor.residual_norms(r.as_ref(), counters);
+            let norms = factor.residual_norms(r.as_ref(), context);
             for (c, norm) in norms.into_iter().enumerate() {
                 let size = factor.norm(x.col(start + c).iter().copied());
                 trial.error.push((2.0 * terms).sqrt() * size);
@@ -352,7 +353,7 @@ impl Trial {
     }
 }
 
-/// How far a symmetric matrix may be from the exact one.
+/// Bound of the distance of a symmetric matrix from the exact one.
 struct Slack {
     /// Scales its diagonal to ones.
     scale: Vec<f64>,

@@ -1,10 +1,11 @@
 //! The proof that no mode is missed: by Sylvester's law the number of negative pivots of K - sigma M is the
 //! number of eigenvalues below sigma (M positive semidefinite).
 
-use super::counters::Counters;
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
+use super::problem::Task;
 use faer::ColRef;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{Analysis, Indefinite, Inertia};
 
 /// A backward error above this means that element growth may have spoilt a count in double precision.
@@ -24,7 +25,7 @@ pub(super) fn size_along(problem: &EigenProblem<'_>, sigma: f64, mode: ColRef<'_
     diagonal.zip(mode.iter()).map(|((k, m), x)| (k.abs() + sigma * m) * x * x).sum()
 }
 
-/// How complete the modes are.
+/// State of the proof that no mode is missing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Proof {
     /// The inertia count equals the number of modes found.
@@ -33,10 +34,10 @@ pub enum Proof {
     NotProved,
 }
 
-/// What is known about missed modes.
+/// Knowledge about missed modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Completeness {
-    /// Whether and how it is proved.
+    /// State of the proof.
     pub proof: Proof,
     /// The shift sigma of the count, between the last mode and the next eigenvalue.
     pub shift: f64,
@@ -56,29 +57,29 @@ impl Completeness {
     }
 }
 
-/// How eigenvalues are counted.
+/// Way to count eigenvalues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Counting {
+pub(super) enum Counting {
     /// With a factor in double precision, which is not kept.
     Double,
     /// With a factor in single precision, whose rounding is then measured; where that may change the count,
     /// in double precision, if that fits the memory.
     Single {
-        /// It does.
+        /// True when a count in double precision fits the memory.
         double_fits: bool,
     },
 }
 
 /// A count of eigenvalues.
 pub(super) struct Count {
-    /// How many lie below the shift, rigid modes included.
+    /// Number of eigenvalues below the shift, rigid modes included.
     pub below: usize,
     /// Of a count in single precision: what rounding amounts to, one being what may change the count.
     pub rounding: Option<f64>,
 }
 
 impl Count {
-    /// What limits a proof by this count; empty when nothing does.
+    /// Returns the limits of a proof by this count; an empty text when there are none.
     pub(crate) fn remark(&self) -> String {
         self.rounding.map_or_else(String::new, |rounding| {
             format!(
@@ -92,15 +93,10 @@ impl Count {
 ///
 /// # Errors
 /// [`EigenFailure::Inaccurate`] where rounding may change the count.
-pub(super) fn count(
-    problem: &EigenProblem<'_>,
-    analysis: &Analysis,
-    sigma: f64,
-    counting: Counting,
-    counters: &mut Counters,
-) -> Result<Count, EigenFailure> {
+pub(super) fn count(task: &Task<'_>, sigma: f64, counting: Counting) -> Result<Count, EigenFailure> {
+    let Task { problem, analysis, context, .. } = task;
     if let Counting::Single { double_fits } = counting {
-        counters.factorizations += 1;
+        context.count(|work| work.factorizations += 1);
         let factor = Indefinite::<f32>::new(analysis, &problem.pencil, sigma);
         let inertia = factor.inertia();
         let rounding = if inertia.zero > 0 { None } else { factor.perturbation(&problem.pencil) };
@@ -111,18 +107,18 @@ pub(super) fn count(
             return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });
         }
     }
-    let below = count_below(problem, analysis, sigma, counters)?;
+    let below = count_below(problem, analysis, sigma, context)?;
     Ok(Count { below, rounding: None })
 }
 
-/// The same in double precision.
+/// Counts the eigenvalues of the pencil below `sigma` in double precision, rigid modes included.
 pub(super) fn count_below(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
     sigma: f64,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<usize, EigenFailure> {
-    counters.factorizations += 1;
+    context.count(|work| work.factorizations += 1);
     let inertia = Inertia::new(analysis, &problem.pencil, sigma);
     if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
         return Err(EigenFailure::Inaccurate { residual: inertia.backward_error });

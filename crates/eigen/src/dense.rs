@@ -1,7 +1,13 @@
-//! All finite modes of a small pencil by one dense symmetric eigenproblem.
+//! The attempt for small pencils: all finite modes by one dense symmetric eigenproblem.
 
+use super::attempt::{Attempt, Goal};
+use super::canonical::{CLUSTER_GAP, cluster_end};
 use super::failure::EigenFailure;
+use super::needs::{Needs, Unusable, dense_seconds, made_of_modes, resident, with_bounds};
 use super::problem::EigenProblem;
+use super::problem::Task;
+use super::refine::{FoundModes, Refined, refine};
+use super::settings::Method;
 use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
 use faer::prelude::ReborrowMut;
 use faer::{Mat, MatMut, Par};
@@ -12,9 +18,85 @@ use flexbody_linalg::{
 /// Scaled eigenvalues of Ms below this are zero: files with 10 digits leave less.
 const NULL: f64 = 1e-10;
 
+/// Largest model that is always solved densely: all modes take less than a second.
+const DENSE_ALWAYS: usize = 600;
+
+/// Largest model that is solved densely because most of its modes are wanted (n^2 numbers, three times).
+const DENSE_AT_MOST: usize = 9000;
+
+/// Part of all modes beyond which the dense path does less work than a Krylov basis of twice that size.
+const DENSE_PART: f64 = 0.2;
+
+/// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one:
+/// a digit.
+const FAR: f64 = 0.1;
+
+/// All modes by dense eigenproblems.
+pub(super) struct Dense;
+
+/// Returns true when the dense path finds so many modes with less work than an iterative search, or was asked for. The iterative
+/// attempts are unsuited then, whether or not it fits the memory.
+pub(super) fn is_chosen(task: &Task<'_>, wanted: usize) -> bool {
+    let n = task.problem.pencil.n();
+    match task.settings.method {
+        Method::Dense => true,
+        Method::Lanczos => false,
+        Method::Auto => {
+            let most = wanted as f64 > DENSE_PART * task.flexible_rows() as f64;
+            n <= DENSE_ALWAYS || (n <= DENSE_AT_MOST && most)
+        }
+    }
+}
+
+impl Attempt for Dense {
+    fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
+        let n = task.problem.pencil.n();
+        // Both matrices, their transformed product, its eigenvectors and copies in work.
+        let found = 8 * (6 * (n as u64).pow(2) + 3 * (n * wanted) as u64);
+        let needs = Needs {
+            bytes: resident(with_bounds(task, wanted, found.max(made_of_modes(n, wanted)))),
+            factor_bytes: 0,
+            seconds: dense_seconds(n, wanted),
+        };
+        needs.within_limits(task)
+    }
+
+    fn search(&self, task: &Task<'_>, goal: &Goal) -> Result<FoundModes, EigenFailure> {
+        let Task { problem, context, .. } = task;
+        context.phase("dense eigenproblem");
+        let pencil = &problem.pencil;
+        let finite = finite_eigenvalues(pencil).ok_or(EigenFailure::MassIndefinite)?;
+        let flexible = finite.saturating_sub(problem.rigid.ncols());
+        let mean = shift(problem.first_estimate, highest_estimate(pencil));
+        let mut spectrum = Spectrum::new(problem, mean)?;
+        let end =
+            |spectrum: &Spectrum| cluster_end(goal.wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
+        let mut last = end(&spectrum);
+        // Far above the wanted modes a shift crowds them together, which costs the digits by which they differ.
+        // Once it is known where they are, another is placed between them, if that matrix can be factored.
+        let highest = if last > 0 { spectrum.eigenvalue(last - 1) } else { mean };
+        let among = shift(problem.first_estimate.min(highest), highest);
+        if among < FAR * mean
+            && let Ok(closer) = Spectrum::new(problem, among)
+        {
+            spectrum = closer;
+            last = end(&spectrum);
+        }
+        let tau = spectrum.factor.tau;
+        let found = Refined::new(problem, spectrum.vectors(last), context)?;
+        let refined = refine(problem, &spectrum.factor, found, goal.tolerance, context)?;
+        let next = (last..flexible).map(|i| spectrum.eigenvalue(i)).collect();
+        Ok(FoundModes { refined, next, tau, finite: Some(flexible) })
+    }
+
+    fn is_conclusive(&self, _: &EigenFailure) -> bool {
+        true
+    }
+}
+
 /// Number of finite eigenvalues of the pencil, rigid ones included: block * rank(Ms). `None`: Ms is
 /// indefinite.
-pub(super) fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
+fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
     let ms = dense(pencil.mass());
     let n = ms.nrows();
     let scale: Vec<f64> =
@@ -27,12 +109,12 @@ pub(super) fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
 }
 
 /// Shift for modes between `first` and `highest`: the geometric mean, so that both ends keep digits.
-pub(super) fn shift(first: f64, highest: f64) -> f64 {
+fn shift(first: f64, highest: f64) -> f64 {
     (0.3 * first * highest.max(first)).sqrt()
 }
 
 /// Dense Cholesky factor K + tau M = L L'.
-pub(super) struct DenseFactor {
+struct DenseFactor {
     l: Mat<f64>,
     tau: f64,
 }
@@ -49,15 +131,15 @@ impl Solve for DenseFactor {
 }
 
 /// The whole spectrum of S = L^-1 M L^-T, whose eigenvalues are 1 / (lambda + tau), rigid modes deflated.
-pub(super) struct Spectrum {
+struct Spectrum {
     /// The factor, for refinement.
-    pub factor: DenseFactor,
+    factor: DenseFactor,
     eigen: SymmetricEigen,
 }
 
 impl Spectrum {
     /// Factors and diagonalises.
-    pub(super) fn new(problem: &EigenProblem<'_>, tau: f64) -> Result<Self, EigenFailure> {
+    fn new(problem: &EigenProblem<'_>, tau: f64) -> Result<Self, EigenFailure> {
         let pencil = &problem.pencil;
         let n = pencil.n();
         let m = dense_mass(pencil);
@@ -79,13 +161,13 @@ impl Spectrum {
     }
 
     /// The i-th flexible eigenvalue lambda, ascending.
-    pub(super) fn eigenvalue(&self, i: usize) -> f64 {
+    fn eigenvalue(&self, i: usize) -> f64 {
         let n = self.eigen.values.len();
         1.0 / self.eigen.values[n - 1 - i] - self.factor.tau
     }
 
     /// The lowest `count` modes.
-    pub(super) fn vectors(&self, count: usize) -> Mat<f64> {
+    fn vectors(&self, count: usize) -> Mat<f64> {
         let n = self.eigen.values.len();
         let mut vectors = Mat::from_fn(n, count, |i, j| {
             self.eigen.vectors[(i, n - 1 - j)] / self.eigen.values[n - 1 - j].abs().sqrt()
@@ -97,7 +179,7 @@ impl Spectrum {
 
 /// The largest ratio K_ii / M_ii: a Rayleigh quotient, hence a lower bound of the largest eigenvalue and
 /// close to it.
-pub(super) fn highest_estimate(pencil: &Pencil<'_>) -> f64 {
+fn highest_estimate(pencil: &Pencil<'_>) -> f64 {
     let k = pencil.stiffness().diagonal();
     let m = pencil.mass().diagonal();
     k.iter()

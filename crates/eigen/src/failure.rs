@@ -1,4 +1,4 @@
-//! What the eigen-solver answers when there are no modes to be trusted.
+//! The answer of the eigen-solver where there are no modes to be trusted.
 
 use faer::Mat;
 use std::fmt;
@@ -13,7 +13,7 @@ pub enum EigenFailure {
         /// Modes asked for.
         wanted: usize,
     },
-    /// What a search with a single-precision factor came to, where double precision was not allowed or does
+    /// Failure of a search with a single-precision factor, where double precision was not allowed or does
     /// not fit: often it says nothing about the model.
     SinglePrecision(Box<EigenFailure>),
     /// K + tau M is not positive definite: K or M is indefinite.
@@ -32,7 +32,7 @@ pub enum EigenFailure {
     MassIndefinite,
     /// Flexible modes without strain energy: a mechanism or several bodies.
     ZeroEnergy {
-        /// How many beyond the rigid modes.
+        /// Number of such modes beside the rigid ones.
         count: usize,
         /// Their eigenvalues as computed.
         eigenvalues: Vec<f64>,
@@ -58,14 +58,14 @@ pub enum EigenFailure {
         /// The reason.
         why: &'static str,
     },
-    /// What is asked for needs more memory than there is.
+    /// The search needs more memory than there is.
     Memory {
         /// Bytes needed.
         bytes: u64,
         /// Bytes there are.
         available: u64,
     },
-    /// What is asked for takes longer than it may.
+    /// The search takes longer than it may.
     TooLong {
         /// Modes that are wanted, of those that there are.
         wanted: usize,

@@ -1,10 +1,9 @@
 //! A block Krylov basis of (K + tau M)^-1 M, M-orthonormal and M-orthogonal to the rigid modes.
 
-use super::counters::Counters;
 use super::problem::EigenProblem;
-use super::resume::Snapshot;
 use faer::prelude::{IntoConst, ReborrowMut};
 use faer::{ColRef, Mat, MatRef};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Solve, Tall, combine, combine_in_place, dense_cholesky, divide, full_qr, gram, solve_upper,
     subtract_combination, uniform, weighted_square,
@@ -27,6 +26,7 @@ const LEAST_KEPT: f64 = 0.1;
 /// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
+    context: Context<'a>,
     v: Tall,
     /// Has as many rows as the basis may have vectors.
     t: Mat<f64>,
@@ -53,10 +53,11 @@ struct Block {
 
 impl<'a> Krylov<'a> {
     /// An empty basis for at most `capacity` vectors.
-    pub(super) fn new(problem: &'a EigenProblem<'a>, capacity: usize) -> Self {
+    pub(super) fn new(problem: &'a EigenProblem<'a>, capacity: usize, context: &Context<'a>) -> Self {
         let n = problem.pencil.n();
         Self {
             problem,
+            context: *context,
             v: Tall::with_room(n, capacity),
             t: Mat::zeros(capacity, capacity),
             fresh: 0,
@@ -88,7 +89,7 @@ impl<'a> Krylov<'a> {
         self.t.nrows() - self.size()
     }
 
-    /// Whether the newest block is empty: the basis spans an invariant subspace.
+    /// Returns true when the newest block is empty: the basis spans an invariant subspace.
     pub(super) fn exhausted(&self) -> bool {
         self.fresh == 0
     }
@@ -126,8 +127,8 @@ impl<'a> Krylov<'a> {
     }
 
     /// Appends `x` (any block), orthonormalised; columns dependent on the basis are dropped.
-    pub(super) fn append(&mut self, x: Mat<f64>, counters: &mut Counters) {
-        let block = self.orthonormalise(x, 0, counters);
+    pub(super) fn append(&mut self, x: Mat<f64>) {
+        let block = self.orthonormalise(x, 0);
         self.reach = 0;
         self.coupling = Mat::zeros(block.w.ncols(), 0);
         self.push(block);
@@ -135,7 +136,7 @@ impl<'a> Krylov<'a> {
 
     /// Appends a deterministic random block of `width` columns, filtered by one application of the operator,
     /// which removes what a singular M does not see.
-    pub(super) fn append_random(&mut self, width: usize, factor: &dyn Solve, counters: &mut Counters) {
+    pub(super) fn append_random(&mut self, width: usize, factor: &dyn Solve) {
         let n = self.problem.pencil.n();
         let seed = self.random;
         self.random += 1;
@@ -143,21 +144,21 @@ impl<'a> Krylov<'a> {
         let heaviest = self.mass_diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let unit = (-0.5 * heaviest.log2()).round().exp2();
         let x = Mat::from_fn(n, width, |i, j| unit * uniform(seed, i as u64, j as u64));
-        counters.mass_columns += width as u64;
+        self.context.count(|work| work.mass_columns += width as u64);
         let mut y = self.problem.pencil.apply_mass(x.as_ref());
-        counters.solved_columns += width as u64;
+        self.context.count(|work| work.solved_columns += width as u64);
         factor.solve_in_place(y.as_mut());
-        self.append(y, counters);
+        self.append(y);
     }
 
     /// One Lanczos step: applies the operator to the newest block and appends what is new.
-    pub(super) fn step(&mut self, factor: &dyn Solve, counters: &mut Counters) {
+    pub(super) fn step(&mut self, factor: &dyn Solve) {
         let old = self.fresh;
         let at = self.size() - old;
         let mut w = std::mem::replace(&mut self.m_fresh, Mat::zeros(0, 0));
-        counters.solved_columns += old as u64;
+        self.context.count(|work| work.solved_columns += old as u64);
         factor.solve_in_place(w.as_mut());
-        let block = self.orthonormalise(w, self.reach, counters);
+        let block = self.orthonormalise(w, self.reach);
         self.reach = at;
         for j in 0..old {
             for i in 0..self.size() {
@@ -197,7 +198,7 @@ impl<'a> Krylov<'a> {
     ///
     /// With A = Q R, Q = [Q1, Q2] orthogonal, W Q1 is the basis and W Q2 its newest block: with Q_1, Q_2 the first rows
     /// of Q1, Q2, one for each column of T, T' = (I - Q_1' R^-1) / (tau' - tau) and B' = -Q_2' R^-1 / (tau' - tau).
-    pub(super) fn change_shift(&mut self, difference: f64, counters: &mut Counters) {
+    pub(super) fn change_shift(&mut self, difference: f64) {
         let (size, all, last) = (self.projected(), self.size(), self.coupling.ncols());
         let h = |i: usize, j: usize| match (i < size, j + last >= size) {
             (true, _) => self.t[(i, j)],
@@ -214,37 +215,9 @@ impl<'a> Krylov<'a> {
         }
         self.coupling = Mat::from_fn(all - size, size, |i, j| -product[(size + i, j)] / difference);
         combine_in_place(self.v.as_mut(), q.as_ref());
-        counters.mass_columns += (all - size) as u64;
+        self.context.count(|work| work.mass_columns += (all - size) as u64);
         self.m_fresh = self.problem.pencil.apply_mass(self.v.columns(size..all));
         self.reach = 0;
-    }
-
-    /// Ritz vectors V S (S: projected x k) with the newest block F behind them, and C of OP V S = V S Theta +
-    /// F C.
-    pub(super) fn state(&self, s: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
-        let (size, k, last) = (self.projected(), s.ncols(), self.coupling.ncols());
-        let coefficients = Mat::from_fn(self.size(), k + self.fresh, |i, j| match (i < size, j < k) {
-            (true, true) => s[(i, j)],
-            (false, false) => f64::from(i - size == j - k),
-            _ => 0.0,
-        });
-        let basis = combine(self.v.as_ref(), coefficients.as_ref());
-        (basis, combine(self.coupling.as_ref(), s.subrows(size - last, last)))
-    }
-
-    /// Fills the empty basis with the first `k` Ritz vectors of a snapshot and its newest block.
-    pub(super) fn take_up(&mut self, start: &Snapshot, shift: f64, k: usize, counters: &mut Counters) {
-        let (given, width) = (start.eigenvalues.len(), start.coupling.nrows());
-        self.v.push(start.basis.as_ref().subcols(0, k));
-        let newest = start.basis.as_ref().subcols(given, width);
-        self.v.push(newest);
-        for (i, lambda) in start.eigenvalues[..k].iter().enumerate() {
-            self.t[(i, i)] = (lambda + shift).recip();
-        }
-        self.coupling = start.coupling.as_ref().subcols(0, if width > 0 { k } else { 0 }).to_owned();
-        self.fresh = width;
-        counters.mass_columns += width as u64;
-        self.m_fresh = self.problem.pencil.apply_mass(newest);
     }
 
     fn push(&mut self, block: Block) {
@@ -257,13 +230,13 @@ impl<'a> Krylov<'a> {
     /// the block. The first leaves out the columns before `reach`, where the operator leaves nothing but
     /// rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the
     /// first ends orthogonal to rounding; only what is rounding altogether is dropped.
-    fn orthonormalise(&self, mut w: Mat<f64>, reach: usize, counters: &mut Counters) -> Block {
+    fn orthonormalise(&self, mut w: Mat<f64>, reach: usize) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
         let basis = self.v.as_ref();
         let mut h = Mat::zeros(self.size(), width);
         let mut b = Mat::<f64>::identity(width, width);
-        counters.mass_columns += w.ncols() as u64;
+        self.context.count(|work| work.mass_columns += w.ncols() as u64);
         let mut mw = pencil.apply_mass(w.as_ref());
         let mut norms = sizes(&gram(w.as_ref(), mw.as_ref()));
         for from in [reach, 0] {
@@ -274,13 +247,13 @@ impl<'a> Krylov<'a> {
             subtract_combination(w.as_mut(), basis, part.as_ref());
             let mut h = h.as_mut().subrows_mut(from, self.size() - from);
             h += combine(part.as_ref(), b.as_ref());
-            counters.mass_columns += w.ncols() as u64;
+            self.context.count(|work| work.mass_columns += w.ncols() as u64);
             pencil.mass_times(w.as_ref(), mw.as_mut());
             let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
             let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &unseen)
                 .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
             if loses_digits(&t) {
-                counters.mass_columns += w.ncols() as u64;
+                self.context.count(|work| work.mass_columns += w.ncols() as u64);
                 pencil.mass_times(w.as_ref(), mw.as_mut());
             }
             norms = vec![1.0; w.ncols()];
@@ -296,7 +269,7 @@ impl<'a> Krylov<'a> {
     }
 }
 
-/// Whether Gram-Schmidt with these coefficients has left less than a tenth of a column: the products with M that
+/// Returns true when Gram-Schmidt with these coefficients has left less than a tenth of a column: the products with M that
 /// went along have then lost a digit.
 fn loses_digits(t: &Mat<f64>) -> bool {
     (0..t.ncols()).any(|j| {
@@ -392,7 +365,6 @@ fn gram_schmidt(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Resume;
     use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Indefinite, Pencil, SymmetricMatrix};
 
     /// Columns of which the last is nearly the sum of the others, up to `apart`.
@@ -452,17 +424,15 @@ mod tests {
             first_estimate: 1e-3,
             input_error: 0.0,
             order: None,
-            resume: Resume::default(),
         };
         let analysis = Analysis::new(&problem.pencil).expect("small");
-        let mut counters = Counters::default();
         let (tau, sigma) = (1e-3, 0.05);
         let first = Cholesky::<f64>::new(&analysis, &problem.pencil, tau).expect("positive definite");
         let second = Indefinite::<f64>::new(&analysis, &problem.pencil, sigma);
-        let mut krylov = Krylov::new(&problem, 80);
-        krylov.append_random(3, &first, &mut counters);
-        (0..12).for_each(|_| krylov.step(&first, &mut counters));
-        krylov.change_shift(-sigma - tau, &mut counters);
+        let mut krylov = Krylov::new(&problem, 80, &Context::QUIET);
+        krylov.append_random(3, &first);
+        (0..12).for_each(|_| krylov.step(&first));
+        krylov.change_shift(-sigma - tau);
         for step in 0..4 {
             let (size, all) = (krylov.projected(), krylov.size());
             let v = krylov.v.columns(0..size);
@@ -480,7 +450,7 @@ mod tests {
             let off = (gram(krylov.v.as_ref(), mass.as_ref()) - Mat::<f64>::identity(all, all)).norm_max();
             assert!(off < 1e-13, "after {step} steps: {off:e}");
             assert!((krylov.m_fresh.as_ref() - mass.as_ref().subcols(size, all - size)).norm_max() < 1e-13);
-            krylov.step(&second, &mut counters);
+            krylov.step(&second);
         }
     }
 

@@ -4,19 +4,16 @@
 //! inner product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) keeps
 //! repeated eigenvalues complete up to what the later inertia count proves.
 
-use super::canonical::cluster_end;
-use super::counters::Counters;
+use super::attempt::Goal;
+use super::canonical::{CLUSTER_GAP, cluster_end};
 use super::failure::EigenFailure;
 use super::krylov::Krylov;
-use super::noise::{energy_noise, is_noisy};
 use super::problem::EigenProblem;
-use super::refine::{Refined, residuals};
-use super::resume::Snapshot;
-use super::second_shift::SecondShift;
-use super::start::snapshot;
+use super::refine::{FoundModes, Refined, residuals};
 use super::zero_energy::NOISE_FACTOR;
+use super::zero_energy::{energy_noise, is_noisy};
 use faer::Mat;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{Solve, SymmetricEigen, symmetric_eigen};
 use std::ops::RangeInclusive;
 
@@ -48,9 +45,6 @@ const BELOW_NOISE: f64 = 1e-2;
 /// Residuals below this are asked of no estimate: the solves have no more digits.
 const LEAST_ASKED: f64 = 1e-12;
 
-/// A search is saved when at least so many more modes have converged, or a quarter of those wanted.
-const SAVED_AFTER: usize = 5;
-
 /// A first flexible eigenvalue below this part of the shift asks for a smaller shift: iterations grow.
 const SMALLEST_PART: f64 = 0.02;
 
@@ -60,28 +54,6 @@ const DIGITS_PART: f64 = 1e-3;
 
 /// Relative gap of two eigenvalues across which modes that have converged do not mix.
 const WIDE: f64 = 1e-3;
-
-/// How a search ended.
-pub(super) enum LanczosOutcome<'a> {
-    /// With the modes.
-    Found {
-        /// The wanted modes and those that complete the cluster of the last one.
-        modes: Refined,
-        /// Further Ritz values, loosely converged.
-        next: Vec<f64>,
-    },
-    /// With rough modes, asked for as such, and some more: the span of these vectors.
-    Rough {
-        /// Not orthonormal.
-        vectors: Mat<f64>,
-        /// How many of the lowest are wanted.
-        wanted: usize,
-    },
-    /// Early: with this shift it would be shorter and more accurate.
-    ShiftTooLarge(f64),
-    /// Midway: it goes on with a second shift, and needs the first factor no more.
-    Midway(Box<Iteration<'a>>),
-}
 
 /// Block steps after which the shift is judged: the lowest Ritz value is near the first eigenvalue after six;
 /// where it is far below the shift it only falls, and a step less is a step saved.
@@ -94,7 +66,7 @@ fn better_shift(
     krylov: &Krylov<'_>,
     factor: &dyn Solve,
     wanted: usize,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<Option<f64>, EigenFailure> {
     let tau = factor.shift();
     let ritz = descending(krylov)?;
@@ -107,7 +79,7 @@ fn better_shift(
         * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
     if lowest.abs() <= noise {
         // Far below the shift and within noise: no shift can resolve it, there is no strain energy.
-        return Err(zero_energy(problem, factor, tau, counters)?);
+        return Err(zero_energy(problem, factor, tau, context)?);
     }
     if lowest < 0.0 {
         return Err(EigenFailure::NegativeEigenvalue {
@@ -132,12 +104,12 @@ fn zero_energy(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
     tau: f64,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<EigenFailure, EigenFailure> {
-    let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS);
-    krylov.append_random(BLOCK, factor, counters);
+    let mut krylov = Krylov::new(problem, ZERO_ENERGY_BASIS, context);
+    krylov.append_random(BLOCK, factor);
     while krylov.room() >= BLOCK && !krylov.exhausted() {
-        krylov.step(factor, counters);
+        krylov.step(factor);
     }
     let ritz = descending(&krylov)?;
     let (lambda, vectors) = best(&krylov, &ritz, krylov.projected() / 2, tau);
@@ -150,71 +122,43 @@ fn zero_energy(
     })
 }
 
-/// What a search is for.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Goal {
-    /// Number of modes, extended to the end of the cluster of the last one.
-    pub wanted: usize,
-    /// K-residual.
-    pub tolerance: f64,
-    /// Eigenvalues closer than this (relative) are one cluster.
-    pub cluster_gap: f64,
-    /// Distance of eigenvalues, beside the size of the matrix along their modes, that the count needs above the
-    /// last mode: corrections go on to the next such gap, if it is near.
-    pub separation: f64,
-    /// Columns per step.
-    pub block: usize,
-    /// Whether the solves are rough: the modes are then handed out as a span to be corrected.
-    pub rough: bool,
-    /// Whether a [second shift](SecondShift) among the modes pays, and fits the memory.
-    pub second_shift: bool,
-    /// Chooses the random start: a search repeated after a count that found more modes starts elsewhere.
-    pub attempt: u64,
+/// The end of a search with one shift, or of a part of it.
+pub(super) enum Outcome<T> {
+    /// The search reached its aim.
+    Reached(T),
+    /// With this shift the search would be shorter and more accurate.
+    ShiftTooLarge(f64),
 }
 
-/// The lowest flexible modes.
-pub(super) fn lowest_modes<'a>(
-    problem: &'a EigenProblem<'a>,
-    factor: &dyn Solve,
-    goal: &'a Goal,
-    start: Option<&Snapshot>,
-    watch: Watch<'a>,
-    counters: &mut Counters,
-) -> Result<LanczosOutcome<'a>, EigenFailure> {
-    Iteration::begin(problem, factor, goal, start, watch, counters).run(factor, counters)
-}
-
-/// A search as it goes on.
+/// A search for the lowest modes in a Krylov basis that grows by a block of columns at each step.
 pub(super) struct Iteration<'a> {
     problem: &'a EigenProblem<'a>,
+    context: Context<'a>,
+    goal: &'a Goal,
+    /// Columns per step.
+    block: usize,
     /// The shift, as tau.
     tau: f64,
-    /// Whether a second shift is still to come.
-    to_come: bool,
-    /// What is left of the first shift when there is a second one.
+    /// The modes below a second shift, after the change to it.
     first: Option<First>,
-    goal: &'a Goal,
-    watch: Watch<'a>,
     krylov: Krylov<'a>,
     /// Vectors that the basis has room for.
     capacity: usize,
     /// Block steps so far.
     steps: usize,
-    /// Whether the basis is an earlier search as it was taken up, before the first step.
-    at_start: bool,
-    /// Whether the basis spans all there is.
+    /// Thick restarts so far.
+    restarts: u64,
+    /// True when the basis spans all there is.
     complete: bool,
     /// Size of the projected eigenproblem from which on it is worth being tested again.
     next_test: usize,
-    /// Modes that had converged when the search was saved last.
-    saved: usize,
     /// K-residual that an estimate has to keep before the true residuals are looked at.
     asked: f64,
     /// Least excess of the true residuals so far.
     least_excess: f64,
 }
 
-/// What a search shows midway.
+/// The Ritz pairs of a search that is about to change its shift.
 pub(super) struct Midway {
     /// Ritz values, ascending.
     pub eigenvalues: Vec<f64>,
@@ -222,7 +166,7 @@ pub(super) struct Midway {
     modes: Mat<f64>,
 }
 
-/// What is left of a first shift.
+/// The result of a first shift, kept when the search goes over to a second one.
 struct First {
     /// The lowest modes, which had converged: far from the second shift, its operator leaves rounding in them.
     modes: Mat<f64>,
@@ -231,7 +175,7 @@ struct First {
 }
 
 /// Ritz pairs of a basis, lambda ascending, and which of them are modes.
-struct Ritz {
+pub(super) struct Ritz {
     /// 1 / (lambda + tau).
     theta: Vec<f64>,
     /// Coefficients of the vectors.
@@ -241,13 +185,18 @@ struct Ritz {
     tau: f64,
     /// Number of the modes to find: those wanted and what completes the cluster of the last one.
     last: usize,
-    /// How many of them are good enough by their estimates.
+    /// Number of modes that are good enough by their estimates.
     converged: usize,
-    /// Whether the next one shows that the cluster has ended.
+    /// True when the next one shows that the cluster has ended.
     beyond: bool,
 }
 
 impl Ritz {
+    /// Number of the modes to find.
+    pub(super) fn last(&self) -> usize {
+        self.last
+    }
+
     fn size(&self) -> usize {
         self.theta.len()
     }
@@ -256,7 +205,7 @@ impl Ritz {
         1.0 / self.theta[i] - self.tau
     }
 
-    /// Whether the residual of the operator is within `tolerance` of theta.
+    /// Returns true when the residual of the operator is within `tolerance` of theta.
     fn is_good(&self, i: usize, tolerance: f64) -> bool {
         self.norms[i] <= tolerance * self.theta[i].abs()
     }
@@ -268,7 +217,7 @@ impl Ritz {
         0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta)).abs().max(SMALLEST_PART * theta.abs())
     }
 
-    /// Whether the first pair beyond the modes is as good as the gap below it needs.
+    /// Returns true when the first pair beyond the modes is as good as the gap below it needs.
     fn shows_gap(&self) -> bool {
         let last = self.last;
         last < self.size() && {
@@ -277,112 +226,134 @@ impl Ritz {
         }
     }
 
-    /// Whether all modes are there by their estimates.
+    /// Returns true when all modes are there by their estimates.
     fn all_there(&self) -> bool {
         self.converged == self.last && self.beyond
     }
 }
 
 impl<'a> Iteration<'a> {
-    /// Begins with random vectors, or where an earlier search stood.
-    fn begin(
+    /// Begins with random vectors.
+    pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         factor: &dyn Solve,
-        goal: &'a Goal,
-        start: Option<&Snapshot>,
-        watch: Watch<'a>,
-        counters: &mut Counters,
+        (goal, block): (&'a Goal, usize),
+        context: &Context<'a>,
     ) -> Self {
-        let block = goal.block;
         let free = problem.pencil.n() - problem.rigid.ncols();
         let capacity = (2 * goal.wanted + SPARE).min(free + block);
-        let mut krylov = Krylov::new(problem, capacity);
-        krylov.choose_random(1000 * goal.attempt);
-        match start {
-            // The Ritz vectors that leave room for a step; the relation that the basis satisfies holds for
-            // any part of them.
-            Some(start) => {
-                let room = capacity.saturating_sub(start.coupling.nrows() + block);
-                let taken = start.eigenvalues.len().min(room);
-                counters.taken_up = taken as u64;
-                krylov.take_up(start, factor.shift(), taken, counters);
-            }
-            None => krylov.append_random(block.min(free), factor, counters),
-        }
-        // A start is looked at before the first step: it may hold all that is wanted.
-        let at_start = krylov.projected() > 0 && !krylov.exhausted();
+        let mut krylov = Krylov::new(problem, capacity, context);
+        krylov.choose_random(1000 * goal.round as u64);
+        krylov.append_random(block.min(free), factor);
         Self {
             problem,
-            tau: factor.shift(),
-            to_come: goal.second_shift && start.is_none(),
-            first: None,
+            context: *context,
             goal,
-            watch,
+            block,
+            tau: factor.shift(),
+            first: None,
             krylov,
             capacity,
             steps: 0,
-            at_start,
+            restarts: 0,
             complete: false,
             next_test: 0,
-            saved: 0,
             asked: goal.tolerance,
             least_excess: f64::INFINITY,
         }
     }
 
-    /// Expands the basis, and tests its Ritz pairs until they are good enough to be handed over; a full basis is
-    /// restarted from the best of them.
-    pub(super) fn run(
-        mut self,
-        factor: &dyn Solve,
-        counters: &mut Counters,
-    ) -> Result<LanczosOutcome<'a>, EigenFailure> {
+    /// Returns true when the basis spans all there is.
+    pub(super) fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// Expands the basis until it has `size` vectors or spans all there is.
+    pub(super) fn expand_to(&mut self, size: usize, factor: &dyn Solve) -> Result<Outcome<()>, EigenFailure> {
         loop {
-            self.expand(factor, counters);
-            if let Some(shift) = self.better_shift(factor, counters)? {
-                return Ok(LanczosOutcome::ShiftTooLarge(shift));
+            self.expand(factor);
+            if let Some(shift) = self.better_shift(factor)? {
+                return Ok(Outcome::ShiftTooLarge(shift));
             }
-            if self.is_midway() {
-                return Ok(LanczosOutcome::Midway(Box::new(self)));
+            if self.complete || self.krylov.projected() >= size {
+                return Ok(Outcome::Reached(()));
+            }
+        }
+    }
+
+    /// Expands the basis until all modes are good enough by their estimates; a full basis is restarted from the best
+    /// Ritz pairs.
+    pub(super) fn estimate(&mut self, factor: &dyn Solve) -> Result<Outcome<Ritz>, EigenFailure> {
+        loop {
+            self.expand(factor);
+            if let Some(shift) = self.better_shift(factor)? {
+                return Ok(Outcome::ShiftTooLarge(shift));
             }
             if !self.is_test_due() {
                 continue;
             }
             let ritz = self.test()?;
-            self.save(&ritz);
-            if let Some(found) = self.hand_over(&ritz, counters)? {
-                return Ok(found);
+            if ritz.all_there() {
+                return Ok(Outcome::Reached(ritz));
             }
-            if let Some(shift) = self.restart(&ritz, counters)? {
-                return Ok(LanczosOutcome::ShiftTooLarge(shift));
+            if let Some(shift) = self.restart(&ritz)? {
+                return Ok(Outcome::ShiftTooLarge(shift));
             }
         }
     }
 
+    /// Expands the basis until the true residuals of the modes keep the tolerance, or further steps gain nothing.
+    pub(super) fn find(&mut self, factor: &dyn Solve) -> Result<Outcome<FoundModes>, EigenFailure> {
+        match self.estimate(factor)? {
+            Outcome::Reached(ritz) => self.find_from(ritz, factor),
+            Outcome::ShiftTooLarge(shift) => Ok(Outcome::ShiftTooLarge(shift)),
+        }
+    }
+
+    /// Does the work of [`Self::find`] from the moment on when the modes are good enough by their estimates.
+    pub(super) fn find_from(
+        &mut self,
+        mut ritz: Ritz,
+        factor: &dyn Solve,
+    ) -> Result<Outcome<FoundModes>, EigenFailure> {
+        loop {
+            if let Some(found) = self.hand_over(&ritz)? {
+                return Ok(Outcome::Reached(found));
+            }
+            if let Some(shift) = self.restart(&ritz)? {
+                return Ok(Outcome::ShiftTooLarge(shift));
+            }
+            ritz = match self.estimate(factor)? {
+                Outcome::Reached(ritz) => ritz,
+                Outcome::ShiftTooLarge(shift) => return Ok(Outcome::ShiftTooLarge(shift)),
+            };
+        }
+    }
+
+    /// Returns the span of the modes and of half as many Ritz vectors again: the corrections would otherwise have to
+    /// find what is already there of the next modes.
+    pub(super) fn rough_modes(&self, ritz: &Ritz) -> Mat<f64> {
+        self.vectors(ritz, (ritz.last + ritz.last / 2 + 2 * self.block).min(ritz.size()))
+    }
+
     /// Expands the basis by a block, unless it spans all there is.
-    fn expand(&mut self, factor: &dyn Solve, counters: &mut Counters) {
-        let Self { krylov, goal, .. } = self;
+    fn expand(&mut self, factor: &dyn Solve) {
+        let Self { krylov, block, .. } = self;
         if krylov.exhausted() {
             // An invariant subspace: go on with new directions, or everything is found.
-            krylov.append_random(goal.block.min(krylov.room()), factor, counters);
+            krylov.append_random((*block).min(krylov.room()), factor);
         }
         self.complete = krylov.exhausted();
-        if !self.complete && !self.at_start {
-            krylov.step(factor, counters);
+        if !self.complete {
+            krylov.step(factor);
             self.steps += 1;
         }
     }
 
-    /// Whether the basis tells where a second shift is to be.
-    fn is_midway(&self) -> bool {
-        self.to_come && !self.complete && self.krylov.projected() >= self.goal.wanted
-    }
-
     /// Midway: the Ritz values, ascending, and what is to be kept when the shift changes.
-    pub(super) fn look_midway(&mut self, counters: &mut Counters) -> Result<Midway, EigenFailure> {
-        self.to_come = false;
+    pub(super) fn look_midway(&mut self) -> Result<Midway, EigenFailure> {
         let mut ritz = self.test()?;
-        if self.asks_below_noise(&ritz, counters) {
+        if self.asks_below_noise(&ritz) {
             ritz = self.test()?;
         }
         let eigenvalues: Vec<f64> = (0..ritz.size()).map(|i| ritz.lambda(i)).collect();
@@ -390,38 +361,33 @@ impl<'a> Iteration<'a> {
         Ok(Midway { eigenvalues, modes })
     }
 
-    /// Goes over to a second shift.
-    pub(super) fn change_shift(&mut self, midway: Midway, second: &SecondShift<'_>, counters: &mut Counters) {
-        let tau = second.factor.shift();
-        self.krylov.change_shift(tau - self.tau, counters);
-        self.first = Some(First { modes: midway.modes, below: second.below });
+    /// Goes over to the shift of `second`, which `below` flexible modes lie below.
+    pub(super) fn change_shift(&mut self, midway: Midway, second: &dyn Solve, below: usize) {
+        let tau = second.shift();
+        self.krylov.change_shift(tau - self.tau);
+        self.first = Some(First { modes: midway.modes, below });
         (self.tau, self.next_test) = (tau, 0);
     }
 
     /// The shift to use instead of this one, once the lowest Ritz value tells.
-    fn better_shift(&self, factor: &dyn Solve, counters: &mut Counters) -> Result<Option<f64>, EigenFailure> {
+    fn better_shift(&self, factor: &dyn Solve) -> Result<Option<f64>, EigenFailure> {
         if self.first.is_some() || !STEPS_TO_JUDGE.contains(&self.steps) {
             return Ok(None);
         }
-        better_shift(self.problem, &self.krylov, factor, self.goal.wanted, counters)
+        better_shift(self.problem, &self.krylov, factor, self.goal.wanted, &self.context)
     }
 
-    /// Whether no further step fits before a restart.
+    /// Returns true when no further step fits before a restart.
     fn is_full(&self) -> bool {
-        self.krylov.room() < self.goal.block
+        self.krylov.room() < self.block
     }
 
-    /// Whether the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100
+    /// Returns true when the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100
     /// vectors or so not after every step, and not while many modes are missing, of which a step finds a few.
-    fn is_test_due(&mut self) -> bool {
+    fn is_test_due(&self) -> bool {
         let size = self.krylov.projected();
         let small = size < self.goal.wanted + 1 || size < self.next_test;
-        // What was taken up is a start no more, tested or not.
-        if !(self.complete || self.is_full()) && small {
-            self.at_start = false;
-            return false;
-        }
-        true
+        self.complete || self.is_full() || !small
     }
 
     /// Solves the projected eigenproblem, and sees which Ritz pairs are modes.
@@ -442,62 +408,31 @@ impl<'a> Iteration<'a> {
         let s = Mat::from_fn(size, size, |i, j| found.vectors[(i, order[j])]);
         let all_below_are_there = below == 0 || found.values[below - 1] < 0.0;
         let norms = krylov.residual_norms(s.as_ref());
-        let last = cluster_end(wanted, size, self.goal.cluster_gap, |i| 1.0 / theta[i] - tau);
+        let last = cluster_end(wanted, size, CLUSTER_GAP, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
         let is_mode = |i: &usize| self.complete || *i < settled || ritz.estimate(*i) <= self.asked;
         let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { settled };
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
         self.next_test = size + (size / 25).max((last - converged) / 4);
-        (self.watch)(Event::Fraction(converged as f64 / wanted.max(1) as f64));
+        self.context.fraction(converged as f64 / wanted.max(1) as f64);
         Ok(ritz)
     }
 
-    /// Saves the search when enough modes have converged since the last time.
-    fn save(&mut self, ritz: &Ritz) {
-        let converged = ritz.converged;
-        if std::mem::take(&mut self.at_start) {
-            self.saved = converged;
-            return;
-        }
-        let many = self.saved + SAVED_AFTER.max(self.goal.wanted / 4);
-        if converged > 0 && !self.goal.rough && (converged >= many || ritz.all_there()) {
-            // All Ritz vectors: with a third of those that are no modes yet, 60 modes after 20 take 36
-            // columns more.
-            self.problem
-                .resume
-                .save(|| snapshot(&self.krylov, ritz.s.as_ref(), &ritz.theta, (ritz.tau, converged)));
-            self.saved = converged;
-        }
-    }
-
-    /// Hands the modes over when they are there and keep what was asked for; else more is asked of the
-    /// estimates.
-    fn hand_over(
-        &mut self,
-        ritz: &Ritz,
-        counters: &mut Counters,
-    ) -> Result<Option<LanczosOutcome<'a>>, EigenFailure> {
-        if !ritz.all_there() {
+    /// Returns the modes where they keep the tolerance; else asks more of the estimates.
+    fn hand_over(&mut self, ritz: &Ritz) -> Result<Option<FoundModes>, EigenFailure> {
+        if self.asks_below_noise(ritz) {
             return Ok(None);
         }
         let (size, last) = (ritz.size(), ritz.last);
-        if self.goal.rough && !self.complete {
-            // Half as many again: what the corrections would have to find of the next modes is then there.
-            let vectors = self.vectors(ritz, (last + last / 2 + 2 * self.goal.block).min(size));
-            return Ok(Some(LanczosOutcome::Rough { vectors, wanted: last }));
-        }
-        if self.asks_below_noise(ritz, counters) {
-            return Ok(None);
-        }
-        let modes = Refined::new(self.problem, self.vectors(ritz, last), counters)?;
-        let excess = modes.excess(self.goal.tolerance);
+        let refined = Refined::new(self.problem, self.vectors(ritz, last), &self.context)?;
+        let excess = refined.excess(self.goal.tolerance);
         // Another step costs a block, the refinement a column for each mode that needs it.
         let gains_nothing = excess.is_nan() || excess > 0.5 * self.least_excess;
         if excess <= 1.0 || self.complete || gains_nothing {
             let is_known = |i: &usize| self.complete || ritz.is_good(*i, 1e-2);
             let next = (last..size).take_while(is_known).map(|i| ritz.lambda(i)).collect();
-            return Ok(Some(LanczosOutcome::Found { modes, next }));
+            return Ok(Some(FoundModes { refined, next, tau: self.tau, finite: None }));
         }
         self.least_excess = excess;
         self.asked /= 1.2 * excess;
@@ -515,15 +450,15 @@ impl<'a> Iteration<'a> {
         vectors
     }
 
-    /// Where rounding hides the true residual of the first mode, whose strain energy is least, more is asked of the
-    /// estimates. Whether it is.
-    fn asks_below_noise(&mut self, ritz: &Ritz, counters: &mut Counters) -> bool {
+    /// Asks more of the estimates where rounding hides the true residual of the first mode, whose strain energy is least.
+    /// Returns true when it does.
+    fn asks_below_noise(&mut self, ritz: &Ritz) -> bool {
         let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
         let may_ask = !self.complete && self.asked > below_noise;
         let asks = may_ask && {
             let count = ritz.last.min(1);
             let (first, eigenvalues) = (self.vectors(ritz, count), &[ritz.lambda(0)][..count]);
-            let (_, floors) = residuals(self.problem, eigenvalues, first.as_ref(), counters);
+            let (_, floors) = residuals(self.problem, eigenvalues, first.as_ref(), &self.context);
             is_noisy(&floors, self.goal.tolerance)
         };
         if asks {
@@ -537,9 +472,9 @@ impl<'a> Iteration<'a> {
     ///
     /// # Errors
     /// [`EigenFailure::NotConverged`] when there is nothing left to search in, or after too many restarts.
-    fn restart(&mut self, ritz: &Ritz, counters: &mut Counters) -> Result<Option<f64>, EigenFailure> {
+    fn restart(&mut self, ritz: &Ritz) -> Result<Option<f64>, EigenFailure> {
         let Ritz { last, converged, .. } = *ritz;
-        if self.complete || counters.restarts >= MAX_RESTARTS {
+        if self.complete || self.restarts >= MAX_RESTARTS {
             return Err(EigenFailure::NotConverged { converged, wanted: self.goal.wanted });
         }
         if !self.is_full() {
@@ -548,8 +483,9 @@ impl<'a> Iteration<'a> {
         if let Some(shift) = suited_shift(ritz.lambda(0), ritz.lambda(last.max(1) - 1), ritz.tau) {
             return Ok(Some(shift));
         }
-        counters.restarts += 1;
-        let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.goal.block));
+        self.restarts += 1;
+        self.context.count(|work| work.restarts += 1);
+        let keep = (last + (self.capacity - last) / 3).min(ritz.size().saturating_sub(self.block));
         self.krylov.restart(ritz.s.as_ref().subcols(0, keep), &ritz.theta[..keep]);
         self.next_test = 0;
         Ok(None)

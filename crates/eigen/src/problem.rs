@@ -1,8 +1,9 @@
 //! The eigenproblem that is to be solved.
 
 use super::failure::EigenFailure;
-use super::resume::Resume;
+use super::settings::EigenSettings;
 use faer::{Mat, MatRef};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Analysis, Cholesky, EliminationOrder, Pencil, Solve, gram, subtract_combination, uniform,
 };
@@ -28,8 +29,6 @@ pub struct EigenProblem<'a> {
     pub input_error: f64,
     /// The elimination order that all problems of this pencil share; `None`: each solver computes its own.
     pub order: Option<&'a EliminationOrder>,
-    /// Start of an iterative search, and the listener that keeps its snapshots.
-    pub resume: Resume<'a>,
 }
 
 impl<'a> EigenProblem<'a> {
@@ -53,8 +52,7 @@ impl<'a> EigenProblem<'a> {
     ) -> Result<Self, EigenFailure> {
         assert_eq!(rigid.nrows(), pencil.n(), "rows of the rigid modes");
         let first_estimate = rayleigh_estimate(&pencil, rigid, order)?;
-        let (order, resume) = (Some(order), Resume::default());
-        Ok(Self { pencil, rigid, first_estimate, input_error: 0.0, order, resume })
+        Ok(Self { pencil, rigid, first_estimate, input_error: 0.0, order: Some(order) })
     }
 }
 
@@ -90,5 +88,21 @@ impl EigenProblem<'_> {
             Some(order) => order.of(&self.pencil),
             None => Analysis::new(&self.pencil).map(Arc::new),
         }
+    }
+}
+
+/// An eigenproblem, the order in which its factors are eliminated, the settings, and the context of the work.
+#[derive(Clone, Copy)]
+pub(super) struct Task<'a> {
+    pub problem: &'a EigenProblem<'a>,
+    pub settings: &'a EigenSettings,
+    pub analysis: &'a Analysis,
+    pub context: &'a Context<'a>,
+}
+
+impl Task<'_> {
+    /// Returns the largest number of modes beside rigid motion that there may be.
+    pub(super) fn flexible_rows(&self) -> usize {
+        self.problem.pencil.n() - self.problem.rigid.ncols()
     }
 }

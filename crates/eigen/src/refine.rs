@@ -1,11 +1,11 @@
 //! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes,
 //! residuals.
 
-use super::counters::Counters;
 use super::failure::EigenFailure;
-use super::noise::{is_noisy, rounding_residual};
 use super::problem::EigenProblem;
+use super::zero_energy::{is_noisy, rounding_residual};
 use faer::{ColRef, Mat, MatRef};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     DoubleDouble, Solve, Tall, column_norms, combine, combine_in_place, combine_into, gram, largest,
     projection_compensated, small_pencil, subtract_columns, subtract_combination, symmetric_eigen,
@@ -27,6 +27,8 @@ pub(super) struct FoundModes {
     pub next: Vec<f64>,
     /// The shift of the search.
     pub tau: f64,
+    /// Number of flexible modes with a finite eigenvalue, where all were computed.
+    pub finite: Option<usize>,
 }
 
 /// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the
@@ -37,19 +39,19 @@ fn inverse_iteration(
     factor: &dyn Solve,
     x: MatRef<'_, f64>,
     correct: bool,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Mat<f64> {
     let pencil = &problem.pencil;
     let k = x.ncols() as u64;
-    counters.mass_columns += k;
-    counters.solved_columns += k;
+    context.count(|work| work.mass_columns += k);
+    context.count(|work| work.solved_columns += k);
     let b = pencil.apply_mass(x);
     let mut y = b.clone();
     factor.solve_in_place(y.as_mut());
     if correct {
-        counters.mass_columns += k;
-        counters.stiffness_columns += k;
-        counters.solved_columns += k;
+        context.count(|work| work.mass_columns += k);
+        context.count(|work| work.stiffness_columns += k);
+        context.count(|work| work.solved_columns += k);
         let shifted =
             pencil.apply_stiffness(y.as_ref()) + pencil.apply_mass(y.as_ref()) * faer::Scale(factor.shift());
         let mut correction = b - shifted;
@@ -80,11 +82,11 @@ fn columns_together(count: usize) -> impl Iterator<Item = Range<usize>> {
 pub(super) fn rayleigh_ritz(
     problem: &EigenProblem<'_>,
     mut x: Mat<f64>,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
     let (pencil, n, k) = (&problem.pencil, x.nrows(), x.ncols());
-    counters.mass_columns += (problem.rigid.ncols() + k) as u64;
-    counters.stiffness_columns += k as u64;
+    context.count(|work| work.mass_columns += (problem.rigid.ncols() + k) as u64);
+    context.count(|work| work.stiffness_columns += k as u64);
     let along = gram(pencil.apply_mass(problem.rigid).as_ref(), x.as_ref());
     subtract_combination(x.as_mut(), problem.rigid, along.as_ref());
     let [mut gm, mut gk] = [(); 2].map(|()| Mat::zeros(k, k));
@@ -168,10 +170,10 @@ pub(super) fn residuals(
     problem: &EigenProblem<'_>,
     eigenvalues: &[f64],
     x: MatRef<'_, f64>,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> (Vec<f64>, Vec<f64>) {
-    counters.mass_columns += x.ncols() as u64;
-    counters.stiffness_columns += x.ncols() as u64;
+    context.count(|work| work.mass_columns += x.ncols() as u64);
+    context.count(|work| work.stiffness_columns += x.ncols() as u64);
     let m_rigid = problem.pencil.apply_mass(problem.rigid);
     columns_together(x.ncols())
         .flat_map(|columns| {
@@ -235,32 +237,27 @@ impl Refined {
     pub(super) fn new(
         problem: &EigenProblem<'_>,
         x: Mat<f64>,
-        counters: &mut Counters,
+        context: &Context<'_>,
     ) -> Result<Self, EigenFailure> {
         let given = x.ncols();
-        let (eigenvalues, vectors) = rayleigh_ritz(problem, x, counters)?;
+        let (eigenvalues, vectors) = rayleigh_ritz(problem, x, context)?;
         if vectors.ncols() < given {
             return Err(EigenFailure::Inaccurate { residual: DEPENDENT });
         }
-        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), context);
         Ok(Self { eigenvalues, vectors, residuals, floors })
     }
 
-    /// The same span with Rayleigh-Ritz in twice the precision, where it [is noisy](is_noisy) and has
+    /// Repeats Rayleigh-Ritz on the span in twice the precision, where it [is noisy](is_noisy) and has
     /// [few modes enough](SHARPENED_AT_MOST): the Ritz vectors are then those of the span to the rounding of
     /// vectors themselves. Their residuals stay what they are in double precision.
-    pub(super) fn sharpened(
-        self,
-        problem: &EigenProblem<'_>,
-        tolerance: f64,
-        counters: &mut Counters,
-    ) -> Self {
+    pub(super) fn sharpened(self, problem: &EigenProblem<'_>, tolerance: f64, context: &Context<'_>) -> Self {
         if !is_noisy(&self.floors, tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
             return self;
         }
         let (pencil, x) = (&problem.pencil, self.vectors.as_ref());
-        counters.mass_columns += x.ncols() as u64;
-        counters.stiffness_columns += x.ncols() as u64;
+        context.count(|work| work.mass_columns += x.ncols() as u64);
+        context.count(|work| work.stiffness_columns += x.ncols() as u64);
         let stiffness = projection_compensated(pencil.stiffness(), x);
         // Nothing cancels in products with M.
         let mass = gram(x, pencil.apply_mass(x).as_ref());
@@ -270,18 +267,18 @@ impl Refined {
         let Some(ritz) = small_pencil(stiffness, &mass) else { return self };
         let eigenvalues: Vec<f64> = ritz.values.iter().map(|lambda| lambda.hi).collect();
         let vectors = combine(x, ritz.vectors.as_ref());
-        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), counters);
+        let (residuals, floors) = residuals(problem, &eigenvalues, vectors.as_ref(), context);
         Self { eigenvalues, vectors, residuals, floors }
     }
 
     /// Residuals and floors anew of some modes, whose vectors or eigenvalues have changed.
-    pub(super) fn renew(&mut self, problem: &EigenProblem<'_>, changed: &[usize], counters: &mut Counters) {
+    pub(super) fn renew(&mut self, problem: &EigenProblem<'_>, changed: &[usize], context: &Context<'_>) {
         if changed.is_empty() {
             return;
         }
         let x = Mat::from_fn(self.vectors.nrows(), changed.len(), |i, j| self.vectors[(i, changed[j])]);
         let lambda: Vec<f64> = changed.iter().map(|&i| self.eigenvalues[i]).collect();
-        let (found, rounding) = residuals(problem, &lambda, x.as_ref(), counters);
+        let (found, rounding) = residuals(problem, &lambda, x.as_ref(), context);
         for ((&i, residual), floor) in changed.iter().zip(found).zip(rounding) {
             (self.residuals[i], self.floors[i]) = (residual, floor);
         }
@@ -307,7 +304,7 @@ pub(super) fn refine(
     factor: &dyn Solve,
     mut best: Refined,
     tolerance: f64,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<Refined, EigenFailure> {
     for round in 0..3 {
         let least = best.excess(tolerance);
@@ -319,11 +316,11 @@ pub(super) fn refine(
             (0..best.residuals.len()).filter(|&i| best.excess_of(i, tolerance) > 1.0).collect();
         let mut x = best.vectors.clone();
         let chosen = Mat::from_fn(x.nrows(), poor.len(), |i, j| x[(i, poor[j])]);
-        let improved = inverse_iteration(problem, factor, chosen.as_ref(), round > 0, counters);
+        let improved = inverse_iteration(problem, factor, chosen.as_ref(), round > 0, context);
         for (from, &to) in poor.iter().enumerate() {
             x.as_mut().col_mut(to).copy_from(improved.col(from));
         }
-        let refined = Refined::new(problem, x, counters)?;
+        let refined = Refined::new(problem, x, context)?;
         let excess = refined.excess(tolerance);
         if excess < least {
             best = refined;

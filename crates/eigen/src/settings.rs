@@ -1,4 +1,4 @@
-//! What is asked of the eigen-solver: which modes, how good, by which method and with what precision.
+//! Settings of the eigen-solver: the wanted modes, their accuracy, the method and the precision of the factor.
 
 /// Which modes are wanted.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,9 +66,9 @@ pub enum Method {
 pub struct EigenSettings {
     /// Which modes.
     pub wanted: Wanted,
-    /// How good.
+    /// Accuracy of the modes.
     pub accuracy: Accuracy,
-    /// How.
+    /// Algorithm.
     pub method: Method,
     /// Precision of the factor.
     pub factor: FactorChoice,
@@ -79,11 +79,6 @@ pub struct EigenSettings {
     /// searched for without a factor, where [`FactorChoice::Auto`] leaves that open. Those of
     /// [`Accuracy::Certified`] never are.
     pub multigrid_pays: f64,
-    /// Bytes that may be allocated on top of what is in use; `None`: as many as are needed.
-    pub memory: Option<u64>,
-    /// Seconds that the search may take by its estimate, without the factorisation; `None`: as many as it
-    /// needs.
-    pub longest: Option<f64>,
 }
 
 impl EigenSettings {
@@ -104,8 +99,6 @@ impl Default for EigenSettings {
             // Measured: a compact solid of 40,000 rows, a bar of 70,000. What is thin has less to factor, and
             // more that no coarse level sees.
             multigrid_pays: 1.2e4,
-            memory: None,
-            longest: None,
         }
     }
 }

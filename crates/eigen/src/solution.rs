@@ -1,10 +1,9 @@
-//! What the eigen-solver answers when there are modes.
+//! The answer of the eigen-solver where there are modes.
 
-use super::Completeness;
-use super::counters::Counters;
-use super::noise::is_noisy;
+use super::completeness::Completeness;
 use super::plan::Plan;
 use super::settings::{Accuracy, keeps};
+use super::zero_energy::is_noisy;
 use faer::Mat;
 
 /// Guaranteed bounds of the eigenvalues of K and M as they are stored, at [`Accuracy::Certified`].
@@ -43,7 +42,7 @@ pub struct EigenSolution {
     pub residuals: Vec<f64>,
     /// K-residual that rounding alone explains, for each mode.
     pub rounding_floors: Vec<f64>,
-    /// What is known about missed modes.
+    /// Knowledge about missed modes.
     pub completeness: Completeness,
     /// Memory and precision as decided (not on the dense path); the precision is the one used in the end.
     pub plan: Option<Plan>,
@@ -56,19 +55,17 @@ pub struct EigenSolution {
     pub finite_modes: Option<usize>,
     /// Shift tau of K + tau M that was used last.
     pub shift: f64,
-    /// Work.
-    pub counters: Counters,
 }
 
 impl EigenSolution {
-    /// How many of the modes, wherever they come from, are eigenvectors to the K-residual of `accuracy` or to
+    /// Returns the number of modes, wherever they come from, that are eigenvectors to the K-residual of `accuracy` or to
     /// rounding.
     pub fn eigenvectors(&self, accuracy: Accuracy) -> usize {
         let pairs = self.residuals.iter().zip(&self.rounding_floors);
         pairs.filter(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()
     }
 
-    /// Whether rounding keeps a K-residual above what [`Accuracy::Standard`] promises: products with K in double
+    /// Returns true when rounding keeps a K-residual above what [`Accuracy::Standard`] promises: products with K in double
     /// precision then cost digits of what is made of these modes.
     pub fn is_noisy(&self) -> bool {
         is_noisy(&self.rounding_floors, Accuracy::Standard.residual())

@@ -4,16 +4,16 @@
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
 use super::completeness::{Completeness, Proof, count_below};
-use super::counters::Counters;
 use super::failure::EigenFailure;
-use super::plan::{Plan, gigabytes};
+use super::needs::{factor_needs, gigabytes, resident_for_count};
 use super::problem::EigenProblem;
+use super::problem::Task;
 use super::refine::Refined;
-use super::settings::{Accuracy, EigenSettings, Wanted, keeps};
+use super::settings::{Accuracy, EigenSettings, Precision, Wanted, keeps};
 use super::solution::EigenSolution;
 use super::zero_energy::check_zero_energy;
 use faer::Mat;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{Analysis, is_positive_semidefinite};
 
 /// Distance of the count's shift from the last eigenvector, relative to its eigenvalue: the second is tried
@@ -34,34 +34,35 @@ pub fn modes_of_span(
     problem: &EigenProblem<'_>,
     basis: Mat<f64>,
     settings: &EigenSettings,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
-    let mut counters = Counters::default();
-    let refined = Refined::new(problem, basis, &mut counters)?;
+    let refined = Refined::new(problem, basis, context)?;
     // Whatever is asked of the modes: nothing is searched, and they are no better than this makes them.
-    let refined = refined.sharpened(problem, Accuracy::Standard.residual(), &mut counters);
+    let refined = refined.sharpened(problem, Accuracy::Standard.residual(), context);
     check_zero_energy(problem, &refined)?;
-    let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, &mut counters);
+    let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, context);
     let exact = modes.exact(settings.accuracy);
     let analysis = (exact > 0 && settings.accuracy != Accuracy::Fast).then(|| {
-        watch(Event::Phase("completeness"));
+        context.phase("completeness");
         problem.analysis().ok_or(EigenFailure::TooLarge)
     });
     let analysis = analysis.transpose()?;
     let completeness = match &analysis {
-        Some(analysis) => count(problem, analysis, &modes.eigenvalues[..exact], settings, &mut counters)?,
+        Some(analysis) => count(problem, analysis, &modes.eigenvalues[..exact], context)?,
         None => uncounted(&modes, exact, settings.accuracy),
     };
     let mut bounds = None;
     if settings.accuracy == Accuracy::Certified && !modes.eigenvalues.is_empty() {
         let analysis = certifiable(&modes, exact, &completeness, analysis.as_deref())
             .map_err(|why| EigenFailure::NotCertified { why })?;
-        watch(Event::Phase("bounds"));
-        // Refuses what does not fit the memory.
-        Plan::new(problem, settings, analysis, modes.eigenvalues.len(), false)?;
+        context.phase("bounds");
+        let task = Task { problem, settings, analysis, context };
+        let wanted = modes.eigenvalues.len();
+        if let Err(unusable) = factor_needs(&task, wanted, Precision::Double) {
+            unusable.failure(&task, wanted).map_or(Ok(()), Err)?;
+        }
         let (vectors, high) = (modes.vectors.as_ref(), completeness.shift);
-        let found =
-            enclose(problem, analysis, vectors, &modes.eigenvalues, high, CLUSTER_GAP, &mut counters)?;
+        let found = enclose(&task, vectors, &modes.eigenvalues, high, CLUSTER_GAP)?;
         found.clamp(&mut modes.eigenvalues);
         bounds = Some(found);
     }
@@ -76,7 +77,6 @@ pub fn modes_of_span(
         next_eigenvalue,
         finite_modes: None,
         shift: 0.0,
-        counters,
     })
 }
 
@@ -85,7 +85,7 @@ fn canonical_modes(
     problem: &EigenProblem<'_>,
     refined: Refined,
     settings: &EigenSettings,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> (Refined, Option<f64>) {
     let Refined { mut eigenvalues, mut vectors, mut residuals, mut floors } = refined;
     let given = match settings.wanted {
@@ -101,19 +101,19 @@ fn canonical_modes(
     let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
     canonical_basis(modes.vectors.as_mut(), &groups);
     let mixed: Vec<usize> = groups.into_iter().filter(|group| group.len() > 1).flatten().collect();
-    modes.renew(problem, &mixed, counters);
+    modes.renew(problem, &mixed, context);
     (modes, next_eigenvalue)
 }
 
 impl Refined {
-    /// How many of the lowest are eigenvectors to the K-residual of `accuracy`.
+    /// Returns the number of the lowest modes that are eigenvectors to the K-residual of `accuracy`.
     fn exact(&self, accuracy: Accuracy) -> usize {
         let pairs = self.residuals.iter().zip(&self.floors);
         pairs.take_while(|(residual, floor)| keeps(**residual, **floor, accuracy.residual())).count()
     }
 }
 
-/// What is known without a count.
+/// Returns the knowledge about missed modes without a count.
 fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
     let given = modes.eigenvalues.len();
     let remark = if exact < given {
@@ -148,8 +148,7 @@ fn count(
     problem: &EigenProblem<'_>,
     analysis: &Analysis,
     eigenvalues: &[f64],
-    settings: &EigenSettings,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<Completeness, EigenFailure> {
     let (rigid, found) = (problem.rigid.ncols(), eigenvalues.len());
     let last = *eigenvalues.last().expect("counted only where there is one");
@@ -160,9 +159,9 @@ fn count(
         modes_below: found,
         remark,
     };
-    let needed = Plan::count_bytes(problem, analysis, found);
-    if let Some(available) = settings.memory.filter(|&available| needed > available) {
-        let (needed, available) = (gigabytes(needed), gigabytes(available));
+    let needed = resident_for_count(problem, analysis, found);
+    if needed > context.available() {
+        let (needed, available) = (gigabytes(needed), gigabytes(context.available()));
         let remark = format!("the count needs {needed} of memory, {available} are available");
         return Ok(outcome(last, None, remark));
     }
@@ -172,7 +171,7 @@ fn count(
     let mut counted = (last, 0);
     for above in ABOVE {
         let shift = (1.0 + above) * last;
-        let negative = count_below(problem, analysis, shift, counters)?;
+        let negative = count_below(problem, analysis, shift, context)?;
         if negative == rigid + found {
             return Ok(outcome(shift, Some(negative), String::new()));
         }

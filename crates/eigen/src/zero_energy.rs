@@ -1,9 +1,48 @@
-//! Modes whose strain energy cannot be told from zero.
+//! Rounding floors, and motions that cannot be told from motions without energy with the digits that are there.
 
 use super::failure::EigenFailure;
-use super::noise::energy_noise;
 use super::problem::EigenProblem;
 use super::refine::Refined;
+use faer::Mat;
+use faer::{ColRef, MatRef};
+use flexbody_linalg::{
+    Analysis, Cholesky, Inertia, Pencil, Solve, SymmetricMatrix, Tall, column_norms, sum_terms,
+};
+
+/// Unit roundoff of f64.
+const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+
+/// For each column x of X: the standard deviation of x'Kx when every entry of K carries an independent
+/// relative error of `relative`: relative * sqrt(sum_ij (K_ij x_i x_j)^2), times sqrt(2) for the equal errors
+/// of symmetric pairs.
+pub fn energy_noise(k: &SymmetricMatrix, x: MatRef<'_, f64>, relative: f64) -> Vec<f64> {
+    let relative = relative.max(ROUNDOFF);
+    let terms = row_sums(k, x, |term| term * term);
+    let columns = x.col_iter().zip(terms.as_ref().col_iter());
+    let sum = |(x, terms): (ColRef<'_, f64>, ColRef<'_, f64>)| -> f64 {
+        x.iter().zip(terms.iter()).map(|(x, term)| x * x * term).sum()
+    };
+    columns.map(|pair| relative * (2.0 * sum(pair)).sqrt()).collect()
+}
+
+/// For each column x of X: eps | |K| |x| |_2, the norm of K x that rounding alone can leave.
+pub fn rounding_residual(k: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<f64> {
+    column_norms(row_sums(k, x, f64::abs).as_ref()).into_iter().map(|norm| f64::EPSILON * norm).collect()
+}
+
+/// Returns true when rounding keeps a K-residual above `tolerance`, as in thin or fine shells: a part eps |K| |x| of K x,
+/// divided by distances of eigenvalues, is then what plain projections turn modes into each other by.
+pub(super) fn is_noisy(floors: &[f64], tolerance: f64) -> bool {
+    floors.iter().any(|floor| *floor > tolerance)
+}
+
+/// sum_j f(K_ij x_j) for each row i and each column x.
+fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Copy + Sync) -> Tall {
+    let mut sums = Tall::zeros(x.nrows(), x.ncols());
+    sum_terms(k, 1, x, sums.as_mut(), f);
+    sums
+}
+
 /// Energy this many standard deviations above the noise of the entries of K is real.
 pub(super) const NOISE_FACTOR: f64 = 30.0;
 
@@ -26,4 +65,50 @@ pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -
         });
     }
     Ok(())
+}
+
+/// Motions with neither strain energy nor mass.
+#[derive(Debug, Clone)]
+pub struct Unresisted {
+    /// Number of such motions; rigid motions are not among them, since they have mass.
+    pub count: usize,
+    /// Some of them (N x at most `SHOWN`), of largest entry one.
+    pub vectors: Mat<f64>,
+}
+
+/// Vectors that are computed at the most.
+const SHOWN: usize = 8;
+
+/// Steps of inverse iteration: the first lifts the motions by as many digits as K has above all others.
+const STEPS: usize = 2;
+
+/// The motions that K + tau M leaves without energy up to the digits of K (`input_error` is the relative
+/// error of its entries); `None` where there is none, or where K + tau M is truly indefinite.
+///
+/// Counted are the eigenvalues mu of (K + tau M) x = mu diag(K) x within noise of zero, by the inertia of K +
+/// tau M -+ delta diag(K).
+pub fn unresisted_motions(pencil: &Pencil<'_>, tau: f64, input_error: f64) -> Option<Unresisted> {
+    let delta = NOISE_FACTOR * input_error.max(f64::EPSILON);
+    let analysis = Analysis::new(pencil)?;
+    let moved = |part: f64| pencil.stiffness().with_diagonal(|_, k| k + part * k);
+    let with = |stiffness: &SymmetricMatrix| {
+        Inertia::new(&analysis, &Pencil::new(stiffness, pencil.mass(), pencil.block()), -tau)
+    };
+    let (lowered, raised) = (moved(-delta)?, moved(delta)?);
+    let count = with(&lowered).negative;
+    if count == 0 || with(&raised).negative > 0 {
+        return None;
+    }
+    let raised = Pencil::new(&raised, pencil.mass(), pencil.block());
+    let factor = Cholesky::<f64>::new(&analysis, &raised, tau)?;
+    let start = |i: usize, j: usize| ((i + 1) as f64 * (j as f64 + 1.37) * 0.754_877_666).fract() - 0.5;
+    let mut vectors = Mat::from_fn(pencil.n(), count.min(SHOWN), start);
+    for _ in 0..STEPS {
+        factor.solve_in_place(vectors.as_mut());
+        for column in vectors.col_iter_mut() {
+            let size = column.norm_max();
+            column.iter_mut().for_each(|value| *value /= size);
+        }
+    }
+    Some(Unresisted { count, vectors })
 }

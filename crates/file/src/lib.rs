@@ -12,7 +12,6 @@
 #[cfg(feature = "hdf5")]
 mod assemble;
 #[cfg(feature = "hdf5")]
-mod checkpoint;
 mod contents;
 #[cfg(feature = "hdf5")]
 mod derived;
@@ -40,7 +39,6 @@ mod value;
 mod write;
 
 #[cfg(feature = "hdf5")]
-pub use checkpoint::{Checkpoint, read_checkpoint, write_checkpoint};
 pub use contents::{NamedArray, NamedAttributes, Numbers, contents};
 pub use document::{format_markdown, format_schema};
 pub use flexbody_base::output::OutputSlot;

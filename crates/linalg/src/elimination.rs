@@ -89,7 +89,7 @@ impl Elimination {
         self.free.len()
     }
 
-    /// Whether no row is free.
+    /// Returns true when no row is free.
     pub fn is_empty(&self) -> bool {
         self.free.is_empty()
     }

@@ -303,7 +303,7 @@ fn eliminate_front<T: Real>(
     Some((pivots, rest))
 }
 
-/// Whether a matrix has a Cholesky factor with numbers of type `T`, which is forgotten front by front.
+/// Returns true when a matrix has a Cholesky factor with numbers of type `T`, which is forgotten front by front.
 fn is_positive_definite<T: Real>(analysis: &Analysis, matrix: &SymmetricMatrix) -> bool {
     let pencil = Pencil::new(matrix, matrix, 1);
     let matrix = analysis.scaled(&pencil, 0.0);
@@ -424,7 +424,7 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 /// both: to find its own takes longer than what it saves.
 const NEARLY_FULL: f64 = 0.5;
 
-/// Whether M is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has been
+/// Returns true when M is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has been
 /// raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Most masses of
 /// displacements are far from the border: where it succeeds in single precision with a diagonal that is 1e-3 less, that
 /// settles it in half the time. Those of rotations are near it. Uses the order of `analysis`, which is that of the pencil.

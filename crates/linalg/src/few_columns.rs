@@ -58,7 +58,7 @@ fn vectors<S: Simd, const N: usize>(columns: [&[f64]; N]) -> ([&[S::f64s]; N], [
     (split.map(|(vectors, _)| &vectors[..count]), split.map(|(_, rest)| rest))
 }
 
-/// Whether the machine has registers for the sums of twice as many columns.
+/// Returns true when the machine has registers for the sums of twice as many columns.
 fn has_long_vectors<S: Simd>() -> bool {
     size_of::<S::f64s>() == 64
 }

@@ -63,7 +63,7 @@ impl<'a, T: Real> Indefinite<'a, T> {
         }
     }
 
-    /// Whether K - sigma M has the inertia of this factor in spite of its rounding; the number that tells.
+    /// Returns true when K - sigma M has the inertia of this factor in spite of its rounding; the number that tells.
     ///
     /// With A the matrix and F the product of the factors, both scaled to a diagonal of about one, and
     /// G = I - F^-1 A: a matrix (1 - t) F + t A between the two is singular only where 1/t is an eigenvalue

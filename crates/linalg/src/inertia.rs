@@ -160,7 +160,7 @@ pub(super) struct Blocks<T> {
     /// Row of A at each place.
     pub order: Vec<usize>,
     diagonal: Vec<f64>,
-    /// Whether there are 2x2 blocks.
+    /// True when there are 2x2 blocks.
     has_pairs: bool,
     /// Nonzero where a 2x2 block of B starts.
     coupling: Vec<f64>,

@@ -116,7 +116,7 @@ impl CscMatrix {
         self.n_cols
     }
 
-    /// Whether its numbers are lent, as by a file that they stay in.
+    /// Returns true when its numbers are lent, as by a file that they stay in.
     pub fn is_lent(&self) -> bool {
         matches!((&self.row_idx, &self.values), (Stored::Lent(_), Stored::Lent(_)))
     }
@@ -190,7 +190,7 @@ impl CscMatrix {
         Self::made(n, n, col_ptr, row_idx, values)
     }
 
-    /// Whether pattern and values are exactly symmetric.
+    /// Returns true when pattern and values are exactly symmetric.
     pub fn is_symmetric(&self) -> bool {
         let n = self.n_cols;
         // Every task has a cursor per column: a few long ranges.

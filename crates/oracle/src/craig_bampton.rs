@@ -5,8 +5,8 @@ use flexbody_body::basis::{Basis, BasisChoice, CraigBampton, ModalBasis, ModeSet
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::flex_body::{FixedInterface, FlexBody};
 use flexbody_body::invariants::BodyFrame;
-use flexbody_eigen::{Resume, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_eigen::Wanted;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
 
 /// Checks a model that is sound.
@@ -21,7 +21,17 @@ pub fn lowest(count: usize) -> ModeSettings {
 
 /// Computes the modes of a basis.
 pub fn modes_of(model: &FeModel, basis: &dyn Basis, settings: &ModeSettings) -> Result<ModalBasis> {
-    basis.modes(&Task { model, settings, resume: Resume::default(), watch: SILENT })
+    modes_within(model, basis, settings, &Context::QUIET)
+}
+
+/// Computes the modes of a basis within the limits of `context`.
+pub fn modes_within(
+    model: &FeModel,
+    basis: &dyn Basis,
+    settings: &ModeSettings,
+    context: &Context<'_>,
+) -> Result<ModalBasis> {
+    basis.modes(&Task { model, settings, context })
 }
 
 /// Computes a Craig-Bampton basis with `count` fixed-interface modes.
@@ -33,7 +43,7 @@ pub fn craig_bampton(model: &FeModel, count: usize) -> ModalBasis {
 pub fn converted(model: &FeModel, basis: BasisChoice, count: usize, frame: BodyFrame) -> Conversion {
     let settings =
         ConvertSettings { modes: lowest(count), basis, frame: frame.into(), ..ConvertSettings::default() };
-    convert(model, &settings, SILENT).expect("a body")
+    convert(model, &settings, &Context::QUIET).expect("a body")
 }
 
 /// Converts a model to a Craig-Bampton body with `count` fixed-interface modes, in its principal axes.

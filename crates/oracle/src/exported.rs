@@ -14,7 +14,7 @@ use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_eigen::Wanted;
 use flexbody_formats::export::{ExportOptions, Exported};
 use flexbody_formats::{export, find_format};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, Damping, FeModel, RawModel};
 use std::sync::OnceLock;
 
@@ -32,7 +32,7 @@ pub fn body_of(raw: RawModel, basis: BasisChoice, frame: BodyFrame) -> FlexBody 
     let model = FeModel::from_raw(raw).expect("a body").model;
     let mut settings = ConvertSettings { basis, frame: frame.into(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(7);
-    convert(&model, &settings, SILENT).expect("converts").body
+    convert(&model, &settings, &Context::QUIET).expect("converts").body
 }
 
 /// A fixture model with its interfaces coupled to reference points and Craig-Bampton modes.
@@ -109,7 +109,7 @@ pub fn on_interfaces() -> Vec<(String, FlexBody)> {
         let basis = BasisChoice::CraigBampton(CraigBampton);
         let mut settings = ConvertSettings { basis, frame, ..ConvertSettings::default() };
         settings.modes.wanted = Wanted::Lowest(4);
-        let body = convert(&model, &settings, SILENT).expect("converts").body;
+        let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
         (format!("{name}, frame on an interface"), body)
     };
     ["bracket_hex20", "robot_link", "satellite", "car_frame"].map(made).to_vec()

@@ -16,7 +16,7 @@ use flexbody_body::flex_body::{
 use flexbody_body::invariants::{BodyFrame, GeneralTerms, Invariants, PrimaryData, TermGroups};
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, UnitLoad};
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -26,7 +26,7 @@ pub fn body_of(raw: RawModel, modes: usize, frame: BodyFrame) -> FlexBody {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() };
-    convert(&model, &settings, SILENT).expect("converts").body
+    convert(&model, &settings, &Context::QUIET).expect("converts").body
 }
 
 /// What flexbody makes of a model of the fixtures.

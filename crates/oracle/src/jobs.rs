@@ -6,7 +6,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_input::{InterfaceNodes, InterfaceSource, ModelFiles, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, RawModel, Reference};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,9 @@ pub fn small(name: &str) -> PathBuf {
 pub fn body(raw: RawModel, modes: usize) -> FlexBody {
     let model = FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{error}")).model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT).expect("a body").body
+    convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
+        .expect("a body")
+        .body
 }
 
 /// Mass of the block of `fixtures/make/make_jobs.py`.

@@ -4,6 +4,7 @@
 //! Each feature adds what stands on one crate more, so that the tests of a crate build nothing above it.
 
 pub mod cases;
+pub mod counted;
 pub mod cuboid;
 pub mod damage;
 pub mod elements;

@@ -6,7 +6,7 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::{ModalBasis, ModeSettings, free_surface};
 use flexbody_body::invariants::{BodyFrame, Frame, Invariants, choose_frame, condense};
 use flexbody_eigen::{Accuracy, Method, Proof, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel, check};
 
 /// A checked model and its lowest flexible modes, in model axes.
@@ -58,7 +58,7 @@ impl Body {
 /// The flexible modes that `settings` ask for.
 pub fn solve(raw: RawModel, settings: &ModeSettings) -> Result<Body> {
     let model = check(raw)?.model;
-    let modes = free_surface(&model, settings, SILENT)?;
+    let modes = free_surface(&model, settings, &Context::QUIET)?;
     Ok(Body { model, modes })
 }
 

@@ -9,7 +9,6 @@
 )]
 
 #[cfg(feature = "hdf5")]
-pub mod checkpoint;
 pub mod reference;
 pub mod response;
 pub mod selection;

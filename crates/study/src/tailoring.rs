@@ -9,9 +9,9 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, BasisKind, CraigBampton, CraigChang, FreeSurface, Loads, UserLoads};
 use flexbody_body::convert::{Condensation, Conversion, ConvertSettings, ModalModel};
 use flexbody_body::flex_body::FlexBody;
-use flexbody_eigen::{Accuracy, Resume, Wanted};
+use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_input::{LoadSource, read_shapes};
-use flexbody_linalg::progress::Watch;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::LoadCases;
 
@@ -37,10 +37,9 @@ impl Tailoring {
         &self,
         model: &FeModel,
         cases: &LoadCases,
-        resume: Resume<'_>,
-        watch: Watch<'_>,
+        context: &Context<'_>,
     ) -> Result<Enriched<Conversion>> {
-        self.enriched(model, cases, resume, watch, |modal| Ok(modal.condense()))
+        self.enriched(model, cases, context, |modal| Ok(modal.condense()))
     }
 
     /// Conversions by `condense`, each with more static responses than the one before, until the body lacks
@@ -49,24 +48,21 @@ impl Tailoring {
         &self,
         model: &FeModel,
         cases: &LoadCases,
-        resume: Resume<'_>,
-        watch: Watch<'_>,
+        context: &Context<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<Enriched<Conversion>> {
         let make = |loads: &Mat<f64>| {
             let own = self.with_motion(loads);
             let band_settings = own.settings_of_band(cases);
-            // A search that was interrupted is that of the free modes, which come first.
-            let resume = if loads.ncols() == 0 { resume } else { Resume::default() };
-            let modal = own.find_modes(band_settings.as_ref(), model, resume, watch)?;
+            let modal = own.find_modes(band_settings.as_ref(), model, context)?;
             let condensed = condense(&modal)?;
-            modal.finish(condensed, watch)
+            modal.finish(condensed, context)
         };
         let Self { settings, .. } = self;
         let grows = settings.modes.accuracy != Accuracy::Certified
             && settings.basis.with_motion(&Mat::new()).is_some();
-        let enrichment = Enrichment { memory: settings.modes.memory, grows, is_fine: false };
-        enrich(model, cases, enrichment, watch, make, |made| &made.body)
+        let enrichment = Enrichment { grows, is_fine: false };
+        enrich(model, cases, enrichment, context, make, |made| &made.body)
     }
 
     /// The body of the fewest shapes of its motions that leave half of the tolerances to others, in place of
@@ -79,7 +75,7 @@ impl Tailoring {
         model: &FeModel,
         cases: &LoadCases,
         whole: Enriched<Conversion>,
-        watch: Watch<'_>,
+        context: &Context<'_>,
         condense: impl Fn(&ModalModel<'_>) -> Result<Condensation>,
     ) -> Result<Enriched<Conversion>> {
         let Enriched { made: mut reference, rounds } = whole;
@@ -91,12 +87,12 @@ impl Tailoring {
             return Ok(Enriched { made: reference, rounds });
         }
         let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
-        let bodies = MotionBodies::new(model, &reference.body, cases, self.settings.modes.memory)?;
+        let bodies = MotionBodies::new(model, &reference.body, cases, context)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
             let settings = self.settings_of_shapes(bodies.basis(count));
-            let modal = ModalModel::find(model, &settings, Resume::default(), watch)?;
+            let modal = ModalModel::find(model, &settings, context)?;
             let condensed = condense(&modal)?;
-            modal.finish(condensed, watch)
+            modal.finish(condensed, context)
         };
         let most: Vec<f64> = lacks.iter().map(|lacks| MOST_LACKING - lacks).collect();
         let fewest = bodies
@@ -149,16 +145,13 @@ impl Tailoring {
         &'m self,
         band_settings: Option<&'m ConvertSettings>,
         model: &'m FeModel,
-        resume: Resume<'_>,
-        watch: Watch<'_>,
+        context: &Context<'_>,
     ) -> Result<ModalModel<'m>> {
         let Some(band_settings) = band_settings else {
-            return ModalModel::find(model, &self.settings, resume, watch);
+            return ModalModel::find(model, &self.settings, context);
         };
-        match ModalModel::find(model, band_settings, resume, watch) {
-            Err(error) if error.has(Code::NoModes) => {
-                ModalModel::find(model, &self.settings, Resume::default(), watch)
-            }
+        match ModalModel::find(model, band_settings, context) {
+            Err(error) if error.has(Code::NoModes) => ModalModel::find(model, &self.settings, context),
             found => found,
         }
     }
@@ -229,23 +222,21 @@ pub fn convert_for(
     model: &FeModel,
     tailoring: &Tailoring,
     cases: &LoadCases,
-    resume: Resume<'_>,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<(Conversion, Selection)> {
-    let memory = tailoring.settings.modes.memory;
     refuse_unfit(tailoring, cases)?;
     let condense = |modal: &ModalModel<'_>| {
         // Rigid motion alone is multiplied by M before the scenes have said which groups they may need.
         let linear = modal.condense_linear();
-        let terms = rule_out(&modal.body(&linear)?, cases, memory)?;
+        let terms = rule_out(&modal.body(&linear)?, cases, context)?;
         Ok(modal.condense_kept(linear, terms))
     };
-    let mut enriched = tailoring.enriched(model, cases, resume, watch, condense)?;
+    let mut enriched = tailoring.enriched(model, cases, context, condense)?;
     if tailoring.of_motion {
-        enriched = tailoring.of_motion(model, cases, enriched, watch, condense)?;
+        enriched = tailoring.of_motion(model, cases, enriched, context, condense)?;
     }
     let Enriched { made: mut conversion, rounds } = enriched;
-    let selection = select(&conversion.body, &rounds, cases, memory, watch)?;
+    let selection = select(&conversion.body, &rounds, cases, context)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
     let mut parts = reduced.into_parts();
     let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.source);

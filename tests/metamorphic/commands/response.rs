@@ -4,7 +4,7 @@ use super::{error, findings};
 use crate::outputs::{Output, Outputs, Values};
 use crate::subject::Subject;
 use flexbody_base::error::Result;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::Point;
 use flexbody_study::response::{Band, Complex, Function, Place, ResponseSettings, respond};
 
@@ -27,12 +27,10 @@ pub fn response(subject: &Subject) -> Result<Outputs> {
         damping: Some(RATIO.into()),
         replaces_damping: true,
         tolerance: ResponseSettings::TOLERANCE,
-        memory: None,
-        longest: None,
     };
     let place = |point: &Point| vec![Place { point: point.clone(), directions: Vec::new() }];
     let [from, to] = [&subject.scene.watched[0], &Point::Interface("tip".to_owned())];
-    let response = respond(Some(&model), &body, &place(from), &place(to), &settings, SILENT)?;
+    let response = respond(Some(&model), &body, &place(from), &place(to), &settings, &Context::QUIET)?;
     let mut outputs = Outputs { times: Vec::new(), all: findings(&[]) };
     for pair in &response.pairs {
         let norm = |of: &dyn Fn(&Function, usize) -> Option<Complex<f64>>| -> Vec<f64> {

@@ -5,6 +5,7 @@ use crate::outputs::{Along, Output, Outputs, Values};
 use crate::subject::Subject;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::Orientation;
 use flexbody_motion::scene::{Recording, simulate};
 use nalgebra::{Matrix3, Vector3};
@@ -53,7 +54,7 @@ impl Sizes {
 /// `simulate`: everything that is recorded.
 pub fn simulation(subject: &Subject) -> Result<Outputs> {
     let body = subject.body()?;
-    let (recording, found) = simulate(&body, &subject.scenes()?[0], None, |_| ())?;
+    let (recording, found) = simulate(&body, &subject.scenes()?[0], &Context::QUIET)?;
     let sizes = Sizes::new(&body, &recording);
     let mut outputs = Outputs { times: recording.time.clone(), all: Vec::new() };
     places(&recording, &sizes, &mut outputs);

@@ -4,8 +4,7 @@ use super::{ENRICHED, cases, error, facts, findings};
 use crate::outputs::{Output, Outputs};
 use crate::subject::{Basis, Subject};
 use flexbody_base::error::Result;
-use flexbody_eigen::Resume;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::{Selection, select};
 use flexbody_study::tailoring::{Tailoring, convert_for};
@@ -40,7 +39,7 @@ fn outputs(subject: &Subject, selection: &Selection, modes: usize) -> Outputs {
 /// `select` of a body.
 pub fn select_body(subject: &Subject) -> Result<Outputs> {
     let body = subject.body()?;
-    let selection = select(&body, &[], &cases(subject)?, None, SILENT)?;
+    let selection = select(&body, &[], &cases(subject)?, &Context::QUIET)?;
     Ok(outputs(subject, &selection, body.n_modes()))
 }
 
@@ -51,9 +50,9 @@ fn tailoring(subject: &Subject) -> Tailoring {
 /// `select` of a model.
 pub fn select_model(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let enriched = tailoring(subject).convert(&model, &scenes, Resume::default(), SILENT)?;
+    let enriched = tailoring(subject).convert(&model, &scenes, &Context::QUIET)?;
     let body = &enriched.made.body;
-    let selection = select(body, &enriched.rounds, &scenes, None, SILENT)?;
+    let selection = select(body, &enriched.rounds, &scenes, &Context::QUIET)?;
     let mut outputs = outputs(subject, &selection, body.n_modes());
     let first = enriched.rounds.iter().filter_map(|rounds| Some(rounds.first()?.worst.min(BEYOND)));
     outputs.all.push(error("errors of the first body", vec![first.fold(0.0, f64::max)]));
@@ -63,7 +62,7 @@ pub fn select_model(subject: &Subject) -> Result<Outputs> {
 /// `convert --scene`.
 pub fn conversion(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let (made, selection) = convert_for(&model, &tailoring(subject), &scenes, Resume::default(), SILENT)?;
+    let (made, selection) = convert_for(&model, &tailoring(subject), &scenes, &Context::QUIET)?;
     let mut outputs = outputs(subject, &selection, made.body.n_modes());
     let told = findings(&made.diagnostics).into_iter();
     outputs.all.extend(
@@ -77,9 +76,9 @@ pub fn conversion(subject: &Subject) -> Result<Outputs> {
 /// `trade` of a body beside the motion of all nodes.
 pub fn trading(subject: &Subject) -> Result<Outputs> {
     let (model, scenes) = (subject.model()?, cases(subject)?);
-    let settings = TradeSettings { repeat: 1, memory: None, reserved: &[], longest: None };
+    let settings = TradeSettings { repeat: 1, reserved: &[] };
     let source = Source::new("body", subject.body()?, None)?;
-    let study = trade(&[source], &scenes, Some(&model), &settings, SILENT)?;
+    let study = trade(&[source], &scenes, Some(&model), &settings, &Context::QUIET)?;
     // Rounded numbers are others in a body that is turned.
     let exact = |row: &&TradeRow| row.candidate.kind() != CandidateKind::Single;
     let rows: Vec<&TradeRow> = study.rows.iter().filter(exact).collect();

@@ -12,7 +12,7 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody_motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Load, Point, Recording, Scene, Spin, VectorHistory, simulate,
@@ -95,7 +95,7 @@ fn block() -> Block {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(usize::MAX), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, lumped: Vec::new(), ..ConvertSettings::default() };
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     let (rate, mass) = (body.modes().eigenvalue[0].sqrt(), body.invariants().mass());
     Block { body, solid, root, rate, extent: 0.9, mass }
 }
@@ -260,7 +260,7 @@ impl Block {
     /// and to what it is in one radian of the lowest mode; and that deflection over the extent.
     fn apart(&self, what: &Happening, weights: Option<Weights>) -> ([f64; 3], f64) {
         let scene = self.scene(what);
-        let (recording, _) = simulate(&self.body, &scene, None, |_| ()).expect("a motion");
+        let (recording, _) = simulate(&self.body, &scene, &Context::QUIET).expect("a motion");
         let (body, states) = self.absolute(what, weights);
         let deflections = recording.paths.iter().flat_map(|path| &path.deflection);
         let deflection = deflections.map(|u| u.norm()).fold(0.0, f64::max);

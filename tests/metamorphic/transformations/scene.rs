@@ -7,6 +7,7 @@ use crate::draws::{between, pick};
 use crate::scenes::scaled;
 use crate::subject::Subject;
 use flexbody_base::error::Result;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{
     Axes, Drive, History, Initial, ModeStart, Point, Scene, Stage, VectorHistory, simulate,
@@ -151,7 +152,7 @@ pub fn restart(subject: &Subject, random: &mut Random) -> Result<Option<Pair>> {
     let (Some(duration), false) = (scene.run.duration, by_acceleration) else { return Ok(None) };
     let skipped = 1 + pick(random, scene.run.outputs / 2);
     let body = subject.body()?;
-    let (recording, _) = simulate(&body, scene, None, |_| ())?;
+    let (recording, _) = simulate(&body, scene, &Context::QUIET)?;
     let (time, state) = (recording.time[skipped], &recording.states[skipped]);
     let mut changed = subject.clone();
     let next = &mut changed.scene;

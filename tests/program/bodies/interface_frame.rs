@@ -10,7 +10,7 @@ use flexbody_body::flex_body::{FlexBody, ReferenceConditions};
 use flexbody_body::invariants::{BodyFrame, FrameChoice};
 use flexbody_body::verification::{own_identities, verify};
 use flexbody_eigen::{Accuracy, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::fixtures;
@@ -45,7 +45,7 @@ fn on_interface(model: &FeModel, name: &str, basis: BasisChoice, modes: usize) -
         ..ConvertSettings::default()
     };
     settings.modes.wanted = Wanted::Lowest(modes);
-    convert(model, &settings, SILENT)
+    convert(model, &settings, &Context::QUIET)
 }
 
 fn checked(raw: RawModel) -> FeModel {
@@ -111,7 +111,7 @@ fn every_identity_holds_for_every_kind_of_model() {
 fn is_the_body_in_mean_axes(body: &FlexBody, model: &FeModel, basis: BasisChoice, what: &str) {
     let mut settings = ConvertSettings { basis, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(8);
-    let expected = convert(model, &settings, SILENT).expect("a body").body;
+    let expected = convert(model, &settings, &Context::QUIET).expect("a body").body;
     let mean = body.in_mean_axes_at(BodyFrame::Com).expect(what);
     assert_eq!(failed(mean.identities(BodyFrame::Com)), Vec::<String>::new(), "{what}");
     // Free modes are the lowest of their span whatever the frame was.
@@ -141,7 +141,7 @@ fn what_no_frame_can_stand_on_is_refused() {
     let mut settings =
         ConvertSettings { frame: FrameChoice::Interface("root".to_owned()), ..ConvertSettings::default() };
     settings.modes.accuracy = Accuracy::Certified;
-    assert!(convert(&model, &settings, SILENT).expect_err("bounds").has(Code::Usage));
+    assert!(convert(&model, &settings, &Context::QUIET).expect_err("bounds").has(Code::Usage));
 }
 
 /// All numbers of a JSON value, in order.

@@ -9,7 +9,7 @@ use flexbody_body::invariants::{BodyFrame, CauchySchwarz, primary_differences};
 use flexbody_body::verification::verify;
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use hdf5_metno as hdf5;
@@ -34,7 +34,7 @@ fn converted(name: &str, modes: usize) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, ..ConvertSettings::default() };
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     (model, body)
 }
 

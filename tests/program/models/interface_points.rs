@@ -8,7 +8,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::verification::verify;
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{
     CheckedModel, Coupling, ElementShape, Elements, FeModel, NodeSet, RawModel, Reference, skin,
 };
@@ -56,7 +56,7 @@ fn away(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 fn body_of(model: &FeModel, basis: BasisChoice) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(3), ..ModeSettings::default() };
-    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT)
+    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, &Context::QUIET)
         .expect("a body")
         .body
 }

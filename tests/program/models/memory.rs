@@ -5,7 +5,7 @@ use flexbody_base::error::ExitCode;
 use flexbody_body::basis::{ModeSettings, free_surface};
 use flexbody_body::convert::{Conversion, ConvertSettings, convert as convert_model};
 use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
-use flexbody_linalg::progress::{Event, SILENT};
+use flexbody_linalg::context::{Context, Event};
 use flexbody_model::check;
 use flexbody_report::{Facts, Format, RunData, render};
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -62,7 +62,7 @@ fn the_peak_is_within_15_percent_of_the_estimate() {
     let folder = tempfile::tempdir().expect("a folder");
     let raw = block([60, 9, 9], [1.0, 0.2, 0.2]).raw_model(); // 18 300 degrees of freedom
     write_model(folder.path(), &raw, Triangle::Lower);
-    for options in ["", "--factor f32", "--checkpoint search.h5"] {
+    for options in ["", "--factor f32"] {
         let ratio = peak_over_estimate(&report(folder.path(), options));
         assert!((0.85..1.15).contains(&ratio), "`{options}`: {ratio} of the estimate");
     }
@@ -103,9 +103,9 @@ fn where_nothing_fits_the_numbers_are_told_before_any_work() {
             phases.lock().expect("one thread").push(name.to_owned());
         }
     };
-    let settings =
-        ModeSettings { memory: Some(1_000_000), method: Method::Lanczos, ..ModeSettings::default() };
-    let error = free_surface(&model, &settings, &watch).expect_err("too little memory");
+    let settings = ModeSettings { method: Method::Lanczos, ..ModeSettings::default() };
+    let little = Context { memory: Some(1_000_000), ..Context::heard_by(&watch) };
+    let error = free_surface(&model, &settings, &little).expect_err("too little memory");
     assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
     assert_eq!(*phases.lock().expect("one thread"), ["ordering"], "nothing was factored");
 }
@@ -122,23 +122,25 @@ fn a_factor_that_does_not_fit_is_taken_in_single_precision() {
             accuracy: Accuracy::Fast,
             method: Method::Lanczos,
             factor,
-            memory,
             ..ModeSettings::default()
         };
         let settings = ConvertSettings { modes, ..ConvertSettings::default() };
-        convert_model(&model, &settings, SILENT).expect("a body")
+        convert_model(&model, &settings, &Context { memory, ..Context::QUIET }).expect("a body")
     };
-    let plan = |found: &Conversion| found.plan.expect("a sparse factor");
+    let plan = |found: &Conversion| found.plan.clone().expect("a sparse factor");
     let (double, single) =
         (run(FactorChoice::Auto, None), run(FactorChoice::Always(Precision::Single), None));
-    let limit = (plan(&double).bytes + plan(&single).bytes) / 2;
-    assert!(plan(&single).bytes < limit && limit < plan(&double).bytes, "room for one of them");
+    let limit = (plan(&double).bytes() + plan(&single).bytes()) / 2;
+    assert!(plan(&single).bytes() < limit && limit < plan(&double).bytes(), "room for one of them");
     let limited = run(FactorChoice::Auto, Some(limit));
     let told =
         |found: &Conversion| found.diagnostics.iter().filter(|d| d.code() == Code::FactorPrecision).count();
     assert_eq!((told(&limited), told(&double)), (1, 0), "{:?}", limited.diagnostics);
-    assert_eq!((plan(&limited).precision, plan(&double).precision), (Precision::Single, Precision::Double));
-    assert_eq!(2 * plan(&limited).factor_bytes, plan(&double).factor_bytes);
+    assert_eq!(
+        (plan(&limited).precision(), plan(&double).precision()),
+        (Precision::Single, Precision::Double)
+    );
+    assert_eq!(2 * plan(&limited).current().needs.factor_bytes, plan(&double).current().needs.factor_bytes);
     for (a, b) in limited.body.modes().eigenvalue.iter().zip(&double.body.modes().eigenvalue) {
         assert!((a / b - 1.0).abs() < 1e-9, "{a} {b}");
     }
@@ -155,13 +157,14 @@ fn a_proof_that_does_not_fit_is_left_out_and_that_is_said_everywhere() {
             wanted: Wanted::Lowest(2),
             accuracy,
             multigrid_pays: 0.0,
-            memory,
             ..ModeSettings::default()
         };
         let settings = ConvertSettings { modes, ..ConvertSettings::default() };
-        threads.install(|| convert_model(&model, &settings, SILENT)).expect("a body")
+        threads
+            .install(|| convert_model(&model, &settings, &Context { memory, ..Context::QUIET }))
+            .expect("a body")
     };
-    let bytes = |found: &Conversion| found.plan.expect("a sparse factor").bytes;
+    let bytes = |found: &Conversion| found.plan.as_ref().expect("a sparse factor").bytes();
     let (search, all) = (run(Accuracy::Fast, None), run(Accuracy::Standard, None));
     assert!(all.body.certificate().proved_modes.is_some());
     let limit = bytes(&search) + bytes(&search) / 50;

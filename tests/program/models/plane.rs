@@ -11,7 +11,7 @@ use flexbody_body::verification::verify;
 use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_input::{ModelFiles, read_model};
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, NodeSet, RawMatrix, RawModel, UnitLoad, check};
 use nalgebra::{Matrix2, Vector2};
 use oracle::plane::{DENSITY, HEIGHT, LENGTH, YOUNGS, rectangle};
@@ -27,7 +27,7 @@ fn settings(modes: usize, frame: BodyFrame) -> ConvertSettings {
 }
 
 fn converted(model: &FeModel, modes: usize, frame: BodyFrame) -> Conversion {
-    convert(model, &settings(modes, frame), SILENT).expect("a sound body")
+    convert(model, &settings(modes, frame), &Context::QUIET).expect("a sound body")
 }
 
 fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
@@ -119,7 +119,7 @@ fn identities_and_recomputation_hold() {
     for accuracy in [Accuracy::Standard, Accuracy::Certified] {
         let mut settings = settings(9, BodyFrame::Principal);
         settings.modes.accuracy = accuracy;
-        let body = convert(&model, &settings, SILENT).expect("a sound body").body;
+        let body = convert(&model, &settings, &Context::QUIET).expect("a sound body").body;
         let checks = body.identities(BodyFrame::Principal);
         let recomputed = verify(&body, &model).expect("the same nodes");
         for check in checks.iter().chain(&recomputed) {

@@ -8,7 +8,7 @@ use flexbody_body::flex_body::{Carrier, FlexBody};
 use flexbody_body::invariants::{BodyFrame, condense};
 use flexbody_input::{read_manifest, read_model};
 use flexbody_linalg::SymmetricMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{LoadCases, Recording, simulate};
@@ -152,7 +152,7 @@ fn run(body: &FlexBody, text: &str) -> (Recording, Vec<Diagnostic>) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
-    simulate(body, &LoadCases::read_single(&path, None).expect("a scene"), None, |_| ()).expect("a motion")
+    simulate(body, &LoadCases::read_single(&path, None).expect("a scene"), &Context::QUIET).expect("a motion")
 }
 
 #[test]
@@ -277,12 +277,12 @@ fn selections_for_a_carried_body_keep_all_groups_and_hold() {
                 [carried.spin]\nrate = { to = 3, duration = 0.4 }\n[[watch]]\ninterface = \"tip\"\n";
     fs::write(&path, text).expect("written");
     let scene = LoadCases::read_single(&path, None).expect("a scene");
-    let selection = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
+    let selection = select(&body, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");
     assert!(selection.holds() && selection.groups == body.groups());
     assert!(selection.modes.len() < body.n_modes(), "{:?}", selection.modes);
     let small = body.reduced(&selection.modes, selection.groups, Vec::new()).expect("a body");
     let ends = [&body, &small].map(|body| {
-        let recording = simulate(body, &scene, None, |_| ()).expect("a motion").0;
+        let recording = simulate(body, &scene, &Context::QUIET).expect("a motion").0;
         recording.paths[0].deflection.clone()
     });
     let largest = ends[0].iter().map(|d| d.norm()).fold(0.0, f64::max);
@@ -378,7 +378,7 @@ fn the_bracket_that_is_bolted_to_a_shaft_hangs_by_what_the_model_says() {
     let expected = Vector3::new(u[3 * at], u[3 * at + 1], u[3 * at + 2]);
     let body = flexbody_file::read(place.join("b.flex.h5")).expect("a body");
     let described = LoadCases::read_single(place.join("scene.toml"), None).expect("a scene");
-    let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
+    let (recording, _) = simulate(&body, &described, &Context::QUIET).expect("a motion");
     let own = recording.paths[0].deflection[5];
     assert!((own - expected).norm() < 2e-3 * expected.norm(), "{own}, {expected}");
     let weight = 9810.0 * body.invariants().mass();

@@ -3,6 +3,7 @@
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{LoadCases, simulate};
 use hdf5_metno as hdf5;
@@ -100,7 +101,7 @@ fn the_gyroscope_senses_its_rate() {
     scene(folder.path(), &steady);
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let described = LoadCases::read_single(folder.path().join("scene.toml"), None).expect("a scene");
-    let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
+    let (recording, _) = simulate(&body, &described, &Context::QUIET).expect("a motion");
     let (drive, sense) = (1, 2);
     let [w1, w2] = [drive, sense].map(|j| body.modes().eigenvalue[j].sqrt());
     let coupling = body.invariants().w3().expect("held")[(2 * body.n_modes() + drive, sense)];
@@ -142,7 +143,7 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
 
     let body = flexbody_file::read(place.join("body.flex.h5")).expect("a body");
     let described = LoadCases::read_single(place.join("scene.toml"), None).expect("a scene");
-    let (recording, _) = simulate(&body, &described, None, |_| ()).expect("a motion");
+    let (recording, _) = simulate(&body, &described, &Context::QUIET).expect("a motion");
     assert_eq!(recording.time.len(), 41);
     let file = hdf5::File::open(first.path().join("motion.h5")).expect("HDF5");
     let array = |name: &str| file.dataset(name).expect(name).read_raw::<f64>().expect("numbers");
@@ -159,7 +160,7 @@ fn files_hold_what_the_library_computes_and_are_the_same_every_time() {
     let one = body.reduced(&[0], body.groups(), Vec::new()).expect("a mode");
     let mut of_one_mode = described.clone();
     of_one_mode.initial.modes.clear();
-    let (recorded, _) = simulate(&one, &of_one_mode, None, |_| ()).expect("a motion");
+    let (recorded, _) = simulate(&one, &of_one_mode, &Context::QUIET).expect("a motion");
     let single = place.join("single.h5");
     let slot = flexbody_file::OutputSlot::prepare(&single).expect("a place");
     flexbody_file::fill_simulation(&recorded, one.units(), &slot).expect("written");
@@ -281,8 +282,8 @@ fn a_recording_that_does_not_fit_is_refused_before_any_work() {
     scene(folder.path(), "[run]\nduration = 1e-3\noutputs = 1000000\n");
     let body = flexbody_file::read(folder.path().join("body.flex.h5")).expect("a body");
     let described = LoadCases::read_single(folder.path().join("scene.toml"), None).expect("a scene");
-    let error =
-        simulate(&body, &described, Some(1_000_000_000), |_| ()).expect_err("a gigabyte is not enough");
+    let error = simulate(&body, &described, &Context { memory: Some(1_000_000_000), ..Context::QUIET })
+        .expect_err("a gigabyte is not enough");
     assert_eq!(error.diagnostics()[0].code(), Code::MemoryShort);
     assert_eq!(
         error.diagnostics()[0].message(),

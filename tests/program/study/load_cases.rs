@@ -2,7 +2,7 @@
 
 use crate::program::flexbody;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, trace, trace_at};
 use flexbody_study::selection::{Selection, select};
 use oracle::{fixtures, members};
@@ -73,8 +73,9 @@ fn scenes(text: &str) -> LoadCases {
 /// The largest error over its tolerance of the selected body, measured by itself.
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> f64 {
     let own = whole.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
-    let (reference, _) = trace(whole, scene, None, |_| ()).expect("a motion");
-    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, None).expect("a motion");
+    let (reference, _) = trace(whole, scene, &Context::QUIET).expect("a motion");
+    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, &Context::QUIET)
+        .expect("a motion");
     let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
     errors.worst(&scene.requirements.tolerance)
 }
@@ -119,10 +120,10 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     written(place);
     let whole = body(place);
     let cases = LoadCases::read(place.join("cases.toml"), None).expect("cases");
-    let both = select(&whole, &[], &cases, None, SILENT).expect("a selection");
+    let both = select(&whole, &[], &cases, &Context::QUIET).expect("a selection");
     assert!(both.holds() && both.cases.len() == 2, "{both:#?}");
     let select_alone =
-        |case: &Scene| select(&whole, &[], &case.clone().into(), None, SILENT).expect("a selection");
+        |case: &Scene| select(&whole, &[], &case.clone().into(), &Context::QUIET).expect("a selection");
     let alone: Vec<Selection> = cases.iter().map(select_alone).collect();
     assert_ne!(alone[0].groups, alone[1].groups, "the cases need different terms");
     for (own, case) in alone.iter().zip(cases.iter()) {
@@ -143,7 +144,7 @@ fn one_body_serves_every_case_and_holds_what_any_of_them_needs() {
     let fast = &both.cases[1];
     assert!(fast.binds_groups.contains(&TermGroup::W1) && both.cases[0].binds_groups.is_empty(), "{both:#?}");
     // Threads and repetitions change nothing.
-    assert_eq!(both, select(&whole, &[], &cases, None, SILENT).expect("a selection"));
+    assert_eq!(both, select(&whole, &[], &cases, &Context::QUIET).expect("a selection"));
 }
 
 #[test]
@@ -154,9 +155,9 @@ fn a_case_that_needs_nothing_changes_nothing() {
     let one = scenes(&shaken);
     let with_idle = scenes(&format!("{shaken}[[case]]\n{IDLE}"));
     let twice = scenes(&format!("{shaken}[[case]]\n{}[[case.load]]\n{SHAKE}", FAST.replace("fast", "again")));
-    let alone = select(&whole, &[], &one, None, SILENT).expect("a selection");
+    let alone = select(&whole, &[], &one, &Context::QUIET).expect("a selection");
     for cases in [with_idle, twice] {
-        let both = select(&whole, &[], &cases, None, SILENT).expect("a selection");
+        let both = select(&whole, &[], &cases, &Context::QUIET).expect("a selection");
         assert_eq!((both.groups, &both.modes), (alone.groups, &alone.modes), "{:?}", cases[1].case);
         let chosen = both.cases[0].chosen.as_ref().expect("measured");
         assert_eq!(Some(chosen), alone.chosen.as_ref());

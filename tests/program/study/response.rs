@@ -8,7 +8,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawMatrix, RawModel};
 use flexbody_motion::scene::Point;
 use flexbody_study::response::{Band, Complex, Direction, Pair, Place, Response, ResponseSettings, respond};
@@ -43,7 +43,7 @@ fn damped_block(damping: Option<Damping<RawMatrix>>) -> FeModel {
 fn body_of(model: &FeModel, modes: usize, basis: BasisChoice) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, basis, lumped: Vec::new(), ..ConvertSettings::default() };
-    convert(model, &settings, SILENT).expect("a body").body
+    convert(model, &settings, &Context::QUIET).expect("a body").body
 }
 
 fn free(model: &FeModel, modes: usize) -> FlexBody {
@@ -58,8 +58,6 @@ fn over(low: f64, high: f64, solves: usize) -> ResponseSettings {
         damping: None,
         replaces_damping: false,
         tolerance: 0.05,
-        memory: None,
-        longest: None,
     }
 }
 
@@ -68,7 +66,7 @@ fn ends(text: &str) -> Vec<Place> {
 }
 
 fn study(model: &FeModel, body: &FlexBody, from: &str, to: &str, settings: &ResponseSettings) -> Response {
-    respond(Some(model), body, &ends(from), &ends(to), settings, SILENT).expect("a response")
+    respond(Some(model), body, &ends(from), &ends(to), settings, &Context::QUIET).expect("a response")
 }
 
 /// Measured errors of the only pair.
@@ -312,19 +310,19 @@ fn places_that_are_not_there_are_refused() {
     for text in ["nowhere", "9999", "1:rx"] {
         for (from, to) in [(text, "left"), ("left", text)] {
             for model in [Some(&model), None] {
-                let error =
-                    respond(model, &body, &ends(from), &ends(to), &settings, SILENT).expect_err("no place");
+                let error = respond(model, &body, &ends(from), &ends(to), &settings, &Context::QUIET)
+                    .expect_err("no place");
                 assert!(error.has(Code::PlaceUnknown), "{text}: {error:?}");
             }
         }
     }
     let other = block(Some(0.5));
-    assert!(respond(Some(&other), &body, &ends("left"), &ends("left"), &settings, SILENT).is_ok());
+    assert!(respond(Some(&other), &body, &ends("left"), &ends("left"), &settings, &Context::QUIET).is_ok());
     let mesh = Mesh::block(ElementKind::Hex8, [4, 2, 1], [0.5, 0.15, 0.1]);
     let raw = mesh.assemble(&Material::STEEL, MassRule::Consistent).raw_model();
     let longer = FeModel::from_raw(raw).expect("a model").model;
-    let error =
-        respond(Some(&longer), &body, &ends("1"), &ends("2"), &settings, SILENT).expect_err("another model");
+    let error = respond(Some(&longer), &body, &ends("1"), &ends("2"), &settings, &Context::QUIET)
+        .expect_err("another model");
     assert!(error.has(Code::BodyIncomparable), "{error:?}");
     assert_eq!(Place::parse("3:z"), Place { point: Point::Node(3), directions: vec![Direction::Z] });
 }

@@ -5,9 +5,9 @@ use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
 use flexbody_body::convert::ConvertSettings;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_eigen::{Resume, Wanted};
+use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Damping, FeModel, RawModel};
 use flexbody_motion::integration::free_oscillation;
 use flexbody_motion::scene::{LoadCases, Scene, simulate};
@@ -59,7 +59,7 @@ const RAYLEIGH: &str = "[damping]\nrayleigh = { alpha = 900.0, beta = 2e-7 }\n";
 fn a_simulation_takes_one_damping() {
     let (damped, bare) = (folder(RAYLEIGH), folder(""));
     let q = |place: &Path, name: &str| {
-        simulate(&body(place), &scene(place, name), None, |_| ())
+        simulate(&body(place), &scene(place, name), &Context::QUIET)
             .map(|(recording, _)| recording.states.into_iter().map(|state| state.q).collect::<Vec<_>>())
     };
     let error = q(damped.path(), "own.toml").expect_err("two dampings");
@@ -149,8 +149,7 @@ fn estimates_take_the_damping_that_replaces_that_of_the_model() {
     let lacks = |damping: Option<Damping<_>>| -> Vec<f64> {
         let model = FeModel::from_raw(RawModel { damping, ..raw.clone() }).expect("sound").model;
         let tailoring = Tailoring { settings: settings.clone(), by_band: false, of_motion: false };
-        let made =
-            tailoring.convert(&model, &scene.clone().into(), Resume::default(), SILENT).expect("a body");
+        let made = tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
         made.rounds[0].iter().map(|round| round.worst).collect()
     };
     let bare = lacks(None);
@@ -182,7 +181,7 @@ fn bands_and_ratios_beyond_the_critical_damping_are_those_of_the_modes() {
         let text = format!("[run]\nduration = {duration}\noutputs = 20\n{modes}[damping]\n{damping}\n");
         fs::write(place.join("fades.toml"), text).expect("written");
         let (recording, _) =
-            simulate(&body(place), &scene(place, "fades.toml"), None, |_| ()).expect("a motion");
+            simulate(&body(place), &scene(place, "fades.toml"), &Context::QUIET).expect("a motion");
         for (time, state) in recording.time.iter().zip(&recording.states) {
             for (j, (lambda, ratio)) in body(place).modes().eigenvalue.iter().zip(ratio_of).enumerate() {
                 let decay = ratio * lambda.sqrt();

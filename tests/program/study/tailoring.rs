@@ -5,9 +5,9 @@ use flexbody_base::provenance::{SourceFile, sha256_hex};
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::ConvertSettings;
 use flexbody_body::flex_body::{TermGroup, TermGroups};
-use flexbody_eigen::{Resume, Wanted};
+use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::LoadCases;
 use flexbody_study::tailoring::{Tailoring, convert_for};
@@ -61,8 +61,7 @@ fn a_mild_scene_never_forms_w() {
         &model,
         &Tailoring { settings, by_band: false, of_motion: false },
         &scene.clone().into(),
-        Resume::default(),
-        SILENT,
+        &Context::QUIET,
     )
     .expect("converts");
     assert_eq!(conversion.condensed_columns, 4, "the columns of rigid motion");

@@ -8,14 +8,14 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::{FlexBody, MassStructure, Storage, TermGroups};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{Axes, Initial, LoadCases, ModeStart, PerQuantity, Scene, Scheme, simulate};
 use flexbody_study::reference::PART_OF_FINE;
 use flexbody_study::selection::select;
 use flexbody_study::trade::{
-    Allowed, CandidateKind, Conversions, LumpedMass, Measured, Recommendation, ReferenceKind, Source, Trade,
-    TradeRow, TradeSettings, WantedBodies, conversions, front, trade,
+    CandidateKind, Conversions, LumpedMass, Measured, Recommendation, ReferenceKind, Source, Trade, TradeRow,
+    TradeSettings, WantedBodies, conversions, front, trade,
 };
 use nalgebra::Vector3;
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -26,7 +26,7 @@ use oracle::scenes::nothing_happens;
 use serde_json::Value;
 use std::fs;
 
-const QUICK: TradeSettings<'static> = TradeSettings { repeat: 1, memory: None, reserved: &[], longest: None };
+const QUICK: TradeSettings<'static> = TradeSettings { repeat: 1, reserved: &[] };
 
 /// A free tumble with so many radians per unit of time about an axis between the principal ones, over `turns`
 /// turns.
@@ -39,8 +39,14 @@ fn tumble(spin: f64, turns: f64) -> Scene {
 }
 
 fn study(body: FlexBody, scene: &Scene) -> Trade {
-    trade(&[Source::new("body", body, None).expect("a body")], &scene.clone().into(), None, &QUICK, SILENT)
-        .expect("a study")
+    trade(
+        &[Source::new("body", body, None).expect("a body")],
+        &scene.clone().into(),
+        None,
+        &QUICK,
+        &Context::QUIET,
+    )
+    .expect("a study")
 }
 
 fn first_rate(body: &FlexBody) -> f64 {
@@ -123,7 +129,7 @@ fn a_lumped_mass_has_the_error_of_two_simulations() {
     // So many instants that a peak between them is no larger by much.
     let mut often = scene.clone();
     often.run.outputs = 6000;
-    let [a, b] = [&body, &other].map(|body| simulate(body, &often, None, |_| ()).expect("a motion").0);
+    let [a, b] = [&body, &other].map(|body| simulate(body, &often, &Context::QUIET).expect("a motion").0);
     let energy = |q: &mut dyn Iterator<Item = f64>| -> f64 {
         q.zip(&body.modes().eigenvalue).map(|(q, lambda)| 0.5 * lambda * q * q).sum()
     };
@@ -232,7 +238,7 @@ fn wanted(modes: usize) -> WantedBodies {
 fn without_scene(model: &FeModel, modes: usize) -> Conversions {
     let mut scene = tumble(1.0, 1.0);
     scene.run.duration = None;
-    conversions(model, &scene.clone().into(), wanted(modes), Allowed::default(), SILENT).expect("bodies")
+    conversions(model, &scene.clone().into(), wanted(modes), &Context::QUIET).expect("bodies")
 }
 
 #[test]
@@ -240,8 +246,7 @@ fn a_reference_is_enriched_for_the_scene_and_tells_what_it_lacks() {
     let model = model();
     let rate = first_rate(without_scene(&model, 4).sources[0].body());
     let scene = tumble(0.15 * rate, 0.5);
-    let made =
-        conversions(&model, &scene.clone().into(), wanted(4), Allowed::default(), SILENT).expect("bodies");
+    let made = conversions(&model, &scene.clone().into(), wanted(4), &Context::QUIET).expect("bodies");
     let [lacks] = &made.lacks[..] else { panic!("one scene: {:?}", made.lacks) };
     let (first, own) = (&lacks[0], lacks.last().expect("an estimate"));
     assert_eq!(own.modes, made.sources[0].body().n_modes());
@@ -259,7 +264,8 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
     let rate = first_rate(sources[0].body());
     let mut scene = tumble(0.15 * rate, 0.5);
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
-    let found = trade(&sources, &scene.clone().into(), Some(&model), &QUICK, SILENT).expect("a study");
+    let found =
+        trade(&sources, &scene.clone().into(), Some(&model), &QUICK, &Context::QUIET).expect("a study");
     assert_eq!(found.reference, ReferenceKind::Nodal);
     let stress = |row: &TradeRow| {
         let measured = row.outcome.as_ref().expect("a motion");
@@ -283,7 +289,7 @@ fn conversions_are_measured_against_the_motion_of_all_nodes() {
         (of("4 free modes, residual vectors", TermGroups::ALL), of("4 free modes", TermGroups::ALL));
     assert!(whole < with && with < without && without < one, "{whole} {with} {without} {one}");
     // The same against the largest body: apart by no more than that is from the truth.
-    let reduced = trade(&sources, &scene.clone().into(), None, &QUICK, SILENT).expect("a study");
+    let reduced = trade(&sources, &scene.clone().into(), None, &QUICK, &Context::QUIET).expect("a study");
     let mut both = 0;
     for a in &found.rows {
         // Ladders differ: which sets of groups are hopeless is judged by either reference.
@@ -303,15 +309,15 @@ fn a_fine_reference_stands_for_the_motion_of_all_nodes() {
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-9 };
     let lacking = |fine: bool| {
         let wanted = WantedBodies { modes: 4, fine };
-        let made =
-            conversions(&model, &scene.clone().into(), wanted, Allowed::default(), SILENT).expect("bodies");
+        let made = conversions(&model, &scene.clone().into(), wanted, &Context::QUIET).expect("bodies");
         (made.lacks[0].last().expect("an estimate").worst, made.sources)
     };
     let (usual, _) = lacking(false);
     let (fine, sources) = lacking(true);
     assert!(fine <= PART_OF_FINE && usual > PART_OF_FINE, "{fine} {usual}");
     // As all nodes tell, whom nobody asked.
-    let found = trade(&sources[..1], &scene.clone().into(), Some(&model), &QUICK, SILENT).expect("a study");
+    let found =
+        trade(&sources[..1], &scene.clone().into(), Some(&model), &QUICK, &Context::QUIET).expect("a study");
     let whole = found.rows[0].outcome.as_ref().expect("a motion").worst();
     assert!((0.3..3.0).contains(&(fine / whole)), "{fine} {whole}");
 }
@@ -323,7 +329,7 @@ fn a_wholly_lumped_mass_has_modes_of_its_own() {
     assert!(diagnostics.iter().all(|one| one.code() != Code::LumpedWithoutBody), "{diagnostics:?}");
     let modes = ModeSettings { wanted: Wanted::Lowest(6), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, lumped_modes: true, ..ConvertSettings::default() };
-    let pipelines = convert(&model, &settings, SILENT).expect("a body").lumped_modes;
+    let pipelines = convert(&model, &settings, &Context::QUIET).expect("a body").lumped_modes;
     assert_eq!(pipelines.len(), 2);
     for pipeline in &pipelines {
         let of = |source: &&Source| source.lumped_by() == Some(&pipeline.scheme);
@@ -336,7 +342,7 @@ fn a_wholly_lumped_mass_has_modes_of_its_own() {
         assert!((pipeline.eigenvalues[0] / exact - 1.0).abs() > 1e-3, "{pipeline:?}");
     }
     let scene = tumble(0.05 * first_rate(sources[0].body()), 0.1);
-    let found = trade(&sources, &scene.clone().into(), None, &QUICK, SILENT).expect("a study");
+    let found = trade(&sources, &scene.clone().into(), None, &QUICK, &Context::QUIET).expect("a study");
     let whole = found.rows.iter().filter(|row| matches!(row.candidate.lumped, Some(LumpedMass::Whole(_))));
     let worst: Vec<f64> = whole.map(|row| row.outcome.as_ref().expect("a motion").worst()).collect();
     assert!(worst.len() == 2 && worst.iter().all(|worst| *worst > 0.0), "{worst:?}");
@@ -351,18 +357,19 @@ fn conserving_scenes_with_damping_are_measured_against_the_nodes() {
     let mut scene = tumble(0.15 * rate, 0.3);
     scene.requirements.damping = Some(0.02.into());
     scene.run.scheme = Scheme::Conserving { order: 4, step: Some(0.1 / rate) };
-    let found = trade(&sources, &scene.clone().into(), Some(&model), &QUICK, SILENT).expect("a study");
+    let found =
+        trade(&sources, &scene.clone().into(), Some(&model), &QUICK, &Context::QUIET).expect("a study");
     let nodal = found.cases[0].nodal.expect("the nodes are the reference");
     assert_eq!((nodal.rows, nodal.scheme, nodal.error), (model.rows().len(), scene.run.scheme, None));
     let row = |at: usize| found.rows[at].outcome.as_ref().expect("a motion");
     let first = row(0).deciding();
     assert!(first.worst > 0.0 && first.errors.stress.expect("deformed") < 0.1, "{:?}", first.errors);
-    let full = trade(&sources, &scene.clone().into(), None, &QUICK, SILENT).expect("a study");
+    let full = trade(&sources, &scene.clone().into(), None, &QUICK, &Context::QUIET).expect("a study");
     assert!(full.cases[0].nodal.is_none());
     assert_eq!(full.rows[0].outcome.as_ref().expect("a motion").worst(), 0.0);
     // Work that takes too long is refused before any.
-    let hasty = TradeSettings { longest: Some(1e-6), ..QUICK };
-    let error = trade(&sources, &scene.clone().into(), Some(&model), &hasty, SILENT).expect_err("refused");
+    let hasty = Context { longest: Some(1e-6), ..Context::QUIET };
+    let error = trade(&sources, &scene.clone().into(), Some(&model), &QUICK, &hasty).expect_err("refused");
     assert_eq!(error.diagnostics()[0].code(), Code::WorkLong);
 }
 
@@ -376,7 +383,7 @@ fn a_study_and_a_selection_take_the_same_modes() {
     scene.requirements.tolerance.errors.stress = 0.2;
     let found = study(body.clone(), &scene);
     let row = recommended(&found);
-    let taken = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
+    let taken = select(&body, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");
     assert!(taken.holds() && taken.modes.len() < 9, "{:?}", taken.modes);
     assert!(row.candidate.modes.len() < 9 && row.candidate.modes.len() <= taken.modes.len(), "{row:?}");
     if row.candidate.groups == taken.groups {
@@ -413,7 +420,7 @@ fn a_candidate_is_as_good_as_it_is_in_the_worst_case() {
     let sources = [Source::new("body", body.clone(), None).expect("a body")];
     let settings = TradeSettings { reserved: &[0.1], ..QUICK };
     let cases = LoadCases::new(scenes.to_vec()).expect("two cases");
-    let both = trade(&sources, &cases, None, &settings, SILENT).expect("a study");
+    let both = trade(&sources, &cases, None, &settings, &Context::QUIET).expect("a study");
     let alone = scenes.each_ref().map(|scene| study(body.clone(), scene));
     let most = [0.9, 1.0];
     let mut shared = 0;

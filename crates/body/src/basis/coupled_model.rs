@@ -7,7 +7,7 @@ use super::modal_basis::problem_of_span;
 use super::rigid_modes::rigid_modes;
 use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
-use flexbody_eigen::{EigenProblem, Resume};
+use flexbody_eigen::EigenProblem;
 use flexbody_linalg::{Dependents, Elimination, Pencil, ReducedPencil, combine, gram, larger};
 use flexbody_model::{Coupling, FeModel, NodeSet};
 use std::borrow::Cow;
@@ -120,7 +120,7 @@ impl<'m> CoupledModel<'m> {
 
     /// The eigenproblem for responses; nothing is searched in it, so no estimate of an eigenvalue is needed.
     pub(super) fn problem<'a>(&'a self, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
-        let whole = problem_of_span(self.model, rigid, Resume::default());
+        let whole = problem_of_span(self.model, rigid);
         match &self.coupling {
             Some(own) => EigenProblem { pencil: own.reduced.pencil(), order: None, ..whole },
             None => whole,

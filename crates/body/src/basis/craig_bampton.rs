@@ -22,9 +22,9 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_eigen::{
     Accuracy, Completeness, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, Proof,
-    ResponseAccuracy, Resume, Wanted, modes_of_span, solve, static_responses_twice,
+    ResponseAccuracy, Wanted, modes_of_span, solve, static_responses_twice,
 };
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Elimination, ReducedPencil, add_combination, column_products, combine, gram, side_by_side,
     subtract_combination, symmetric_eigen,
@@ -47,14 +47,14 @@ impl Basis for CraigBampton {
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
-        let Task { model, settings, resume, watch } = *task;
-        check_possible(model, settings)?;
+        let Task { model, settings, context } = *task;
+        check_possible(model, settings, context)?;
         let joints = coupled_interfaces(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
-        let parts = Parts::new(model, &joints, settings, watch)?;
+        let parts = Parts::new(model, &joints, settings, context)?;
         let rigid = rigid_modes(model, &model.pencil())?;
-        let problem = problem_of_span(model, rigid.as_ref(), resume);
-        watch(Event::Phase("pseudo-free-surface modes"));
+        let problem = problem_of_span(model, rigid.as_ref());
+        context.phase("pseudo-free-surface modes");
         let failed = |failure| explain(model, failure);
         let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
         let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
@@ -67,15 +67,14 @@ impl Basis for CraigBampton {
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
         let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
         let span = found.vectors;
-        let mut solution = modes_of_span(&problem, span.clone(), &all, watch).map_err(failed)?;
+        let mut solution = modes_of_span(&problem, span.clone(), &all, context).map_err(failed)?;
         let parted = gram(span.as_ref(), problem.pencil.apply_mass(solution.vectors.as_ref()).as_ref());
         let provenance = parts.provenance(&found.kept, parted.as_ref());
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
         let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
-        solution.plan = parts.fixed.plan.map(|plan| Plan { bytes: plan.bytes.max(bytes), ..plan });
-        add_work(&mut solution, &parts.fixed);
+        solution.plan = parts.fixed.plan.map(|plan| plan.with_bytes(|search| search.max(bytes)));
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
         basis.provenance = provenance;
         basis.coordinates = Some(coordinates);
@@ -87,7 +86,7 @@ impl Basis for CraigBampton {
 
 /// Refuses what the basis cannot promise, and what does not fit the memory, before anything of that size is
 /// made.
-fn check_possible(model: &FeModel, settings: &ModeSettings) -> Result<()> {
+fn check_possible(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<()> {
     if settings.accuracy == Accuracy::Certified {
         let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
         return Err(Diagnostic::new(Code::Usage, message).with_help("use --accuracy standard").into());
@@ -97,7 +96,8 @@ fn check_possible(model: &FeModel, settings: &ModeSettings) -> Result<()> {
         _ => rigid_count(model.dimension()),
     });
     let bytes = shape_bytes(model.pencil().n(), coordinates.sum());
-    if let Some(available) = settings.memory.filter(|&available| bytes > available) {
+    let available = context.available();
+    if bytes > available {
         return Err(explain(model, EigenFailure::Memory { bytes, available }));
     }
     Ok(())
@@ -128,12 +128,12 @@ impl<'a> Parts<'a> {
         model: &FeModel,
         joints: &'a [CoupledInterface],
         settings: &ModeSettings,
-        watch: Watch<'_>,
+        context: &Context<'_>,
     ) -> Result<Self> {
-        watch(Event::Phase("interfaces"));
+        context.phase("interfaces");
         let pencil = model.pencil();
         let failed = |failure| explain(model, failure);
-        let elimination = hold(pencil.n(), joints, settings.memory).map_err(failed)?;
+        let elimination = hold(pencil.n(), joints, context.memory).map_err(failed)?;
         if elimination.is_empty() {
             let message = "the interfaces hold every node of the body: nothing is left to deform";
             return Err(Diagnostic::new(Code::InterfaceCoupling, message)
@@ -157,26 +157,24 @@ impl<'a> Parts<'a> {
             first_estimate,
             input_error: input_error(model),
             order: None,
-            resume: Resume::default(),
         };
         let in_model = |failure| failed(expanded(failure, &elimination));
         let own = reduced.bytes();
-        let left =
-            ModeSettings { memory: settings.memory.map(|bytes| bytes.saturating_sub(own)), ..*settings };
-        let mut fixed = fixed_modes(&problem, &left, watch).map_err(in_model)?;
-        fixed.plan = fixed.plan.map(|plan| Plan { bytes: plan.bytes + own, ..plan });
-        watch(Event::Phase("constraint modes"));
+        let left = Context { memory: context.memory.map(|bytes| bytes.saturating_sub(own)), ..*context };
+        let mut fixed = fixed_modes(&problem, settings, &left).map_err(in_model)?;
+        fixed.plan = fixed.plan.map(|plan| plan.with_bytes(|search| search + own));
+        context.phase("constraint modes");
         let lowest = fixed.eigenvalues.first().copied().or(fixed.next_eigenvalue).unwrap_or(first_estimate);
-        let precision = fixed.plan.map_or(Precision::Double, |plan| plan.precision);
+        let precision = fixed.plan.as_ref().map_or(Precision::Double, Plan::precision);
         let mut loads = elimination.restrict(pencil.apply_stiffness(moved.as_ref()).as_ref());
         loads *= faer::Scale(-1.0);
         let inertia = |interior: &Mat<f64>| {
             let constraint = &moved + elimination.expand(interior.as_ref());
             elimination.restrict(pencil.apply_mass(constraint.as_ref()).as_ref())
         };
-        let (accuracy, counters) = (ResponseAccuracy::FULL, &mut fixed.counters);
+        let accuracy = ResponseAccuracy::FULL;
         let [interior, correction] =
-            static_responses_twice(&problem, loads, inertia, lowest, precision, accuracy, counters)
+            static_responses_twice(&problem, loads, inertia, lowest, precision, accuracy, context)
                 .map_err(in_model)?;
         let lacking = lacking(&problem, correction, &fixed);
         let mut constraint = moved + elimination.expand(interior.as_ref());
@@ -411,12 +409,12 @@ const KNOWN: f64 = 1e-8;
 fn fixed_modes(
     problem: &EigenProblem<'_>,
     settings: &ModeSettings,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> std::result::Result<EigenSolution, EigenFailure> {
     if settings.wanted != Wanted::Lowest(0) {
-        return solve(problem, settings, watch);
+        return solve(problem, settings, context);
     }
-    let first = solve(problem, &ModeSettings { wanted: Wanted::Lowest(1), ..*settings }, watch)?;
+    let first = solve(problem, &ModeSettings { wanted: Wanted::Lowest(1), ..*settings }, context)?;
     Ok(EigenSolution {
         next_eigenvalue: first.eigenvalues.first().copied(),
         eigenvalues: Vec::new(),
@@ -516,12 +514,4 @@ fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
 /// Bytes for so many shapes of n rows.
 fn shape_bytes(n: usize, count: usize) -> u64 {
     8 * COPIES * (n as u64) * (count as u64)
-}
-
-/// Adds the work of the fixed-interface problem.
-fn add_work(solution: &mut EigenSolution, fixed: &EigenSolution) {
-    let own = solution.counters;
-    solution.counters = fixed.counters;
-    solution.counters.stiffness_columns += own.stiffness_columns;
-    solution.counters.mass_columns += own.mass_columns;
 }

@@ -9,10 +9,9 @@ use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_eigen::{
-    Accuracy, EigenProblem, EigenSolution, FactorChoice, Multigrid, Precision, Proof, Resume, Wanted,
-    energy_noise, planned_bytes, solve,
+    Accuracy, EigenProblem, EigenSolution, FactorChoice, Plan, Proof, Wanted, Way, energy_noise, plan, solve,
 };
-use flexbody_linalg::progress::Watch;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{Pencil, Tall, combine, contiguous_mut, gram, subtract_combination, symmetric_eigen};
 use flexbody_model::{FeModel, centre_and_length};
 use rayon::prelude::*;
@@ -35,9 +34,9 @@ impl Basis for FreeSurface {
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
         if self.residual_vectors.is_empty() {
-            let Task { model, settings, resume, watch } = *task;
-            let mut free = free_surface_resumed(model, settings, resume, watch)?;
-            free.truncation = interface_truncation(model, &free.solution, settings, watch);
+            let Task { model, settings, context } = *task;
+            let mut free = free_surface(model, settings, context)?;
+            free.truncation = interface_truncation(model, &free.solution, context);
             return Ok(free);
         }
         free_modes_with(&self.residual_vectors, "residual vector", task)
@@ -46,32 +45,19 @@ impl Basis for FreeSurface {
 
 /// Free-surface modes and the static responses to `loads`, each called `what` where modes are named after it.
 pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> Result<ModalBasis> {
-    let Task { model, settings, resume, watch } = *task;
+    let Task { model, settings, context } = *task;
     let rigid = rigid_modes(model, &model.pencil())?;
-    let problem = problem_of_span(model, rigid.as_ref(), resume);
+    let problem = problem_of_span(model, rigid.as_ref());
     let loads = NamedLoads::new(model, loads, what, settings)?;
-    let free = free_surface_resumed(model, settings, resume, watch)?;
-    with_residual_vectors(model, &problem, free, &loads, settings, watch)
+    let free = free_surface(model, settings, context)?;
+    with_residual_vectors(model, &problem, free, &loads, settings, context)
 }
 
 /// Computes the free-surface modes of `model`.
 ///
 /// # Errors
 /// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
-pub fn free_surface(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<ModalBasis> {
-    free_surface_resumed(model, settings, Resume::default(), watch)
-}
-
-/// The same with a search that starts where an earlier one stood, or that is kept.
-///
-/// # Errors
-/// As [`free_surface`].
-pub fn free_surface_resumed(
-    model: &FeModel,
-    settings: &ModeSettings,
-    resume: Resume<'_>,
-    watch: Watch<'_>,
-) -> Result<ModalBasis> {
+pub fn free_surface(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<ModalBasis> {
     let pencil = model.pencil();
     let rigid = rigid_modes(model, &pencil)?;
     let first_estimate = polynomial_estimate(model, &pencil, rigid.as_ref());
@@ -81,9 +67,8 @@ pub fn free_surface_resumed(
         first_estimate,
         input_error: input_error(model),
         order: Some(model.elimination()),
-        resume,
     };
-    let solution = solve(&problem, settings, watch).map_err(|failure| explain(model, failure))?;
+    let solution = solve(&problem, settings, context).map_err(|failure| explain(model, failure))?;
     let mut basis = ModalBasis::new(model, &problem, settings, solution, "free mode")?;
     describe(&basis.solution, settings, &problem, &mut basis.diagnostics);
     basis.diagnostics.extend(single_precision_note(&basis.solution, settings));
@@ -92,19 +77,21 @@ pub fn free_surface_resumed(
 
 /// What the user should know about the precision of the factor.
 pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
-    let plan = solution.plan.filter(|_| settings.factor == FactorChoice::Auto)?;
-    let message = match plan.precision {
-        _ if plan.multigrid == Multigrid::Used => {
+    let plan = solution.plan.as_ref().filter(|_| settings.factor == FactorChoice::Auto)?;
+    let message = match plan.current().way {
+        Way::Cycles => {
             "no factor: the modes are found by cycles over levels of groups of nodes, and corrected in double precision"
         }
-        _ if plan.multigrid == Multigrid::Failed => {
+        _ if plan.has_failed(Way::Cycles) => {
             "cycles over levels of groups of nodes do not converge for this model: factored instead"
         }
-        Precision::Single => "the factor is in single precision; the modes are corrected in double precision",
-        Precision::Double if plan.single_failed => {
+        Way::SinglePrecision => {
+            "the factor is in single precision; the modes are corrected in double precision"
+        }
+        _ if plan.has_failed(Way::SinglePrecision) => {
             "a single-precision factor is too poor for the conditioning of this model: factored in double precision"
         }
-        Precision::Double => return None,
+        _ => return None,
     };
     Some(Diagnostic::new(Code::FactorPrecision, message))
 }
@@ -176,14 +163,15 @@ pub fn first_eigenvalue_estimate(model: &FeModel, rigid: MatRef<'_, f64>) -> f64
     polynomial_estimate(model, &model.pencil(), rigid)
 }
 
-/// Bytes that the search for the free modes of a model holds at the most.
+/// Returns the plan of the search for the free modes of a model: the attempts that can be made within the limits of
+/// `context`, and what they take.
 ///
 /// # Errors
-/// Those of the analysis of a model that has no factor.
-pub fn memory_estimate(model: &FeModel, settings: &ModeSettings, watch: Watch<'_>) -> Result<u64> {
+/// Those of the analysis of a model that has no factor; FB601 and FB604 where no attempt is within the limits.
+pub fn search_plan(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<Plan> {
     let rigid = rigid_modes(model, &model.pencil())?;
-    let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
-    planned_bytes(&problem, settings, watch).map_err(|failure| explain(model, failure))
+    let problem = problem_of_span(model, rigid.as_ref());
+    plan(&problem, settings, context).map_err(|failure| explain(model, failure))
 }
 
 /// The smallest Rayleigh quotient of polynomial fields, M-orthogonal to the rigid modes: an upper bound of the first

@@ -102,9 +102,9 @@ impl Basis for ImportedShapes {
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
-        let Task { model, settings, resume, watch } = *task;
+        let Task { model, settings, context } = *task;
         let rigid = rigid_modes(model, &model.pencil())?;
-        let problem = problem_of_span(model, rigid.as_ref(), resume);
+        let problem = problem_of_span(model, rigid.as_ref());
         let criterion = self.dependent();
         let (one, several) = self.names();
         let failed = |failure| explain(model, failure);
@@ -115,7 +115,7 @@ impl Basis for ImportedShapes {
             let message = format!("none of {} {several} deforms the body", self.shapes.ncols());
             return Err(Error::new([vec![Diagnostic::new(Code::ShapesNone, message)], notes].concat()));
         }
-        let solution = modes_of_span(&problem, independent.vectors, settings, watch).map_err(failed)?;
+        let solution = modes_of_span(&problem, independent.vectors, settings, context).map_err(failed)?;
         let mut basis = ModalBasis::new(model, &problem, settings, solution, one)?;
         let compared = self
             .stated

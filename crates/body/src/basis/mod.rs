@@ -31,9 +31,7 @@ pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;
 /// What is asked for.
 pub use flexbody_eigen::EigenSettings as ModeSettings;
-pub use free_surface::{
-    FreeSurface, first_eigenvalue_estimate, free_surface, free_surface_resumed, memory_estimate,
-};
+pub use free_surface::{FreeSurface, first_eigenvalue_estimate, free_surface, search_plan};
 pub use imported::ImportedShapes;
 pub use interface_coordinates::{CoordinatesInModelAxes, InterfaceCoordinates};
 pub use kind::BasisKind;

@@ -4,8 +4,8 @@ use super::{BasisKind, CoordinatesInModelAxes, FixedInterface, ModeSettings};
 use faer::MatRef;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_eigen::{EigenProblem, EigenSolution, Resume, Wanted, energy_noise};
-use flexbody_linalg::progress::Watch;
+use flexbody_eigen::{EigenProblem, EigenSolution, Wanted, energy_noise};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, larger};
 use flexbody_model::FeModel;
 
@@ -23,17 +23,15 @@ pub trait Basis {
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis>;
 }
 
-/// What a basis is computed for.
+/// The model and the settings that a basis is computed for.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
     /// The model.
     pub model: &'a FeModel,
     /// Which modes and how good.
     pub settings: &'a ModeSettings,
-    /// Where a search starts, and who keeps it.
-    pub resume: Resume<'a>,
-    /// Who listens.
-    pub watch: Watch<'a>,
+    /// Limits, listener and counter of the work.
+    pub context: &'a Context<'a>,
 }
 
 /// What a basis lacks of the static response x = K^+ f to a load: |x - x_basis| / |x| in the norm of K, which
@@ -89,21 +87,10 @@ pub(super) fn input_error(model: &FeModel) -> f64 {
 
 /// The eigenproblem of a model for vectors that are there already: nothing is searched, so no estimate is
 /// needed.
-pub(super) fn problem_of_span<'a>(
-    model: &'a FeModel,
-    rigid: MatRef<'a, f64>,
-    resume: Resume<'a>,
-) -> EigenProblem<'a> {
+pub(super) fn problem_of_span<'a>(model: &'a FeModel, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
     let first_estimate = f64::INFINITY;
     let order = Some(model.elimination());
-    EigenProblem {
-        pencil: model.pencil(),
-        rigid,
-        first_estimate,
-        input_error: input_error(model),
-        order,
-        resume,
-    }
+    EigenProblem { pencil: model.pencil(), rigid, first_estimate, input_error: input_error(model), order }
 }
 
 impl ModalBasis {

@@ -4,7 +4,8 @@ use super::coupled_model::CoupledModel;
 use super::failure::explain;
 use faer::Mat;
 use flexbody_base::error::Result;
-use flexbody_eigen::{Counters, EigenFailure, dynamic_responses_twice};
+use flexbody_eigen::{EigenFailure, dynamic_responses_twice};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{combine, gram, side_by_side, subtract_combination};
 use nalgebra::DMatrix;
 
@@ -41,7 +42,7 @@ pub fn oscillating_responses(
         model.pencil().apply_mass(x.as_ref())
     };
     let all = side_by_side(&[model.restrict(loads).as_ref(), conditions.as_ref()]);
-    let [_, mut y] = match dynamic_responses_twice(&problem, all, further, square, &mut Counters::default()) {
+    let [_, mut y] = match dynamic_responses_twice(&problem, all, further, square, &Context::QUIET) {
         Ok(responses) => responses,
         Err(EigenFailure::Inaccurate { .. }) => return Ok(None),
         Err(failure) => return Err(explain(model.model(), failure)),

@@ -15,10 +15,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::provenance::SourceFile;
 use flexbody_eigen::{
-    Accuracy, Counters, EigenFailure, EigenProblem, EigenSolution, Multigrid, Precision, ResponseAccuracy,
-    Resume, Wanted, dynamic_responses, modes_of_span, static_responses, static_responses_twice,
+    Accuracy, EigenFailure, EigenProblem, EigenSolution, Plan, Precision, ResponseAccuracy, Wanted, Way,
+    dynamic_responses, modes_of_span, static_responses, static_responses_twice,
 };
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{add_combination, column_products, gram, side_by_side};
 use flexbody_model::{Coupling, FeModel, InertialRows, NodeSet, RawShapes};
 use nalgebra::Vector3;
@@ -58,8 +58,7 @@ pub fn free_static_responses_twice(
     let (precision, accuracy) = (Precision::Double, ResponseAccuracy::ROUGH);
     let further = |x: &Mat<f64>| model.restrict(further(&model.expand(x)));
     let loads = model.restrict(loads);
-    let counters = &mut Counters::default();
-    let found = static_responses_twice(&problem, loads, further, first, precision, accuracy, counters);
+    let found = static_responses_twice(&problem, loads, further, first, precision, accuracy, &Context::QUIET);
     let both = found.map_err(|failure| explain(model.model(), failure))?;
     Ok(both.map(|x| model.expand(&x).into_owned()))
 }
@@ -275,33 +274,29 @@ pub(super) fn with_residual_vectors(
     free: ModalBasis,
     loads: &NamedLoads,
     settings: &ModeSettings,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<ModalBasis> {
-    watch(Event::Phase(&format!("{}s", loads.what)));
+    context.phase(&format!("{}s", loads.what));
     let failed = |failure: EigenFailure| explain(model, failure);
     let modes = &free.solution.vectors;
-    let mut counters = free.solution.counters;
-    let beside = beside_modes(model, problem, &free.solution, loads, ResponseAccuracy::FULL, &mut counters)?;
+    let beside = beside_modes(model, problem, &free.solution, loads, ResponseAccuracy::FULL, context)?;
     let responses = Responses::new(problem, &free.solution, loads, beside);
     let added =
         responses.added(problem, modes.as_ref()).ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
     let span = side_by_side(&[modes.as_ref(), added.vectors.as_ref()]);
     let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
-    let ritz = modes_of_span(problem, span.clone(), &all, watch).map_err(failed)?;
+    let ritz = modes_of_span(problem, span.clone(), &all, context).map_err(failed)?;
     let parts = gram(span.as_ref(), problem.pencil.apply_mass(ritz.vectors.as_ref()).as_ref());
     let provenance = added.provenance(loads, parts.as_ref(), modes.ncols());
     let truncation = responses.truncation(problem, &ritz);
     let mut notes = free.diagnostics;
     notes.extend(added.note(loads));
-    counters.stiffness_columns += ritz.counters.stiffness_columns;
-    counters.mass_columns += ritz.counters.mass_columns;
     // What was proved of the free modes stays: the Ritz values of the others lie above the next eigenvalue.
     let solution = EigenSolution {
         eigenvalues: ritz.eigenvalues,
         vectors: ritz.vectors,
         residuals: ritz.residuals,
         rounding_floors: ritz.rounding_floors,
-        counters,
         ..free.solution
     };
     let mut basis = ModalBasis::new(model, problem, settings, solution, "")?;
@@ -314,35 +309,34 @@ pub(super) fn with_residual_vectors(
 pub(super) fn interface_truncation(
     model: &FeModel,
     free: &EigenSolution,
-    settings: &ModeSettings,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Vec<Truncation> {
-    let has_levels = free.plan.is_some_and(|plan| plan.multigrid == Multigrid::Used);
-    let unknown = has_levels || free.vectors.ncols() == 0 || !responses_fit(model, free, settings);
+    let has_levels = free.plan.as_ref().is_some_and(|plan| plan.current().way == Way::Cycles);
+    let unknown = has_levels || free.vectors.ncols() == 0 || !responses_fit(model, free, context);
     if model.interfaces().is_empty() || unknown {
         return Vec::new();
     }
-    watch(Event::Phase("compliance of the interfaces"));
+    context.phase("compliance of the interfaces");
     let found = || -> Result<Vec<Truncation>> {
         let rigid = rigid_modes(model, &model.pencil())?;
-        let problem = problem_of_span(model, rigid.as_ref(), Resume::default());
+        let problem = problem_of_span(model, rigid.as_ref());
         let loads = NamedLoads::of(model, &[Loads::Interfaces], "interface load")?;
-        let counters = &mut Counters::default();
-        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, counters)?;
+        let uncounted = context.uncounted();
+        let beside = beside_modes(model, &problem, free, &loads, ResponseAccuracy::ROUGH, &uncounted)?;
         Ok(Responses::new(&problem, free, &loads, beside).lacking())
     };
     found().unwrap_or_default()
 }
 
 /// True if the responses to all loads at interfaces fit the memory beside a factor like that of the search.
-fn responses_fit(model: &FeModel, free: &EigenSolution, settings: &ModeSettings) -> bool {
+fn responses_fit(model: &FeModel, free: &EigenSolution, context: &Context<'_>) -> bool {
     /// Blocks of all loads that are held at once: forces, responses, and these times K and M.
     const BLOCKS: usize = 5;
     let loads = |set: &NodeSet| if set.coupling() == Coupling::Free { 3 * set.nodes.len() } else { 6 };
     let columns: usize = model.interfaces().iter().map(loads).sum();
     let bytes = (BLOCKS * columns * free.vectors.nrows() * size_of::<f64>()) as u64;
-    let factor = free.plan.map_or(0, |plan| plan.bytes);
-    settings.memory.is_none_or(|most| bytes.saturating_add(factor) <= most)
+    let factor = free.plan.as_ref().map_or(0, Plan::bytes);
+    bytes.saturating_add(factor) <= context.available()
 }
 
 /// What free modes do not have of the responses to loads (N x m).
@@ -352,18 +346,18 @@ fn beside_modes(
     free: &EigenSolution,
     loads: &NamedLoads,
     accuracy: ResponseAccuracy,
-    counters: &mut Counters,
+    context: &Context<'_>,
 ) -> Result<Mat<f64>> {
     let (modes, first) = (free.vectors.as_ref(), free.eigenvalues[0]);
-    let precision = free.plan.map_or(Precision::Double, |plan| plan.precision);
+    let precision = free.plan.as_ref().map_or(Precision::Double, Plan::precision);
     let mut beside = Mat::zeros(loads.forces.nrows(), loads.forces.ncols());
     for ((hertz, square), columns) in loads.by_frequency() {
         let forces = Mat::from_fn(beside.nrows(), columns.len(), |i, c| loads.forces[(i, columns[c])]);
         let responses = if square == 0.0 {
-            static_responses(problem, modes, forces, first, precision, accuracy, counters)
+            static_responses(problem, modes, forces, first, precision, accuracy, context)
                 .map_err(|failure| explain(model, failure))?
         } else {
-            dynamic_responses(problem, modes, forces, square, counters)
+            dynamic_responses(problem, modes, forces, square, context)
                 .map_err(|failure| no_response(model, hertz, failure))?
         };
         for (c, &j) in columns.iter().enumerate() {

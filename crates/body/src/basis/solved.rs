@@ -53,9 +53,9 @@ impl Basis for SolvedModes {
     }
 
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis> {
-        let Task { model, settings, resume, watch } = *task;
+        let Task { model, settings, context } = *task;
         let rigid = rigid_modes(model, &model.pencil())?;
-        let problem = problem_of_span(model, rigid.as_ref(), resume);
+        let problem = problem_of_span(model, rigid.as_ref());
         // All that were found: the modes of one eigenvalue get their canonical form together.
         let accuracy = match (self.prove, settings.accuracy) {
             (false, _) => Accuracy::Fast,
@@ -63,7 +63,7 @@ impl Basis for SolvedModes {
             (true, other) => other,
         };
         let whole = EigenSettings { wanted: Wanted::Lowest(usize::MAX), accuracy, ..*settings };
-        let solution = modes_of_span(&problem, self.vectors.clone(), &whole, watch);
+        let solution = modes_of_span(&problem, self.vectors.clone(), &whole, context);
         let mut solution = solution.map_err(|failure| explain(model, failure))?;
         self.refuse_others(&solution, settings.accuracy)?;
         solution.completeness = self.completeness(model, rigid.ncols(), solution.completeness)?;

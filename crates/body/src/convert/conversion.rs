@@ -11,9 +11,9 @@ use crate::flex_body::{
 use crate::invariants::{FrameChoice, Invariants, MassProperties};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
-use flexbody_eigen::{Counters, Plan, Resume};
+use flexbody_eigen::Plan;
+use flexbody_linalg::context::{Context, Work};
 use flexbody_linalg::copied;
-use flexbody_linalg::progress::{Event, Watch};
 use flexbody_model::FeModel;
 
 /// A finished conversion.
@@ -26,7 +26,7 @@ pub struct Conversion {
     /// Fully lumped pipelines, where asked for.
     pub lumped_modes: Vec<LumpedPipeline>,
     /// Work of the eigen-solver.
-    pub counters: Counters,
+    pub work: Work,
     /// Columns that the condensation multiplied by M, for the consistent mass.
     pub condensed_columns: u64,
     /// Memory and precision as decided before the work; none on the dense path.
@@ -39,24 +39,10 @@ pub struct Conversion {
 ///
 /// # Errors
 /// Those of [`ModalModel::find`], and of a damping that feeds energy to the modes.
-pub fn convert(model: &FeModel, settings: &ConvertSettings, watch: Watch<'_>) -> Result<Conversion> {
-    convert_resuming(model, settings, Resume::default(), watch)
-}
-
-/// As [`convert`], with a search for modes that starts where an earlier one stood, or that is kept (a
-/// checkpoint).
-///
-/// # Errors
-/// As [`convert`].
-pub fn convert_resuming(
-    model: &FeModel,
-    settings: &ConvertSettings,
-    resume: Resume<'_>,
-    watch: Watch<'_>,
-) -> Result<Conversion> {
-    let modal = ModalModel::find(model, settings, resume, watch)?;
+pub fn convert(model: &FeModel, settings: &ConvertSettings, context: &Context<'_>) -> Result<Conversion> {
+    let modal = ModalModel::find(model, settings, context)?;
     let condensed = modal.condense();
-    modal.finish(condensed, watch)
+    modal.finish(condensed, context)
 }
 
 impl ModalModel<'_> {
@@ -72,14 +58,15 @@ impl ModalModel<'_> {
     ///
     /// # Errors
     /// Of a damping that feeds energy to the modes, and of a comparator.
-    pub fn finish(self, condensed: Condensation, watch: Watch<'_>) -> Result<Conversion> {
+    pub fn finish(self, condensed: Condensation, context: &Context<'_>) -> Result<Conversion> {
         let exact = &condensed.invariants;
-        watch(Event::Phase("lumped comparison"));
+        context.phase("lumped comparison");
         let lumped = self.schemes.iter().map(|masses| lumped::comparator(&self, masses, exact)).collect();
+        let uncounted = context.uncounted();
         let pipelines = if self.settings.lumped_modes { self.schemes.as_slice() } else { &[] };
         let lumped_modes = pipelines
             .iter()
-            .map(|masses| lumped::pipeline(&self, masses, exact, watch))
+            .map(|masses| lumped::pipeline(&self, masses, exact, &uncounted))
             .collect::<Result<_>>()?;
         let (parts, overdamped) = self.parts(&condensed, lumped)?;
         let body = FlexBody::new(parts)?;
@@ -89,7 +76,7 @@ impl ModalModel<'_> {
             body,
             mass_properties: self.mass_properties,
             lumped_modes,
-            counters: solution.counters,
+            work: self.work,
             condensed_columns: condensed.columns,
             plan: solution.plan,
             diagnostics,

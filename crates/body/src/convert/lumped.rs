@@ -12,8 +12,8 @@ use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_eigen::{Accuracy, EigenSolution, Wanted};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::gram;
-use flexbody_linalg::progress::Watch;
 use flexbody_model::FeModel;
 use std::collections::HashMap;
 
@@ -104,10 +104,11 @@ pub(super) fn pipeline(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,
     exact: &Invariants,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<LumpedPipeline> {
     let scheme = masses.scheme().name().to_owned();
-    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } = match own_modes(modal, masses, watch) {
+    let EigenSolution { eigenvalues, vectors, next_eigenvalue, .. } = match own_modes(modal, masses, context)
+    {
         Ok(found) => found,
         Err(remark) => return Ok(LumpedPipeline::without_result(scheme, remark)),
     };
@@ -162,7 +163,7 @@ fn caution(
 fn own_modes(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> std::result::Result<EigenSolution, String> {
     if masses.negative() > 0 {
         return Err(format!("{} nodal masses are negative: no real modes", masses.negative()));
@@ -175,7 +176,7 @@ fn own_modes(
     let wanted = Wanted::Lowest(modal.n_modes());
     let settings = ModeSettings { wanted, accuracy, ..modal.settings.modes };
     let lumped = modal.model.with_nodal_masses(masses.masses());
-    let found = free_surface(&lumped, &settings, watch)
+    let found = free_surface(&lumped, &settings, context)
         .map_err(|error| error.first_error().message().to_owned())?
         .solution;
     if found.eigenvalues.len() < modal.n_modes() {

@@ -21,7 +21,7 @@ mod settings;
 
 pub use body_modes::{BodyModes, NodesInFrame, rigid_mass};
 pub use condensation::Condensation;
-pub use conversion::{Conversion, convert, convert_resuming};
+pub use conversion::{Conversion, convert};
 pub use damping::modal_damping;
 pub use geometric_stiffness::modal_geometric_stiffness;
 pub use interface_frame::interfaces_in_frame;

@@ -13,8 +13,8 @@ use crate::invariants::{
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
-use flexbody_eigen::{Accuracy, Resume};
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_eigen::Accuracy;
+use flexbody_linalg::context::{Context, Work, WorkCounter};
 use flexbody_model::{FeModel, GeometricStiffness, Nodes};
 use nalgebra::Vector3;
 
@@ -36,30 +36,26 @@ pub struct ModalModel<'m> {
     pub(super) inertia_stiffness: Option<InertiaStiffness>,
     pub(super) nodes: Nodes,
     pub(super) interfaces: Vec<Interface>,
+    /// Work of the search for modes.
+    pub(super) work: Work,
 }
 
 impl<'m> ModalModel<'m> {
     /// Finds the modes and chooses the frame.
     ///
-    /// * `resume`: a search for modes that starts where an earlier one stood, or that is kept (a checkpoint).
-    ///
     /// # Errors
     /// Those of [`free_surface`](crate::basis::free_surface) and [`choose_frame`];
     /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes (found before any
     /// work).
-    pub fn find(
-        model: &'m FeModel,
-        settings: &'m ConvertSettings,
-        resume: Resume<'_>,
-        watch: Watch<'_>,
-    ) -> Result<Self> {
+    pub fn find(model: &'m FeModel, settings: &'m ConvertSettings, context: &Context<'_>) -> Result<Self> {
         refuse_uncertifiable(model, settings.modes.accuracy)?;
         let schemes =
             settings.lumped.iter().map(|lumping| lumping.masses(model)).collect::<Result<Vec<_>>>()?;
         let own_frame = own_frame(model, settings)?;
-        let task = Task { model, settings: &settings.modes, resume, watch };
+        let counter = WorkCounter::default();
+        let task = Task { model, settings: &settings.modes, context: &context.counted_by(&counter) };
         let mut found = settings.basis.basis().modes(&task)?;
-        watch(Event::Phase("invariants"));
+        context.phase("invariants");
         let (frame, mass_properties) = body_frame(model, &settings.frame)?;
         let frame = own_frame.unwrap_or(frame);
         let place = NodesInFrame::new(model, frame);
@@ -94,6 +90,7 @@ impl<'m> ModalModel<'m> {
             inertia_stiffness,
             nodes,
             interfaces,
+            work: counter.total(),
         })
     }
 

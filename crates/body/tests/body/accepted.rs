@@ -11,7 +11,7 @@ use flexbody_body::invariants::BodyFrame;
 use flexbody_body::verification::{accept, own_identities};
 use flexbody_eigen::{Accuracy, Method, Wanted};
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel, RawShapes};
 use nalgebra::{Matrix3, Vector3};
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -29,7 +29,7 @@ fn converted(raw: RawModel, modes: usize, method: Method, accuracy: Accuracy) ->
     let mut settings = ConvertSettings { lumped: Vec::new(), ..ConvertSettings::default() };
     (settings.modes.wanted, settings.modes.method) = (Wanted::Lowest(modes), method);
     settings.modes.accuracy = accuracy;
-    convert(&model, &settings, SILENT).expect("converts")
+    convert(&model, &settings, &Context::QUIET).expect("converts")
 }
 
 /// The identities of the body and, rounded to 32-bit floats, once more.
@@ -173,7 +173,7 @@ proptest! {
             let mut settings = ConvertSettings { basis, ..ConvertSettings::default() };
             settings.modes.wanted = Wanted::Lowest(8);
             settings.modes.accuracy = if fast { Accuracy::Fast } else { Accuracy::Standard };
-            assert_accepted(&convert(&model, &settings, SILENT).expect(&about), &about);
+            assert_accepted(&convert(&model, &settings, &Context::QUIET).expect(&about), &about);
         }
     }
 }
@@ -187,7 +187,7 @@ fn a_body_that_breaks_an_identity_is_refused() {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let mut settings = ConvertSettings::default();
     settings.modes.wanted = Wanted::Lowest(6);
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     accept(&body).expect("all identities hold");
     let broken = |change: &dyn Fn(&mut Parts)| -> Vec<&'static str> {
         let mut parts = body.clone().into_parts();

@@ -9,7 +9,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::verification::{own_identities, verify};
 use flexbody_eigen::Wanted;
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel};
 use oracle::reference::symmetric_eigen;
 
@@ -38,7 +38,7 @@ fn with(mut raw: RawModel, coupling: Coupling, sets: &[Vec<i64>]) -> FeModel {
 fn body(model: &FeModel, count: usize) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() };
     let basis = BasisChoice::CraigBampton(CraigBampton);
-    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT)
+    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, &Context::QUIET)
         .expect("a body")
         .body
 }

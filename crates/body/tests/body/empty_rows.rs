@@ -10,7 +10,7 @@ use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::verification::{own_identities, verify};
 use flexbody_eigen::{Method, Wanted};
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{CheckedModel, DofLabel, FeModel, NodeSet, Nodes, RawModel, RawShapes};
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 use oracle::mesh::Mesh;
@@ -18,7 +18,8 @@ use std::path::PathBuf;
 
 fn converted(model: &FeModel, modes: usize, method: Method) -> Conversion {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), method, ..ModeSettings::default() };
-    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT).expect("converts")
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
+        .expect("converts")
 }
 
 fn told(found: &[Diagnostic], code: Code) -> String {

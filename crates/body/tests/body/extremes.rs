@@ -9,7 +9,7 @@ use flexbody_body::invariants::{BodyFrame, Frame, RigidMotion, compare_invariant
 use flexbody_body::verification::verify;
 use flexbody_eigen::{Method, Wanted};
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix, gram};
 use flexbody_model::{FeModel, RawModel, check};
 use nalgebra::{Matrix3, Vector3};
@@ -39,7 +39,7 @@ fn try_convert(raw: RawModel, modes: usize, method: Method) -> Result<(FeModel, 
     let checked = check(raw)?;
     let mut settings = ConvertSettings { lumped: Vec::new(), ..ConvertSettings::default() };
     (settings.modes.wanted, settings.modes.method) = (Wanted::Lowest(modes), method);
-    let mut done = convert(&checked.model, &settings, SILENT)?;
+    let mut done = convert(&checked.model, &settings, &Context::QUIET)?;
     done.diagnostics.splice(0..0, checked.diagnostics);
     Ok((checked.model, done))
 }

@@ -2,7 +2,7 @@
 
 use flexbody_body::convert::{ConvertSettings, LumpedPipeline, Lumping, convert};
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, check};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
@@ -17,7 +17,7 @@ fn pipeline(model: &FeModel, lumping: Lumping, count: usize) -> (LumpedPipeline,
     let mut settings =
         ConvertSettings { lumped: vec![lumping], lumped_modes: true, ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(count);
-    let mut made = convert(model, &settings, SILENT).expect("converts");
+    let mut made = convert(model, &settings, &Context::QUIET).expect("converts");
     (made.lumped_modes.remove(0), made.body.modes().eigenvalue.clone())
 }
 

@@ -22,6 +22,7 @@ mod multigrid;
 mod nastran;
 mod nastran_rows;
 mod partial_conversion;
+mod plans;
 mod precision;
 mod real_models;
 mod residual_vectors;

@@ -7,7 +7,7 @@ use flexbody_body::convert::{ConvertSettings, MeshChoice, convert};
 use flexbody_body::flex_body::{FlexBody, SurfaceMesh};
 use flexbody_eigen::Wanted;
 use flexbody_input::{ModelFiles, read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, Nodes, RawModel};
 use nalgebra::Vector3;
 use oracle::fixtures;
@@ -350,7 +350,7 @@ fn a_mesh_beside_tables_is_drawn_on_their_nodes() {
 fn body(raw: RawModel, mesh: MeshChoice) -> FlexBody {
     let model = FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{error}")).model;
     let modes = ModeSettings { wanted: Wanted::Lowest(4), ..ModeSettings::default() };
-    convert(&model, &ConvertSettings { modes, mesh, ..ConvertSettings::default() }, SILENT)
+    convert(&model, &ConvertSettings { modes, mesh, ..ConvertSettings::default() }, &Context::QUIET)
         .expect("a body")
         .body
 }

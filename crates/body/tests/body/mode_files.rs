@@ -7,7 +7,7 @@ use flexbody_body::basis::{BasisChoice, ImportedShapes, ModeSettings};
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_eigen::Wanted;
 use flexbody_input::{ImportedColumns, MatrixLocation, ModelFiles, read_imported, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModes};
 use oracle::damage::{apply, damage};
 use oracle::fixtures;
@@ -35,7 +35,8 @@ fn read(model: &FeModel, path: &Path) -> Result<RawModes> {
 
 fn converted(model: &FeModel, basis: BasisChoice, count: usize) -> Conversion {
     let modes = ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() };
-    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT).expect("a body")
+    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, &Context::QUIET)
+        .expect("a body")
 }
 
 fn imported(model: &FeModel, modes: RawModes) -> Conversion {

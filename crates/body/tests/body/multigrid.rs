@@ -5,8 +5,8 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::invariants::error_norms;
-use flexbody_eigen::{Accuracy, FactorChoice, Method, Multigrid, Precision, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_eigen::{Accuracy, FactorChoice, Method, Plan, Precision, Wanted, Way};
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, check};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
@@ -23,7 +23,7 @@ fn run(model: &FeModel, count: usize, factor: FactorChoice) -> Result<Conversion
         multigrid_pays: 0.0,
         ..ModeSettings::default()
     };
-    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT)
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
 }
 
 fn steel(mesh: &Mesh) -> FeModel {
@@ -54,8 +54,12 @@ fn both(name: &str, model: &FeModel, count: usize) -> [Conversion; 2] {
     found
 }
 
-fn way(found: &Conversion) -> Multigrid {
-    found.plan.expect("no dense path").multigrid
+fn plan(found: &Conversion) -> &Plan {
+    found.plan.as_ref().expect("no dense path")
+}
+
+fn way(found: &Conversion) -> Way {
+    plan(found).current().way
 }
 
 /// What was said about the factor.
@@ -72,9 +76,9 @@ fn compact_bodies_of_every_element_have_the_modes_of_a_factor() {
     {
         let name = format!("{kind:?}");
         let [_, found] = both(&name, &cube(kind, cells), 20);
-        assert_eq!(way(&found), Multigrid::Used, "{name}");
+        assert_eq!(way(&found), Way::Cycles, "{name}");
         assert!(said(&found)[0].starts_with("no factor"), "{:?}", said(&found));
-        let work = found.counters;
+        let work = found.work;
         assert_eq!((work.factorizations, work.factor_bytes), (0, 0), "{name}");
         // Columns of cycles, and of products with K in double precision. Elements of the second order take more.
         let [most_solved, most_products] = match kind {
@@ -94,7 +98,7 @@ fn the_last_modes_of_a_cube_are_those_of_a_factor() {
     let model = cube(ElementKind::Hex8, 9);
     for count in 1..=24 {
         let [_, found] = both(&format!("{count} modes"), &model, count);
-        assert_eq!(way(&found), Multigrid::Used, "{count} modes");
+        assert_eq!(way(&found), Way::Cycles, "{count} modes");
     }
 }
 
@@ -103,10 +107,10 @@ fn the_last_modes_of_a_cube_are_those_of_a_factor() {
 fn plane_bodies_and_bodies_with_arms_have_them_too() {
     let plane = check(rectangle(60, 40, 0.7, [1.0, 2.0])).expect("a sound model").model;
     let [_, found] = both("rectangle", &plane, 12);
-    assert_eq!(way(&found), Multigrid::Used);
+    assert_eq!(way(&found), Way::Cycles);
     let bracket = steel(&Mesh::bracket(ElementKind::Hex8, 14, 12, 0.01));
     let [_, found] = both("bracket", &bracket, 12);
-    assert_eq!(way(&found), Multigrid::Used);
+    assert_eq!(way(&found), Way::Cycles);
 }
 
 /// Materials whose stiffness differs by 1e4 and by 1e8, and one that hardly changes its volume: the modes of
@@ -131,7 +135,7 @@ fn contrasts_of_stiffness_and_of_volume_give_the_modes_of_a_factor() {
 fn a_thin_plate_is_factored_after_all_with_a_note() {
     let plate = steel(&Mesh::block(ElementKind::Hex8, [40, 30, 1], [1.0, 0.7, 1e-3]));
     let [factored, found] = both("plate", &plate, 10);
-    assert_eq!(way(&found), Multigrid::Failed);
+    assert!(plan(&found).has_failed(Way::Cycles));
     assert!(said(&found)[0].starts_with("cycles over levels"), "{:?}", said(&found));
     assert_eq!(factored.body.modes().eigenvalue, found.body.modes().eigenvalue, "the same search");
 }
@@ -151,7 +155,7 @@ fn the_bits_do_not_depend_on_the_number_of_threads() {
     let bits = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let found = pool.install(|| run(&model, 10, FactorChoice::Auto)).expect("modes");
-        assert_eq!(way(&found), Multigrid::Used);
+        assert_eq!(way(&found), Way::Cycles);
         let shapes = &found.body.modes().shape;
         let entries =
             (0..shapes.ncols()).flat_map(|j| (0..shapes.nrows()).map(move |i| shapes[(i, j)].to_bits()));
@@ -169,11 +173,11 @@ fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
     let with = |accuracy: Accuracy, multigrid_pays: f64| {
         let modes =
             ModeSettings { wanted: Wanted::Lowest(10), accuracy, multigrid_pays, ..ModeSettings::default() };
-        way(&convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT)
+        way(&convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
             .expect("modes"))
     };
-    assert_eq!(with(Accuracy::Fast, ModeSettings::default().multigrid_pays), Multigrid::Unsuited);
-    assert_eq!(with(Accuracy::Certified, 0.0), Multigrid::Unsuited);
-    assert_eq!(with(Accuracy::Standard, 0.0), Multigrid::Used);
-    assert_eq!(with(Accuracy::Fast, 0.0), Multigrid::Used);
+    assert_eq!(with(Accuracy::Fast, ModeSettings::default().multigrid_pays), Way::DoublePrecision);
+    assert_eq!(with(Accuracy::Certified, 0.0), Way::DoublePrecision);
+    assert_eq!(with(Accuracy::Standard, 0.0), Way::Cycles);
+    assert_eq!(with(Accuracy::Fast, 0.0), Way::Cycles);
 }

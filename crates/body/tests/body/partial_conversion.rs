@@ -5,9 +5,9 @@ use flexbody_body::convert::{Conversion, ConvertSettings, ModalModel, convert};
 use flexbody_body::flex_body::{TermDecision, TermGroups};
 use flexbody_body::invariants::{BodyFrame, primary_differences};
 use flexbody_body::verification::verify;
-use flexbody_eigen::{Accuracy, Resume, Wanted};
+use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Damping, FeModel};
 use oracle::partial::{combinations, decisions};
 use oracle::plane::rectangle;
@@ -26,9 +26,9 @@ fn fixture(name: &str) -> FeModel {
 }
 
 fn decided(model: &FeModel, settings: &ConvertSettings, terms: &[TermDecision]) -> Conversion {
-    let modal = ModalModel::find(model, settings, Resume::default(), SILENT).expect("modes");
+    let modal = ModalModel::find(model, settings, &Context::QUIET).expect("modes");
     let condensed = modal.condense_kept(modal.condense_linear(), terms.to_vec());
-    modal.finish(condensed, SILENT).expect("converts")
+    modal.finish(condensed, &Context::QUIET).expect("converts")
 }
 
 /// Models with the columns of rigid motion, and those of all that is condensed.
@@ -49,7 +49,7 @@ fn models() -> [(FeModel, u64, u64); 4] {
 fn what_is_ruled_out_is_not_multiplied_and_the_rest_is_the_same() {
     for (model, rigid, all) in models() {
         let name = model.name();
-        let whole = convert(&model, &settings(), SILENT).expect("converts");
+        let whole = convert(&model, &settings(), &Context::QUIET).expect("converts");
         assert_eq!(whole.condensed_columns, all, "{name}");
         let modes: Vec<usize> = (0..whole.body.n_modes()).collect();
         for groups in combinations() {
@@ -93,10 +93,10 @@ fn what_is_ruled_out_is_not_multiplied_and_the_rest_is_the_same() {
 #[test]
 fn a_decision_is_made_on_what_the_body_will_have() {
     for (model, ..) in models() {
-        let body = convert(&model, &settings(), SILENT).expect("converts").body;
+        let body = convert(&model, &settings(), &Context::QUIET).expect("converts").body;
         let near = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} is not {b}");
         let settings = settings();
-        let modal = ModalModel::find(&model, &settings, Resume::default(), SILENT).expect("modes");
+        let modal = ModalModel::find(&model, &settings, &Context::QUIET).expect("modes");
         let linear = modal.condense_linear();
         let early = modal.body(&linear).expect("a body");
         assert_eq!(early.groups(), TermGroups { w1: true, ..TermGroups::NONE });
@@ -112,7 +112,7 @@ fn a_decision_is_made_on_what_the_body_will_have() {
             near(*found, *expected);
         }
         let condensed = modal.condense_kept(linear, Vec::new());
-        let found = modal.finish(condensed, SILENT).expect("converts");
+        let found = modal.finish(condensed, &Context::QUIET).expect("converts");
         assert_eq!(found.body, body, "nothing was decided");
     }
 }
@@ -122,7 +122,7 @@ fn certified_digits_are_those_of_the_whole() {
     let (model, ..) = &models()[2];
     let mut settings = settings();
     settings.modes.accuracy = Accuracy::Certified;
-    let whole = convert(model, &settings, SILENT).expect("converts").body;
+    let whole = convert(model, &settings, &Context::QUIET).expect("converts").body;
     let terms = decisions(TermGroups::NONE);
     let found = decided(model, &settings, &terms).body;
     let modes: Vec<usize> = (0..whole.n_modes()).collect();

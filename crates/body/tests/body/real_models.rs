@@ -5,7 +5,7 @@ use flexbody_body::basis::{ModeSettings, free_surface};
 use flexbody_body::invariants::{BodyFrame, Frame, LumpedMasses, condense_lumped};
 use flexbody_eigen::{Accuracy, Method, Wanted};
 use flexbody_input::{ModelFiles, read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{RawModel, check};
 use nalgebra::{Matrix3, Vector3};
 use oracle::equations::Coriolis;
@@ -151,7 +151,7 @@ fn agrees_with_its_reference(case: &Case) {
             method: Method::Auto,
             ..ModeSettings::default()
         };
-        let found = free_surface(&body.model, &settings, SILENT).expect("a sound body").solution;
+        let found = free_surface(&body.model, &settings, &Context::QUIET).expect("a sound body").solution;
         assert_eq!(found.eigenvalues.len() + 6, below, "{name}");
         assert_eq!(found.completeness.negative_pivots, Some(below), "{name}");
     }
@@ -236,7 +236,7 @@ fn shared_bodies_agree_with_the_row_sums_and_the_rank_of_their_references() {
         assert!(invariants.first_moment().norm() < 1e-12 * invariants.mass() * size, "{}", case.name);
         if let Some(missing) = reference["M_rank_deficit_1e-12"].as_u64().filter(|missing| *missing > 0) {
             let settings = ModeSettings { wanted: Wanted::Lowest(usize::MAX), ..ModeSettings::default() };
-            let found = free_surface(&model, &settings, SILENT).expect("a sound body").solution;
+            let found = free_surface(&model, &settings, &Context::QUIET).expect("a sound body").solution;
             let finite = model.stiffness().n() - missing as usize - 6;
             assert_eq!(found.eigenvalues.len(), finite, "{}", case.name);
         }

@@ -6,8 +6,8 @@ use faer::{Mat, Scale, Side};
 use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
 use flexbody_body::basis::{Basis, FreeSurface, Loads, ModalBasis, ModeSettings, Task, UserLoads};
-use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Resume, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_eigen::{Accuracy, FactorChoice, Method, Precision, Wanted};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{combine, gram};
 use flexbody_model::{FeModel, NodeSet, RawShapes};
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -39,7 +39,7 @@ fn model(plate: &Assembly) -> FeModel {
 }
 
 fn modes(model: &FeModel, settings: &ModeSettings, loads: Vec<Loads>) -> Result<ModalBasis> {
-    let task = Task { model, settings, resume: Resume::default(), watch: SILENT };
+    let task = Task { model, settings, context: &Context::QUIET };
     FreeSurface { residual_vectors: loads }.modes(&task)
 }
 

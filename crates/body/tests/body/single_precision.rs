@@ -6,9 +6,9 @@ use flexbody_base::error::{ExitCode, Result};
 use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::invariants::error_norms;
-use flexbody_eigen::{FactorChoice, Method, Precision, Wanted};
+use flexbody_eigen::{FactorChoice, Method, Precision, Wanted, Way};
 use flexbody_input::{ModelFiles, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, check};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::Mesh;
@@ -46,7 +46,7 @@ fn run(model: &FeModel, count: usize, factor: FactorChoice, single_pays: f64) ->
         single_pays,
         ..ModeSettings::default()
     };
-    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT)
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
 }
 
 /// A steel plate of 1 m x 0.7 m: cond(K + tau M) grows with the fourth power of length over thickness.
@@ -68,10 +68,10 @@ fn a_single_precision_factor_gives_the_modes_and_invariants_of_a_double_one() {
         // Where conditioning defeats it, `auto` falls back; it does not on the models of the project.
         let [double, single] = [DOUBLE, FactorChoice::Auto]
             .map(|factor| run(&model, 20, factor, 0.0).unwrap_or_else(|e| panic!("{name}: {e}")));
-        let fell_back = single.plan.expect("a sparse factor").single_failed;
+        let fell_back = single.plan.as_ref().expect("a sparse factor").has_failed(Way::SinglePrecision);
         assert!(!fell_back || !name.contains("fixtures"), "{name}");
         let size = if fell_back { 1 } else { 2 };
-        assert_eq!(size * single.counters.factor_bytes, double.counters.factor_bytes, "{name}");
+        assert_eq!(size * single.work.factor_bytes, double.work.factor_bytes, "{name}");
         let (a, b) = (double.body.modes(), single.body.modes());
         assert_eq!(a.eigenvalue.len(), b.eigenvalue.len(), "{name}");
         for (j, (x, y)) in a.eigenvalue.iter().zip(&b.eigenvalue).enumerate() {
@@ -120,7 +120,7 @@ fn counts_in_single_precision_are_those_of_double_precision() {
         if said.is_empty() {
             in_double += 1;
             // Another factorisation than that of the count.
-            assert!(single.counters.factorizations > double.counters.factorizations, "{name}");
+            assert!(single.work.factorizations > double.work.factorizations, "{name}");
         } else {
             in_single += 1;
             assert!(said.starts_with("counted in single precision, whose rounding is "), "{name}: {said}");
@@ -157,22 +157,22 @@ fn a_thin_plate_defeats_single_precision_and_auto_falls_back_with_a_note() {
         run(&model, 10, DOUBLE, 0.0).expect("modes"),
         run(&model, 10, FactorChoice::Auto, 0.0).expect("modes"),
     );
-    let plan = auto.plan.expect("a sparse factor");
-    assert_eq!((plan.precision, plan.single_failed), (Precision::Double, true));
+    let plan = auto.plan.as_ref().expect("a sparse factor");
+    assert_eq!((plan.precision(), plan.has_failed(Way::SinglePrecision)), (Precision::Double, true));
     assert!(said(&auto)[0].starts_with("a single-precision factor is too poor"), "{:?}", said(&auto));
     assert!(said(&double).is_empty());
     // From there on it is the search in double precision.
     assert_eq!(auto.body.modes().eigenvalue, double.body.modes().eigenvalue);
-    assert_eq!(auto.counters.factor_bytes, double.counters.factor_bytes);
-    assert!(auto.counters.factorizations > double.counters.factorizations);
+    assert_eq!(auto.work.factor_bytes, double.work.factor_bytes);
+    assert!(auto.work.factorizations > double.work.factorizations);
 
     // A thicker one does not, and without the wish for speed single precision is not tried at all.
     let model = plate(3e-2);
     let tried = run(&model, 10, FactorChoice::Auto, 0.0).expect("modes");
-    assert_eq!(tried.plan.expect("a sparse factor").precision, Precision::Single);
+    assert_eq!(tried.plan.as_ref().expect("a sparse factor").precision(), Precision::Single);
     assert!(said(&tried)[0].starts_with("the factor is in single precision"), "{:?}", said(&tried));
     let default = run(&model, 10, FactorChoice::Auto, ModeSettings::default().single_pays).expect("modes");
-    assert_eq!(default.plan.expect("a sparse factor").precision, Precision::Double);
+    assert_eq!(default.plan.as_ref().expect("a sparse factor").precision(), Precision::Double);
     assert!(said(&default).is_empty());
 }
 

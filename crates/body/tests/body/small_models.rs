@@ -6,7 +6,7 @@ use flexbody_base::error::ExitCode;
 use flexbody_body::basis::{ModeSettings, free_surface};
 use flexbody_eigen::{Accuracy, Method, Proof, Wanted};
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{RawModel, check};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Assembly, Mesh, entries};
@@ -147,7 +147,7 @@ fn every_mode_below_a_frequency_is_found() {
             let wanted = Wanted::Below(0.5 * (below + above));
             let settings =
                 ModeSettings { wanted, accuracy: Accuracy::Standard, method, ..ModeSettings::default() };
-            let found = free_surface(&model, &settings, SILENT).expect("a sound body");
+            let found = free_surface(&model, &settings, &Context::QUIET).expect("a sound body");
             assert_eq!(found.solution.eigenvalues.len(), count, "{method:?}");
             assert_eq!(found.solution.completeness.proof, Proof::InertiaCount);
         }

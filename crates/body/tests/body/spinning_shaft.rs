@@ -6,7 +6,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::{FlexBody, LoadKind};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use nalgebra::Vector3;
 use oracle::beams::{SHAFT_YOUNGS, shaft};
@@ -45,7 +45,7 @@ fn body(parts: usize, width: f64) -> FlexBody {
     let model = FeModel::from_raw(shaft(parts, width)).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(6), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
-    convert(&model, &settings, SILENT).expect("converts").body
+    convert(&model, &settings, &Context::QUIET).expect("converts").body
 }
 
 /// Rates of vibration along axes that turn with the body at `spin` about x, ascending: of

@@ -2,11 +2,12 @@
 //! clock. `FLEXBODY_BLESS=1 cargo test -p flexbody-body work_counters` writes the table after a change that is
 //! meant.
 
-use flexbody_body::basis::{ModalBasis, ModeSettings, free_surface};
-use flexbody_eigen::{Accuracy, Method, Wanted};
+use flexbody_body::basis::{ModeSettings, free_surface};
+use flexbody_eigen::{Accuracy, EigenSolution, Method, Wanted};
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Work;
 use flexbody_model::{FeModel, RawModel};
+use oracle::counted::counted;
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,14 +27,15 @@ fn model(name: &str) -> FeModel {
     FeModel::from_raw(raw(name)).expect("a sound model").model
 }
 
-fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> ModalBasis {
+fn modes(model: &FeModel, count: usize, accuracy: Accuracy) -> (EigenSolution, Work) {
     let settings = ModeSettings {
         wanted: Wanted::Lowest(count),
         accuracy,
         method: Method::Lanczos,
         ..ModeSettings::default()
     };
-    free_surface(model, &settings, SILENT).expect("modes")
+    let (found, work) = counted(|context| free_surface(model, &settings, context));
+    (found.expect("modes").solution, work)
 }
 
 #[test]
@@ -51,7 +53,7 @@ fn work_is_what_it_was() {
             (20, Accuracy::Certified),
             (60, Accuracy::Standard),
         ] {
-            let work = modes(&model, count, accuracy).solution.counters;
+            let (_, work) = modes(&model, count, accuracy);
             writeln!(
                 table,
                 "{name:<16}{count:>6} {:<10}{:>8}{:>7}{:>6}{:>6}{:>10}{:>12}",
@@ -78,8 +80,8 @@ fn work_is_what_it_was() {
 #[ignore = "slow"]
 fn twenty_modes_take_at_most_six_solved_columns_each() {
     for name in MODELS {
-        let found = modes(&model(name), 20, Accuracy::Standard).solution;
-        assert!(found.counters.solved_columns <= 120, "{name}: {:?}", found.counters);
+        let (found, work) = modes(&model(name), 20, Accuracy::Standard);
+        assert!(work.solved_columns <= 120, "{name}: {work:?}");
         for (residual, floor) in found.residuals.iter().zip(&found.rounding_floors) {
             assert!(*residual <= floor.max(1e-9), "{name}: K-residual {residual:e}, floor {floor:e}");
         }
@@ -91,10 +93,10 @@ fn modes_and_work_have_the_same_bits_on_any_number_of_threads() {
     let model = model("cube_hex8");
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
-        pool.install(|| modes(&model, 20, Accuracy::Standard).solution)
+        pool.install(|| modes(&model, 20, Accuracy::Standard))
     };
-    let (one, three) = (on(1), on(3));
-    assert_eq!(one.counters, three.counters);
+    let ((one, one_work), (three, three_work)) = (on(1), on(3));
+    assert_eq!(one_work, three_work);
     assert_eq!(one.eigenvalues, three.eigenvalues);
     assert!(one.vectors == three.vectors, "vectors differ");
 }
@@ -106,11 +108,11 @@ fn searches_of_one_model_share_one_order_and_give_the_same_bits() {
     for name in ["cube_hex8", "shell_folded", "frame_beams", "plane_frame", "hex8_bubbles"] {
         let model = model(name);
         let order = || model.elimination().of(&model.pencil()).expect("enough memory");
-        let one = modes(&model, 8, Accuracy::Standard).solution;
+        let (one, one_work) = modes(&model, 8, Accuracy::Standard);
         let first = order();
-        let other = modes(&model, 8, Accuracy::Standard).solution;
+        let (other, other_work) = modes(&model, 8, Accuracy::Standard);
         assert!(Arc::ptr_eq(&first, &order()), "{name}");
-        assert_eq!(one.counters, other.counters, "{name}");
+        assert_eq!(one_work, other_work, "{name}");
         assert_eq!(one.eigenvalues, other.eigenvalues, "{name}");
         assert!(one.vectors == other.vectors, "{name}: vectors differ");
     }

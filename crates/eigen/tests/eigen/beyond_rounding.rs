@@ -3,9 +3,9 @@
 
 use faer::Mat;
 use flexbody_eigen::{
-    Accuracy, EigenProblem, EigenSettings, EigenSolution, Method, Resume, Wanted, modes_of_span, solve,
+    Accuracy, EigenProblem, EigenSettings, EigenSolution, Method, Wanted, modes_of_span, solve,
 };
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, Pencil, SymmetricMatrix, gram, uniform};
 
 /// Elements; a power of two, so that K and M have no rounding in them.
@@ -76,9 +76,8 @@ fn with_modes(test: impl FnOnce(&EigenProblem<'_>, EigenSolution)) {
         first_estimate: ROOTS[0].powi(4) / 420.0,
         input_error: 0.5 * f64::EPSILON,
         order: None,
-        resume: Resume::default(),
     };
-    let solution = solve(&problem, &settings(Accuracy::Standard), SILENT).expect("modes");
+    let solution = solve(&problem, &settings(Accuracy::Standard), &Context::QUIET).expect("modes");
     assert!(solution.is_noisy(), "floors {:?}", solution.rounding_floors);
     test(&problem, solution);
 }
@@ -108,7 +107,8 @@ fn modes_are_those_of_their_span_whatever_vectors_it_is_given_by() {
             uniform(1, i as u64, j as u64) + if i == j { 2.0 } else { 0.0 }
         });
         let span = &solution.vectors * mixed;
-        let again = modes_of_span(problem, span, &settings(Accuracy::Fast), SILENT).expect("the same modes");
+        let again =
+            modes_of_span(problem, span, &settings(Accuracy::Fast), &Context::QUIET).expect("the same modes");
         for j in 0..count {
             let (one, other) = (solution.vectors.col(j), again.vectors.col(j));
             let sign = if one.transpose() * other < 0.0 { -1.0 } else { 1.0 };

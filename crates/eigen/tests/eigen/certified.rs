@@ -3,10 +3,10 @@
 
 use faer::Mat;
 use flexbody_eigen::{
-    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Resume,
-    Wanted, solve,
+    Accuracy, EigenFailure, EigenProblem, EigenSettings, EigenSolution, EigenvalueBounds, Method, Wanted,
+    solve,
 };
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, Pencil, SymmetricMatrix};
 use oracle::exact::count_below;
 use proptest::prelude::*;
@@ -68,9 +68,12 @@ impl Body {
             first_estimate: form(&self.k, &ramp, &ramp) / form(&self.m, &ramp, &ramp),
             input_error: 0.0,
             order: None,
-            resume: Resume::default(),
         };
-        solve(&problem, &EigenSettings { wanted, accuracy, method, ..EigenSettings::default() }, SILENT)
+        solve(
+            &problem,
+            &EigenSettings { wanted, accuracy, method, ..EigenSettings::default() },
+            &Context::QUIET,
+        )
     }
 
     /// Every bound is right by exact counts; the largest relative width.

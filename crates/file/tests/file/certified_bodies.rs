@@ -7,7 +7,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_body::verification::verify;
 use flexbody_eigen::{Accuracy, Method, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use flexbody_model::{FeModel, RawModel, check};
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -42,7 +42,8 @@ fn dense(a: &SymmetricMatrix, block: usize) -> Vec<Vec<f64>> {
 fn eigenvalues_of_a_cuboid_of_tetrahedra_lie_between_their_bounds() {
     let model = model(ElementKind::Tet4, [1, 1, 1], MassRule::Consistent);
     let conversion =
-        convert(&model, &settings(Accuracy::Certified, 18, BodyFrame::Principal), SILENT).expect("sound");
+        convert(&model, &settings(Accuracy::Certified, 18, BodyFrame::Principal), &Context::QUIET)
+            .expect("sound");
     let guarantee = conversion.body.certificate().guarantee.as_ref().expect("certified");
     let (k, m) = (dense(model.stiffness(), 1), dense(model.scalar_mass().expect("a solid"), 3));
     assert_eq!(count_below(&k, &m, guarantee.shift_below), 6);
@@ -64,7 +65,8 @@ fn certified_bodies_keep_their_guarantees_through_file_and_check() {
         (ElementKind::Tet10, MassRule::Reduced, BodyFrame::Model),
     ] {
         let model = model(kind, [3, 2, 1], rule);
-        let conversion = convert(&model, &settings(Accuracy::Certified, 10, frame), SILENT).expect("sound");
+        let conversion =
+            convert(&model, &settings(Accuracy::Certified, 10, frame), &Context::QUIET).expect("sound");
         flexbody_file::write(&conversion.body, &path).expect("written");
         let body = flexbody_file::read(&path).expect("read");
         let guarantee = body.certificate().guarantee.as_ref().expect("certified");
@@ -87,7 +89,8 @@ fn certified_bodies_keep_their_guarantees_through_file_and_check() {
 fn check_finds_invariants_and_bounds_that_do_not_keep_their_guarantees() {
     let model = model(ElementKind::Hex8, [2, 1, 1], MassRule::Consistent);
     let conversion =
-        convert(&model, &settings(Accuracy::Certified, 6, BodyFrame::Principal), SILENT).expect("sound");
+        convert(&model, &settings(Accuracy::Certified, 6, BodyFrame::Principal), &Context::QUIET)
+            .expect("sound");
     let failed = |change: &dyn Fn(&mut flexbody_body::flex_body::Parts)| -> Vec<&'static str> {
         let mut parts = conversion.body.clone().into_parts();
         change(&mut parts);
@@ -120,7 +123,7 @@ fn guarantees_do_not_depend_on_the_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
         let settings = settings(Accuracy::Certified, 12, BodyFrame::Principal);
-        pool.install(|| convert(&model, &settings, SILENT)).expect("sound").body
+        pool.install(|| convert(&model, &settings, &Context::QUIET)).expect("sound").body
     };
     assert_eq!(on(1), on(3));
 }
@@ -128,8 +131,8 @@ fn guarantees_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn other_levels_store_no_guarantees() {
     let model = model(ElementKind::Hex8, [2, 1, 1], MassRule::Consistent);
-    let conversion =
-        convert(&model, &settings(Accuracy::Standard, 6, BodyFrame::Principal), SILENT).expect("sound");
+    let conversion = convert(&model, &settings(Accuracy::Standard, 6, BodyFrame::Principal), &Context::QUIET)
+        .expect("sound");
     assert_eq!(conversion.body.certificate().guarantee, None);
 }
 
@@ -165,7 +168,7 @@ fn a_mass_that_is_the_same_along_all_axes_is_bounded_as_stored() {
 fn a_mass_that_differs_along_an_axis_by_rounding_is_not_certified() {
     let certified = settings(Accuracy::Certified, 6, BodyFrame::Principal);
     let sound = check(with_mass(|_, _, v| v)).expect("a sound body").model;
-    let body = convert(&sound, &certified, SILENT).expect("certified").body;
+    let body = convert(&sound, &certified, &Context::QUIET).expect("certified").body;
     let failed = |model: &FeModel| -> Vec<&'static str> {
         let checks = verify(&body, model).expect("the same nodes");
         checks.iter().filter(|c| !c.passed).map(|c| c.name).collect()
@@ -182,11 +185,11 @@ fn a_mass_that_differs_along_an_axis_by_rounding_is_not_certified() {
     for raw in [along_z, one_entry, across] {
         let model = check(raw).expect("a sound body").model;
         assert!(model.scalar_mass().is_some() && !model.has_exact_scalar_mass());
-        let error = convert(&model, &certified, SILENT).expect_err("another mass matrix");
+        let error = convert(&model, &certified, &Context::QUIET).expect_err("another mass matrix");
         assert_eq!(error.diagnostics()[0].code(), Code::Usage);
         assert!(error.to_string().contains("differs along x, y and z"), "{error}");
         let standard = settings(Accuracy::Standard, 6, BodyFrame::Principal);
-        convert(&model, &standard, SILENT).expect("standard takes the mean");
+        convert(&model, &standard, &Context::QUIET).expect("standard takes the mean");
         assert_eq!(failed(&model), ["certified_mass"]);
     }
 }

@@ -10,7 +10,7 @@ use flexbody_body::invariants::{BodyFrame, primary_differences};
 use flexbody_eigen::{Method, Wanted};
 use flexbody_input::{ModelFiles, read_model};
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{DofLabel, FeModel, Nodes, RawModel};
 use nalgebra::{Matrix3, Vector3};
 use oracle::general::{FIXTURES, raw_fixture as raw};
@@ -24,7 +24,7 @@ fn settings(modes: usize, method: Method) -> ConvertSettings {
 
 fn converted(raw: RawModel, modes: usize, method: Method) -> Conversion {
     let model = FeModel::from_raw(raw).expect("a body").model;
-    convert(&model, &settings(modes, method), SILENT).expect("converts")
+    convert(&model, &settings(modes, method), &Context::QUIET).expect("converts")
 }
 
 fn refused(raw: RawModel) -> Error {
@@ -170,7 +170,7 @@ fn invariants_follow_the_frame() {
         let model = FeModel::from_raw(raw(name)).expect("a body").model;
         let [own, other] = [BodyFrame::Principal, BodyFrame::Model].map(|frame| {
             let settings = ConvertSettings { frame: frame.into(), ..settings(6, Method::Auto) };
-            convert(&model, &settings, SILENT).expect("converts").body
+            convert(&model, &settings, &Context::QUIET).expect("converts").body
         });
         let frame = own.frame();
         // x_model = r0 + A x: turned back, then to an origin at -r0.
@@ -266,7 +266,7 @@ fn bodies_with_rotations_and_inner_rows_are_taken_apart() {
     for (checked, part) in bodies.iter().zip(parts) {
         let alone = FeModel::from_raw(part).expect("a body").model;
         let [a, b] = [&checked.model, &alone]
-            .map(|model| convert(model, &settings(6, Method::Auto), SILENT).expect("converts").body);
+            .map(|model| convert(model, &settings(6, Method::Auto), &Context::QUIET).expect("converts").body);
         assert_eq!(a.invariants(), b.invariants(), "{}", checked.model.name());
         assert_eq!(a.modes().rotation, b.modes().rotation);
     }
@@ -277,11 +277,11 @@ fn certified_says_what_it_does_not_cover() {
     let model = FeModel::from_raw(raw("frame_beams")).expect("a body").model;
     let mut settings = settings(6, Method::Auto);
     settings.modes.accuracy = flexbody_eigen::Accuracy::Certified;
-    let error = convert(&model, &settings, SILENT).expect_err("rotations");
+    let error = convert(&model, &settings, &Context::QUIET).expect_err("rotations");
     assert_eq!(error.diagnostics()[0].code(), Code::Usage);
     // Bubbles are displacements.
     let model = FeModel::from_raw(raw("hex8_bubbles")).expect("a body").model;
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     let digits = body.certificate().guarantee.as_ref().expect("certified").digits;
     assert!(digits.iter().all(|d| *d > 13.0), "{digits:?}");
 }
@@ -307,7 +307,7 @@ fn centrifugal_vectors_carry_the_response_that_all_modes_have() {
         let vectors = FreeSurface { residual_vectors: vec![Loads::Centrifugal] };
         settings.basis = BasisChoice::Free(vectors);
         let model = FeModel::from_raw(raw(name)).expect("a body").model;
-        let completed = convert(&model, &settings, SILENT).expect("converts").body;
+        let completed = convert(&model, &settings, &Context::QUIET).expect("converts").body;
         let plane = all.dimension() == 2;
         for spin in [Vector3::new(0.3, -1.0, 0.7), Vector3::new(1.0, 0.2, -0.4)] {
             let spin = if plane { Vector3::z() } else { spin };

@@ -7,7 +7,7 @@ use flexbody_body::convert::{ConvertSettings, convert, poor_fits};
 use flexbody_body::flex_body::{Certificate, FixedInterface, FlexBody, InterfaceCoordinates, Parts};
 use flexbody_body::verification::{own_identities, verify};
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, RawModel};
 use oracle::general::raw_fixture;
 
@@ -18,7 +18,7 @@ fn model_of(raw: RawModel) -> FeModel {
 fn converted(model: &FeModel, basis: BasisChoice, modes: usize) -> FlexBody {
     let mut settings = ConvertSettings { basis, ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(modes);
-    convert(model, &settings, SILENT).expect("converts").body
+    convert(model, &settings, &Context::QUIET).expect("converts").body
 }
 
 /// A link whose interfaces are `coupling`.

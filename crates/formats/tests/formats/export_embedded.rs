@@ -11,7 +11,7 @@ use flexbody_eigen::Wanted;
 use flexbody_formats::export::{ExportFrame, ExportOptions, Exported, Points, frames};
 use flexbody_formats::{export, find_format};
 use flexbody_input::{read_manifest, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, LoadKind};
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use nalgebra::Vector3;
@@ -414,7 +414,7 @@ fn craig_bampton_bodies_have_frames_at_their_interfaces() {
     let modes = ModeSettings { wanted: Wanted::Lowest(6), ..ModeSettings::default() };
     let basis = BasisChoice::CraigBampton(CraigBampton);
     let settings = ConvertSettings { modes, basis, ..ConvertSettings::default() };
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     assert_same("craig-bampton", &body, "double", &["-O3"]);
     let header = exported(&body, "double", &Points::Usual).beside.remove(0).1;
     let header = String::from_utf8(header).expect("ASCII");

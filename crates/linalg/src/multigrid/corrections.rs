@@ -62,9 +62,9 @@ struct Slot {
     /// r'z at first, and last.
     first: f64,
     last: f64,
-    /// Whether the aim is reached, or not waited for any more.
+    /// True when the aim is reached, or not waited for any more.
     is_reached: bool,
-    /// Whether more steps gain anything.
+    /// True when more steps gain anything.
     is_at_end: bool,
 }
 

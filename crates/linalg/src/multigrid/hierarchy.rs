@@ -48,7 +48,7 @@ pub trait Levels {
     fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64;
 }
 
-/// Whether nodes with so many rows, and a body with so many rigid modes, can have levels.
+/// Returns true when nodes with so many rows, and a body with so many rigid modes, can have levels.
 pub fn can_have_levels(pencil: &Pencil<'_>, rigid_modes: usize) -> bool {
     matches!((pencil.block(), rigid_modes), (3, 6) | (2, 3))
 }

@@ -3,6 +3,7 @@
 use super::{Scene, Stage, instants, trace};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 
 /// Largest part of the stiffness of any motion of `body` that its stiffness of inertia has along the motion of
 /// `scene`, an upper bound over the directions of spin and acceleration; `None` where it has none.
@@ -12,12 +13,12 @@ use flexbody_body::flex_body::FlexBody;
 ///
 /// # Errors
 /// As [`simulate`](super::simulate).
-pub fn inertia_share(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<Option<f64>> {
+pub fn inertia_share(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<Option<f64>> {
     let stage = Stage::new(body, scene)?;
     let Some(inertia) = stage.body.inertia_stiffness() else { return Ok(None) };
     let stiffness = stage.body.invariants().modal_stiffness();
     let Some(shares) = inertia.shares(stiffness.as_ref()) else { return Ok(None) };
-    let (motion, _) = trace(body, scene, memory, |_| {})?;
+    let (motion, _) = trace(body, scene, &context.unheard())?;
     let seen = instants(body, scene, &motion.time)?;
     let at = seen.iter().map(|now| {
         let acceleration = now.velocity_rate + now.omega.cross(&now.velocity) - now.gravity;

@@ -4,6 +4,7 @@ use super::{Recording, Scene, Scheme, Stage, simulate};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest error that the momentum may make of a rate, relative to the largest rate, before the run is repeated with finer
@@ -36,7 +37,7 @@ const FINEST_TOLERANCE: f64 = 1e-13;
 /// the run is repeated with finer steps, and the rates of both are compared at the instants of `recording`.
 ///
 /// * `recording`: the motion of `body` in `scene`.
-/// * `memory`: bytes that there are for another recording; `None` where it is not known.
+/// * `context`: its memory bounds another recording.
 ///
 /// # Errors
 /// Those of [`Stage::new`]. A finer run that takes too long is none: then nothing is told.
@@ -44,7 +45,7 @@ pub fn unsettled_rate(
     body: &FlexBody,
     scene: &Scene,
     recording: &Recording,
-    memory: Option<u64>,
+    context: &Context<'_>,
 ) -> Result<Option<Diagnostic>> {
     if scene.prescribes() {
         return Ok(None);
@@ -52,7 +53,7 @@ pub fn unsettled_rate(
     let stage = Stage::new(body, scene)?;
     let inertia = stage.body.invariants().inertia();
     let Some(finer) = finer(&inertia, scene, recording.scheme) else { return Ok(None) };
-    let Ok((finer, _)) = simulate(body, &finer, memory, |_| ()) else { return Ok(None) };
+    let Ok((finer, _)) = simulate(body, &finer, &context.unheard()) else { return Ok(None) };
     Ok(change(&inertia, recording, &finer))
 }
 

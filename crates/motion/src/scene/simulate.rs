@@ -10,6 +10,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::{FlexBody, SOFTENING, axis_in_words};
+use flexbody_linalg::context::Context;
 use flexbody_model::LoadKind;
 use nalgebra::Vector3;
 
@@ -27,8 +28,8 @@ const WATCHED: usize = 12;
 
 /// The motion of `body` in `scene` at the instants that it writes, with warnings and notes about it.
 ///
-/// * `memory`: bytes that there are for the recording and tables of it; `None` where it is not known.
-/// * `watch`: hears which part of the duration is done.
+/// * `context`: its memory bounds the recording and the tables of it; its listener hears the fraction of the duration that
+///   is done.
 ///
 /// # Errors
 /// FB212 where the scene does not fit the body; FB550, before any work, when the run takes more steps than it
@@ -36,21 +37,20 @@ const WATCHED: usize = 12;
 pub fn simulate(
     body: &FlexBody,
     scene: &Scene,
-    memory: Option<u64>,
-    mut watch: impl FnMut(f64),
+    context: &Context<'_>,
 ) -> Result<(Recording, Vec<Diagnostic>)> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
     let scene = &*stage.scene;
     let run = Prepared::new(body, scene)?;
-    refuse_too_much(body, scene, memory)?;
+    refuse_too_much(body, scene, context)?;
     let outputs = scene.run.outputs;
     let time: Vec<f64> = (0..=outputs).map(|i| run.duration * (i as f64 / outputs as f64)).collect();
     let mut recorder = Recorder::new(body, scene, &run, time.len());
     let mut survey = Survey::new(body, &run.watched);
     let record = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
         if sight != Sight::Instant {
-            watch(time / run.duration);
+            context.fraction(time / run.duration);
             return run.survey(&mut survey, sight, time, state, motion).map(|_| ());
         }
         recorder.record(time, state, motion)
@@ -129,11 +129,11 @@ impl<'r> Recorder<'r> {
 
 /// # Errors
 /// FB601 when the recording does not fit the memory.
-fn refuse_too_much(body: &FlexBody, scene: &Scene, memory: Option<u64>) -> Result<()> {
+fn refuse_too_much(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<()> {
     let numbers = NUMBERS + 2 * body.n_modes() + WATCHED * scene.watched.len();
     let instants = scene.run.outputs + 1;
     let needed = instants as f64 * numbers as f64 * BYTES;
-    refuse_beyond(memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
+    refuse_beyond(context.memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
 }
 
 /// Warnings about a motion with these extremes: where it leaves the range in which the model holds.

@@ -10,6 +10,7 @@ use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use nalgebra::Vector3;
 
 /// The continuous motion of a body: at the ends of the steps of its integration, at both sides of every
@@ -62,22 +63,17 @@ impl Trace {
 
 /// The continuous motion of `body` in `scene`, with warnings and notes about it.
 ///
-/// * `memory`, `watch`: as for [`simulate`](super::simulate).
+/// * `context`: as for [`simulate`](super::simulate).
 ///
 /// # Errors
 /// As [`simulate`](super::simulate).
-pub fn trace(
-    body: &FlexBody,
-    scene: &Scene,
-    memory: Option<u64>,
-    mut watch: impl FnMut(f64),
-) -> Result<(Trace, Vec<Diagnostic>)> {
+pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(Trace, Vec<Diagnostic>)> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
     let scene = &*stage.scene;
     let run = Prepared::new(body, scene)?;
     let bytes = Trace::bytes_of_instant(body.n_modes(), run.watched.len());
-    let most = memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
+    let most = context.memory.map_or(f64::INFINITY, |memory| memory as f64 / bytes);
     let mut tracer = Tracer::new(&run);
     let mut survey = Survey::new(body, &run.watched);
     let look = |sight: Sight, time: f64, state: &[f64], motion: &mut Motion<'_>| {
@@ -87,7 +83,7 @@ pub fn trace(
         if tracer.trace.time.len() as f64 >= most {
             return Err(Stop::Memory { time });
         }
-        watch(time / run.duration);
+        context.fraction(time / run.duration);
         let reaction = run.survey(&mut survey, sight, time, state, motion)?;
         tracer.see(time, state, motion, reaction);
         Ok(())
@@ -102,17 +98,17 @@ pub fn trace(
 /// extremes there are none.
 ///
 /// * `times`: ascending, from 0 to the end of the scene.
-/// * `memory`: bytes that there are for the motion; `None` where it is not known.
+/// * `context`: its memory bounds the motion.
 ///
 /// # Errors
 /// As [`simulate`](super::simulate).
-pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], memory: Option<u64>) -> Result<Trace> {
+pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context<'_>) -> Result<Trace> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
     let run = Prepared::new(body, &stage.scene)?;
     let needed = times.len() as f64 * Trace::bytes_of_instant(body.n_modes(), run.watched.len());
     refuse_beyond(
-        memory,
+        context.memory,
         needed,
         &format!("the motion at {} instants", times.len()),
         "simulate a shorter `duration`",

@@ -7,7 +7,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, LoadKind};
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use oracle::flexible::{fixture, stressed};
@@ -97,7 +97,7 @@ fn interfaces_and_identities_come_along_and_the_way_back_is_the_body() {
         basis: BasisChoice::CraigBampton(CraigBampton),
         ..ConvertSettings::default()
     };
-    let body: FlexBody = convert(&model, &settings, SILENT).expect("converts").body;
+    let body: FlexBody = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     assert!(body.coordinates().is_some() && body.interfaces().iter().any(|i| i.reference.is_some()));
     let there = body.in_units(&other()).expect("a body");
     let failed: Vec<_> = there.identities(BodyFrame::Com).into_iter().filter(|c| !c.passed).collect();

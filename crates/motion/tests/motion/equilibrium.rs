@@ -3,6 +3,7 @@
 use flexbody_base::error::Error;
 use flexbody_body::flex_body::{FlexBody, GeometricStiffness, LoadKind, UnitLoad};
 use flexbody_body::invariants::BodyFrame;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, NodeSet, RawModel};
 use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
 use nalgebra::{DMatrix, DVector};
@@ -41,7 +42,7 @@ fn scene(text: &str) -> Scene {
 }
 
 fn run(body: &FlexBody, text: &str) -> Result<Recording, Error> {
-    simulate(body, &scene(text), None, |_| ()).map(|(recording, _)| recording)
+    simulate(body, &scene(text), &Context::QUIET).map(|(recording, _)| recording)
 }
 
 fn first_rate(body: &FlexBody) -> f64 {

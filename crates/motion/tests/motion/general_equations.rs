@@ -248,7 +248,7 @@ fn converted(name: &str, modes: usize) -> Conversion {
         frame: BodyFrame::Com.into(),
         ..ConvertSettings::default()
     };
-    convert(&model, &settings, &|_| {}).expect("converts")
+    convert(&model, &settings, &flexbody_linalg::context::Context::QUIET).expect("converts")
 }
 
 /// The invariants of a conversion with the signs of `like`: signs are free where rotations decide them.

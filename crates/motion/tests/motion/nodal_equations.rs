@@ -7,7 +7,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::{FlexBody, Frame};
 use flexbody_eigen::Wanted;
 use flexbody_input::{ModelFiles, read_model};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{CscMatrix, sum_terms};
 use flexbody_model::{Damping, DofLabel, FeModel, RawModel};
 use flexbody_motion::dynamics::{
@@ -168,7 +168,7 @@ fn the_axes_of_the_frame_do_not_matter() {
 fn converted(raw: RawModel, modes: usize) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    let body = convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT)
+    let body = convert(&model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
         .expect("converts")
         .body;
     (model, body)

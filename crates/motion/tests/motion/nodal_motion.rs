@@ -5,7 +5,7 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
 use flexbody_motion::dynamics::{
     Configuration, EmptySpace, EquationsOfMotion, EulerParameters, Evaluation, Motion, NodalConfiguration,
@@ -29,7 +29,9 @@ fn model_of(raw: RawModel) -> FeModel {
 /// What flexbody makes of a model with so many modes, in the principal frame.
 fn body_of(model: &FeModel, modes: usize) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT).expect("converts").body
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
+        .expect("converts")
+        .body
 }
 
 /// All that there are.

@@ -6,7 +6,7 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::{Carrier, FlexBody, Frame};
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{DofLabel, FeModel, Nodes, RawMatrix, RawModel};
 use flexbody_motion::dynamics::{
     AlongFrame, Configuration, EquationsOfMotion, EulerParameters, Evaluation, NodalConfiguration,
@@ -450,7 +450,7 @@ fn carried_nodes_accelerate_as_carried_modes_to_second_order() {
         let model = FeModel::from_raw(raw).expect("a body").model;
         let modes = ModeSettings { wanted: Wanted::Lowest(10_000), ..ModeSettings::default() };
         let settings = ConvertSettings { modes, ..ConvertSettings::default() };
-        let body = convert(&model, &settings, SILENT).expect("converts").body;
+        let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
         let carried = body.carried(&Carrier::Node(node)).expect("carried");
         let at = |amplitude| carried_apart(&model, &carried, node, amplitude);
         if name == "rigid face" {

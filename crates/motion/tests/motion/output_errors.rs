@@ -5,7 +5,7 @@ use flexbody_body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, multiply};
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EulerParameters, Orientation};
@@ -26,7 +26,7 @@ fn scene(duration: f64) -> Scene {
 }
 
 fn motion(body: &FlexBody, scene: &Scene) -> Trace {
-    trace(body, scene, None, |_| ()).expect("a motion").0
+    trace(body, scene, &Context::QUIET).expect("a motion").0
 }
 
 /// The motion with other modal coordinates.
@@ -185,7 +185,7 @@ fn bodies(model: &FeModel) -> [FlexBody; 2] {
     let made = |count: usize, residual_vectors: Vec<Loads>| {
         let modes = ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() };
         let basis = BasisChoice::Free(FreeSurface { residual_vectors });
-        convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT)
+        convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, &Context::QUIET)
             .expect("converts")
             .body
     };
@@ -212,7 +212,7 @@ fn two_bases_of_one_model_are_apart_by_the_energy_of_the_difference_of_displacem
     let mut turning = scene(3.0 / rate);
     turning.initial.angular_velocity *= 0.3 * rate;
     let whole = motion(&reference, &turning);
-    let recordings = [trace_at(&candidate, &turning, &whole.time, None).expect("a motion"), whole];
+    let recordings = [trace_at(&candidate, &turning, &whole.time, &Context::QUIET).expect("a motion"), whole];
     let found = Measure::new(&reference, &recordings[1]).of_other(&recordings[0], &modes).largest();
 
     // Displacements of all rows, and their energy, one instant after the other.

@@ -3,6 +3,7 @@
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, Scene, simulate, unsettled_rate};
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::flexible::body_of;
@@ -28,8 +29,8 @@ fn turning(tolerance: f64, duration: f64, rates: [f64; 3]) -> Scene {
 
 /// Rates about the axis, and what is told of them.
 fn rates_of(body: &FlexBody, scene: &Scene) -> (Vec<f64>, Option<Diagnostic>) {
-    let recording = simulate(body, scene, None, |_| ()).expect("a motion").0;
-    let told = unsettled_rate(body, scene, &recording, None).expect("a body");
+    let recording = simulate(body, scene, &Context::QUIET).expect("a motion").0;
+    let told = unsettled_rate(body, scene, &recording, &Context::QUIET).expect("a body");
     (recording.states.iter().map(|state| state.omega.x).collect(), told)
 }
 

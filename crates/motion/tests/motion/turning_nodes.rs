@@ -8,7 +8,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::{Carrier, FlexBody, LoadKind, UnitLoad};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, DofLabel, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Terms};
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
@@ -24,7 +24,7 @@ fn converted(raw: RawModel, modes: usize, frame: BodyFrame) -> (FeModel, FlexBod
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, frame: frame.into(), ..ConvertSettings::default() };
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     (model, body)
 }
 
@@ -520,7 +520,7 @@ fn a_cantilever_with_an_offset_mass_has_the_closed_form() {
     let basis = BasisChoice::CraigBampton(CraigBampton);
     let settings =
         ConvertSettings { modes, basis, frame: BodyFrame::Model.into(), ..ConvertSettings::default() };
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     let carried = body.carried(&Carrier::Interface("root".to_owned())).expect("carried");
 
     let (length, extension, bending) = (1.0, 1e6, 2e3);

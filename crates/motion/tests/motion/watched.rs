@@ -6,7 +6,7 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Damping, FeModel, RawMatrix, RawModel};
 use flexbody_motion::dynamics::{NodalEquations, NodalEvaluation, NodalModes, ReferenceConditions};
 use flexbody_motion::scene::{LoadCases, ModeStart, Path, Point, Recording, Scene, simulate};
@@ -26,7 +26,7 @@ fn scene(text: &str) -> Scene {
 }
 
 fn recorded(body: &FlexBody, scene: &Scene) -> Recording {
-    simulate(body, scene, None, |_| ()).expect("a motion").0
+    simulate(body, scene, &Context::QUIET).expect("a motion").0
 }
 
 /// What is left of the velocity and of the acceleration when central differences of the places are taken from
@@ -104,7 +104,7 @@ fn whole(raw: RawModel) -> (FeModel, FlexBody) {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(10_000), ..ModeSettings::default() };
     let settings = ConvertSettings { modes, frame: BodyFrame::Com.into(), ..ConvertSettings::default() };
-    let body = convert(&model, &settings, SILENT).expect("converts").body;
+    let body = convert(&model, &settings, &Context::QUIET).expect("converts").body;
     (model, body)
 }
 

@@ -7,7 +7,7 @@ use flexbody_body::convert::{Conversion, ConvertSettings, convert};
 use flexbody_body::invariants::BodyFrame;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Damping, DampingBand, FeModel, RawMatrix, RawModel};
 use flexbody_report::{Facts, Format, RunData, render};
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -27,7 +27,7 @@ fn run(raw: RawModel, frame: BodyFrame) -> Result<Conversion> {
     let mut settings =
         ConvertSettings { frame: frame.into(), lumped: Vec::new(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(12);
-    let mut done = convert(&checked.model, &settings, SILENT)?;
+    let mut done = convert(&checked.model, &settings, &Context::QUIET)?;
     done.diagnostics.splice(0..0, checked.diagnostics);
     Ok(done)
 }

@@ -11,7 +11,7 @@ use flexbody_body::invariants::{BodyFrame, IdentityCheck};
 use flexbody_body::verification::verify;
 use flexbody_eigen::Wanted;
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{
     Damping, FeModel, GeometricStiffness, LoadKind, NodeSet, RawMatrix, RawModel, UnitLoad,
 };
@@ -114,7 +114,7 @@ fn run(raw: RawModel, frame: BodyFrame, basis: BasisChoice) -> Result<Conversion
     let mut settings =
         ConvertSettings { frame: frame.into(), basis, lumped: Vec::new(), ..ConvertSettings::default() };
     settings.modes.wanted = Wanted::Lowest(10);
-    let mut done = convert(&checked.model, &settings, SILENT)?;
+    let mut done = convert(&checked.model, &settings, &Context::QUIET)?;
     done.diagnostics.splice(0..0, checked.diagnostics);
     Ok(done)
 }

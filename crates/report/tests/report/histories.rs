@@ -4,6 +4,7 @@
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{EulerParameters, Orientation, RotationVector};
 use flexbody_motion::scene::{LoadCases, Recording, simulate};
 use flexbody_report::simulation_csv;
@@ -27,7 +28,7 @@ fn run(body: &FlexBody, text: &str, files: &[(&str, &str)]) -> Recording {
     let path = folder.path().join("scene.toml");
     fs::write(&path, text).expect("written");
     let scene = LoadCases::read_single(&path, None).unwrap_or_else(|error| panic!("{error}\n{text}"));
-    simulate(body, &scene, None, |_| ()).unwrap_or_else(|error| panic!("{error}\n{text}")).0
+    simulate(body, &scene, &Context::QUIET).unwrap_or_else(|error| panic!("{error}\n{text}")).0
 }
 
 /// Rows of numbers.

@@ -6,12 +6,13 @@ use flexbody_base::diagnostic::Code;
 use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, ImportedShapes, ModalBasis, ModeSettings, Task, free_surface};
 use flexbody_body::convert::{Conversion, ConvertSettings, convert};
-use flexbody_eigen::{Accuracy, Proof, Resume, Wanted};
+use flexbody_eigen::{Accuracy, Proof, Wanted};
 use flexbody_input::{MatrixLocation, read_manifest, read_model, read_shapes};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawShapes, rigid_fields};
 use flexbody_report::{Tolerances, compare};
 use hdf5_metno::File;
+use oracle::counted::counted;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::files::{DofOrder, Numbering, reordered};
 use oracle::mesh::Mesh;
@@ -35,7 +36,7 @@ fn settings(wanted: Wanted, accuracy: Accuracy) -> ModeSettings {
 
 fn free(model: &FeModel) -> Mat<f64> {
     let settings = settings(Wanted::Lowest(COUNT), Accuracy::Certified);
-    free_surface(model, &settings, SILENT).expect("a sound model").solution.vectors
+    free_surface(model, &settings, &Context::QUIET).expect("a sound model").solution.vectors
 }
 
 /// Columns in internal order, by matrix rows.
@@ -59,14 +60,15 @@ fn imported(model: &FeModel, internal: &Mat<f64>, digits: u8) -> ImportedShapes 
 
 fn modes_of(model: &FeModel, shapes: ImportedShapes, accuracy: Accuracy) -> Result<ModalBasis> {
     let settings = settings(Wanted::Lowest(usize::MAX), accuracy);
-    let task = Task { model, settings: &settings, resume: Resume::default(), watch: SILENT };
+    let task = Task { model, settings: &settings, context: &Context::QUIET };
     BasisChoice::Imported(shapes).basis().modes(&task)
 }
 
 fn converted(model: &FeModel, basis: BasisChoice, accuracy: Accuracy) -> Conversion {
     let count = if basis == BasisChoice::default() { COUNT } else { usize::MAX };
     let modes = settings(Wanted::Lowest(count), accuracy);
-    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, SILENT).expect("a body")
+    convert(model, &ConvertSettings { modes, basis, ..ConvertSettings::default() }, &Context::QUIET)
+        .expect("a body")
 }
 
 fn codes(conversion: &Conversion) -> Vec<Code> {
@@ -122,9 +124,13 @@ fn certified_bounds_hold_for_imported_eigenvectors_too() {
 #[test]
 fn accuracy_fast_factors_nothing() {
     let model = bracket();
-    let found =
-        modes_of(&model, imported(&model, &free(&model), 17), Accuracy::Fast).expect("shapes").solution;
-    assert_eq!((found.counters.factorizations, found.counters.factor_len), (0, 0));
+    let shapes = imported(&model, &free(&model), 17);
+    let settings = settings(Wanted::Lowest(usize::MAX), Accuracy::Fast);
+    let (found, work) = counted(|context| {
+        BasisChoice::Imported(shapes).basis().modes(&Task { model: &model, settings: &settings, context })
+    });
+    let found = found.expect("shapes").solution;
+    assert_eq!((work.factorizations, work.factor_len), (0, 0));
     assert_eq!(found.completeness.proof, Proof::NotProved);
 }
 

@@ -4,7 +4,7 @@ use super::estimate::{Estimate, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError}
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::side_by_side;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Scene};
@@ -20,8 +20,6 @@ const MOST_ROUNDS_OF_FINE: usize = 12;
 /// How far a body is enriched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Enrichment {
-    /// Bytes that there are; `None` where it is not known.
-    pub memory: Option<u64>,
     /// Whether it can be enriched at all: what it lacks is estimated in any case.
     pub grows: bool,
     /// Whether it has to come within [`PART_OF_FINE`] of the tolerances instead of [`PART_OF_REFERENCE`].
@@ -64,7 +62,7 @@ pub fn enrich<B>(
     model: &FeModel,
     cases: &LoadCases,
     enrichment: Enrichment,
-    watch: Watch<'_>,
+    context: &Context<'_>,
     mut make: impl FnMut(&Mat<f64>) -> Result<B>,
     body: impl Fn(&B) -> &FlexBody,
 ) -> Result<Enriched<B>> {
@@ -76,8 +74,8 @@ pub fn enrich<B>(
     let mut poorer = None;
     let (enough, most_rounds) = (enrichment.enough(), enrichment.most_rounds());
     for round in 0..=most_rounds {
-        watch(Event::Phase("what the body lacks of the model"));
-        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, enrichment.memory);
+        context.phase("what the body lacks of the model");
+        let estimate = |scene: &Scene| Estimate::new(model, body(&made), scene, enough, context);
         let estimates = cases.iter().map(estimate).collect::<Result<Vec<_>>>()?;
         if estimates.iter().all(Option::is_none) {
             break;

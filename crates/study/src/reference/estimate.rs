@@ -10,6 +10,7 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::CoupledModel;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::not_negative;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
@@ -163,7 +164,7 @@ impl Estimate {
         body: &FlexBody,
         scene: &Scene,
         allowed: f64,
-        memory: Option<u64>,
+        context: &Context<'_>,
     ) -> Result<Option<Self>> {
         let Some(duration) = scene.run.duration else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
@@ -180,7 +181,7 @@ impl Estimate {
         let of_model = model.damping().filter(|_| !given);
         let view = |coupled| NodalView::new(coupled, body, loads.clone(), carrier.as_ref(), of_model);
         let Some(own) = view(coupled) else { return Ok(None) };
-        let (motion, _) = trace(body, scene, memory, |_| ())?;
+        let (motion, _) = trace(body, scene, &context.unheard())?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
             let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);
             return Ok(Some(Self { error, missing: Mat::zeros(model.rows().len(), 0) }));

@@ -5,6 +5,7 @@ use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::basis::BasisChoice;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{
     LoadCases, Measure, OtherModes, OutputErrors, Scene, Stage, Trace, trace, trace_at,
@@ -47,10 +48,10 @@ impl<'m> MotionBodies<'m> {
         model: &'m FeModel,
         reference: &'m FlexBody,
         cases: &'m LoadCases,
-        memory: Option<u64>,
+        context: &Context<'_>,
     ) -> Result<Option<Self>> {
         let case = |scene: &'m Scene| -> Result<Case<'m>> {
-            let (motion, _) = trace(reference, scene, memory, |_| ())?;
+            let (motion, _) = trace(reference, scene, &context.unheard())?;
             Ok(Case { scene, staged: Stage::new(reference, scene)?.body.into_owned(), motion })
         };
         let cases = cases.iter().map(case).collect::<Result<Vec<_>>>()?;
@@ -144,7 +145,7 @@ impl Case<'_> {
         };
         let mut scene = stage.scene.into_owned();
         scene.run.scheme = self.motion.scheme;
-        let motion = trace_at(&stage.body, &scene, &self.motion.time, None)?;
+        let motion = trace_at(&stage.body, &scene, &self.motion.time, &Context::QUIET)?;
         Ok(Some(measure.of_other(&motion, &modes).largest()))
     }
 }

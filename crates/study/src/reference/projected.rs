@@ -165,7 +165,7 @@ mod tests {
     use flexbody_body::convert::{ConvertSettings, convert};
     use flexbody_eigen::Wanted;
     use flexbody_input::{read_manifest, read_model};
-    use flexbody_linalg::progress::SILENT;
+    use flexbody_linalg::context::Context;
     use flexbody_linalg::uniform;
     use flexbody_model::FeModel;
     use flexbody_motion::scene::{Point, nodal_point};
@@ -221,7 +221,7 @@ mod tests {
             let model = FeModel::from_raw(raw).expect("a sound model").model;
             let modes = ModeSettings { wanted: Wanted::Lowest(4), ..ModeSettings::default() };
             let settings = ConvertSettings { modes, lumped: Vec::new(), ..ConvertSettings::default() };
-            let body = convert(&model, &settings, SILENT).expect("a body").body;
+            let body = convert(&model, &settings, &Context::QUIET).expect("a body").body;
             let at =
                 |node: usize| nodal_point(&model, &Point::Node(model.nodes().ids[node])).expect("a node");
             let load = at(3).unit_loads(&model);

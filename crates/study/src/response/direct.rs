@@ -4,6 +4,7 @@ use faer::{Mat, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::basis::CoupledModel;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{
     Analysis, Indefinite, Pencil, add_combination, gram, largest_entry, side_by_side, subtract_combination,
 };
@@ -62,7 +63,7 @@ impl<'m> DirectSolver<'m> {
         [loads, measured]: [&Mat<f64>; 2],
         damping: Option<(&Mat<f64>, &Mat<f64>)>,
         solves: usize,
-        (memory, longest): (Option<u64>, Option<f64>),
+        context: &Context<'_>,
     ) -> Result<Self> {
         let pencil = model.pencil();
         let ordering =
@@ -76,15 +77,15 @@ impl<'m> DirectSolver<'m> {
         subtract_combination(loads.as_mut(), rigid_products.as_ref(), rigid_loads.as_ref());
         let damping = damping.and_then(|(u, c)| damped_columns(&model.restrict(u.clone()), c));
         let solver = Self { pencil, analysis, rigid, rigid_products, loads, measured, rigid_gain, damping };
-        solver.refuse_too_much(solves, memory, longest)?;
+        solver.refuse_too_much(solves, context)?;
         Ok(solver)
     }
 
-    fn refuse_too_much(&self, solves: usize, memory: Option<u64>, longest: Option<f64>) -> Result<()> {
+    fn refuse_too_much(&self, solves: usize, context: &Context<'_>) -> Result<()> {
         let (n, columns) = (self.pencil.n(), self.columns());
         let numbers = self.analysis.peaks(rayon::current_num_threads()).inertia;
         let bytes = 8 * (numbers + self.analysis.factor_len() as u64 + (4 * n * columns) as u64);
-        if let Some(available) = memory.filter(|available| bytes > *available) {
+        if let Some(available) = context.memory.filter(|available| bytes > *available) {
             let message = format!(
                 "solving the equations of all {n} rows at a frequency needs {:.3} GB on top of the matrices, {:.3} GB are left",
                 bytes as f64 * 1e-9,
@@ -94,7 +95,7 @@ impl<'m> DirectSolver<'m> {
         }
         let each = 2.0 * self.analysis.flops() + 12.0 * (self.analysis.factor_len() * columns) as f64;
         let seconds = solves as f64 * each / PACE;
-        if longest.is_some_and(|longest| seconds > longest) {
+        if context.longest.is_some_and(|longest| seconds > longest) {
             let message = format!(
                 "solving the equations of all {n} rows at {solves} frequencies takes about {:.1} hours on one processor",
                 seconds / 3600.0

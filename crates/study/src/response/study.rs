@@ -13,7 +13,7 @@ use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::basis::{CoupledModel, rigid_modes};
 use flexbody_body::flex_body::FlexBody;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, largest, side_by_side};
 use flexbody_model::{DampingRatios, FeModel};
 use flexbody_motion::scene::Requirements;
@@ -40,10 +40,6 @@ pub struct ResponseSettings {
     pub replaces_damping: bool,
     /// Largest relative error.
     pub tolerance: f64,
-    /// Bytes that may be allocated, and seconds that the solves may take by their estimate.
-    pub memory: Option<u64>,
-    /// See `memory`.
-    pub longest: Option<f64>,
 }
 
 impl ResponseSettings {
@@ -162,7 +158,7 @@ pub fn respond(
     from: &[Place],
     to: &[Place],
     settings: &ResponseSettings,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<Response> {
     let mean = body.in_mean_axes()?;
     let body = &*damped(&mean, settings)?;
@@ -172,7 +168,7 @@ pub fn respond(
     let damping = Some(body.damping()).filter(|c| c.norm_max() > 0.0);
     let reduced = reduced_sum(&at_centre, &rows(from)?, &rows(to)?, damping.clone());
     let known = match model {
-        Some(model) => Some(Known::new(model, body, [from, to], damping.as_ref(), settings, watch)?),
+        Some(model) => Some(Known::new(model, body, [from, to], damping.as_ref(), context)?),
         None => None,
     };
     let resonances =
@@ -184,7 +180,7 @@ pub fn respond(
     let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units());
     if let Some(known) = &known {
         curves.look_closer(&blocks, settings.tolerance, solves.div_ceil(4));
-        curves.solve(known, body.units(), watch)?;
+        curves.solve(known, body.units(), context)?;
     }
     let [low, high] = settings.band.ends();
     let in_band = |f: &f64| *f >= low && *f <= high;
@@ -262,8 +258,7 @@ struct Known<'m> {
     /// nothing to respond to.
     enriched: Option<ModalSum>,
     damping: Option<Mat<f64>>,
-    /// Memory and time that solutions may take.
-    limits: (Option<u64>, Option<f64>),
+    context: Context<'m>,
 }
 
 impl<'m> Known<'m> {
@@ -272,20 +267,19 @@ impl<'m> Known<'m> {
         body: &FlexBody,
         [from, to]: [&[Place]; 2],
         damping: Option<&Mat<f64>>,
-        settings: &ResponseSettings,
-        watch: Watch<'_>,
+        context: &Context<'m>,
     ) -> Result<Self> {
-        watch(Event::Phase("estimate of the error"));
+        context.phase("estimate of the error");
         let nodal = nodal_modes(model, body, from, to)?;
         let enriched = nodal.enriched(body, damping)?;
-        Ok(Self { nodal, enriched, damping: damping.cloned(), limits: (settings.memory, settings.longest) })
+        Ok(Self { nodal, enriched, damping: damping.cloned(), context: *context })
     }
 
     /// The equations of all nodes of `model`, under the couplings of the body or without, for `solves` frequencies.
     fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
         let NodalModes { inertial, loads, measured, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
-        DirectSolver::new(model, [loads, measured], damping, solves, self.limits)
+        DirectSolver::new(model, [loads, measured], damping, solves, &self.context)
     }
 
     /// The model whose interfaces deform; `None` where no interface of the body is rigid.
@@ -388,17 +382,17 @@ impl Curves {
     }
 
     /// Solves the equations of all nodes, under the couplings of the body and, where these hold something, without.
-    fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, watch: Watch<'_>) -> Result<()> {
-        watch(Event::Phase("equations of all nodes"));
+    fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, context: &Context<'_>) -> Result<()> {
+        context.phase("equations of all nodes");
         let deforming = known.deforming();
         let studies = if deforming.is_some() { 2 } else { 1 };
         let count = studies * self.frequencies.iter().filter(|f| f.solved).count();
         let solver = known.direct_solver(&known.nodal.model, count)?;
         self.flops = solver.flops();
-        let part = |from: f64| move |done: f64| watch(Event::Fraction((from + done) / studies as f64));
+        let part = |from: f64| move |done: f64| context.fraction((from + done) / studies as f64);
         self.full = self.solutions(&solver, units, &part(0.0))?;
         if let Some(model) = &deforming {
-            watch(Event::Phase("equations of all nodes, interfaces that deform"));
+            context.phase("equations of all nodes, interfaces that deform");
             self.deforming = self.solutions(&known.direct_solver(model, count)?, units, &part(1.0))?;
         }
         Ok(())

@@ -6,6 +6,7 @@ use super::trial::{Trial, TrialRuns};
 use super::variation::Variation;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroup, TermGroups};
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{OutputErrors, Range, Scene, points_of};
 use nalgebra::Vector3;
@@ -79,14 +80,14 @@ pub(super) struct Case<'c> {
     pub situation: Situation,
     loads: Vec<BodyPoint>,
     watched: Vec<BodyPoint>,
-    memory: Option<u64>,
+    context: Context<'c>,
 }
 
 impl<'c> Case<'c> {
-    pub(super) fn new(body: &'c FlexBody, scene: &'c Scene, memory: Option<u64>) -> Result<Self> {
+    pub(super) fn new(body: &'c FlexBody, scene: &'c Scene, context: &Context<'c>) -> Result<Self> {
         let (loads, watched) = points_of(body, scene)?;
         let situation = Situation::new(body, scene, &loads);
-        Ok(Self { body, scene, situation, loads, watched, memory })
+        Ok(Self { body, scene, situation, loads, watched, context: context.unheard() })
     }
 
     /// Sizes of the terms at tier 0 and, where they are wanted and the body holds all groups, at tier 1.
@@ -101,8 +102,8 @@ impl<'c> Case<'c> {
     }
 
     pub(super) fn runs(&self) -> TrialRuns<'_> {
-        let Self { body, scene, situation, loads, watched, memory } = self;
-        TrialRuns { body, scene, situation, loads, watched, memory: *memory }
+        let Self { body, scene, situation, loads, watched, context } = self;
+        TrialRuns { body, scene, situation, loads, watched, context: *context }
     }
 }
 

@@ -10,7 +10,7 @@ use crate::reference::{PART_OF_REFERENCE, ReferenceError};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::TermGroups;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{Measure, Trace};
 
 /// What was tried and what is chosen so far.
@@ -78,13 +78,13 @@ impl<'s> Deciding<'s> {
     }
 
     /// Chooses terms and modes by motion that is integrated; gives the reason for the modes.
-    pub(super) fn choose_by_motion(&mut self, watch: Watch<'_>) -> Result<String> {
-        watch(Event::Phase("reference motion"));
+    pub(super) fn choose_by_motion(&mut self, context: &Context<'_>) -> Result<String> {
+        context.phase("reference motion");
         let references = self.reference_motions()?;
         let demands = self.demands;
         let both = demands.iter().zip(&references);
         let cases: Vec<TriedCase<'_>> = both.map(|(demand, motions)| Self::tried(demand, motions)).collect();
-        watch(Event::Phase("trials"));
+        context.phase("trials");
         let fixed = demands.iter().zip(&self.short_of).filter(|(_, short)| short.is_some());
         let search = SelectionSearch {
             cases: &cases,

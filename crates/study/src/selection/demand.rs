@@ -7,6 +7,7 @@ use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{PerQuantity, Scene, Stage, Tolerance, damped_once, points_of};
 use std::borrow::Cow;
@@ -57,13 +58,13 @@ impl<'c> Demand<'c> {
     pub(super) fn new(
         stage: &'c OnStage<'_>,
         name: Option<&'c str>,
-        memory: Option<u64>,
+        context: &Context<'c>,
         tier_1: bool,
     ) -> Result<Self> {
         let (body, scene) = (&*stage.body, &*stage.scene);
         let (loads, _) = points_of(body, scene)?;
         let cases =
-            stage.scenes.iter().map(|one| Case::new(body, one, memory)).collect::<Result<Vec<_>>>()?;
+            stage.scenes.iter().map(|one| Case::new(body, one, context)).collect::<Result<Vec<_>>>()?;
         let bounds = bounded(&cases, tier_1)?;
         Ok(Self {
             name,

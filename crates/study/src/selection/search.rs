@@ -4,6 +4,7 @@ use super::cases::{Case, sets_in, together, worst};
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{Measure, Scene, Tolerance, Trace};
 
 /// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are
@@ -52,7 +53,7 @@ fn by_weight(weights: &[f64]) -> Vec<usize> {
 pub fn liveliest_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usize>> {
     let mut weight = vec![0.0f64; cases.first().map_or(0, |(body, ..)| body.n_modes())];
     for (body, scene, motion) in cases {
-        let case = Case::new(body, scene, None)?;
+        let case = Case::new(body, scene, &Context::QUIET)?;
         let own = weights(&case.runs().shares(motion), &scene.requirements.tolerance);
         weight.iter_mut().zip(own).for_each(|(weight, own)| *weight = weight.max(own));
     }

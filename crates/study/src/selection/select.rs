@@ -12,7 +12,7 @@ use crate::reference::ReferenceError;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroups};
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, PerQuantity};
 
 /// What was decided, and on what grounds.
@@ -83,12 +83,12 @@ impl Selection {
 ///
 /// # Errors
 /// FB212 where a scene does not fit the body; those of [`simulate`](flexbody_motion::scene::simulate).
-pub fn rule_out(body: &FlexBody, cases: &LoadCases, memory: Option<u64>) -> Result<Vec<TermDecision>> {
+pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Result<Vec<TermDecision>> {
     if cases.iter().any(|scene| scene.carried.is_some()) {
         return Ok(Vec::new());
     }
     let stages = stages(body, cases)?;
-    let demands = demands(&stages, cases, memory, false)?;
+    let demands = demands(&stages, cases, context, false)?;
     let passed = |(at, demand): (usize, &Demand<'_>)| {
         let trial = demand.bounds.iter().find(|trial| trial.passed())?;
         Some(Trial { case: Some(at), ..trial.clone() })
@@ -119,20 +119,19 @@ pub fn select(
     body: &FlexBody,
     lacks: &[Vec<ReferenceError>],
     cases: &LoadCases,
-    memory: Option<u64>,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<Selection> {
     body.require_mean_axes("select")?;
     let stages = stages(body, cases)?;
-    watch(Event::Phase("bounds"));
-    let mut demands = demands(&stages, cases, memory, true)?;
+    context.phase("bounds");
+    let mut demands = demands(&stages, cases, context, true)?;
     for (demand, lacks) in demands.iter_mut().zip(lacks) {
         demand.lacks = lacks;
     }
     let mut deciding = Deciding::new(&demands);
     let mode_reason = match deciding.has_run() {
         false => deciding.choose_by_band(),
-        true => deciding.choose_by_motion(watch)?,
+        true => deciding.choose_by_motion(context)?,
     };
     let Deciding { choice, trials, diagnostics, short_of, chosen_by_case, .. } = deciding;
     for (demand, short_of) in demands.iter_mut().zip(short_of) {
@@ -178,10 +177,10 @@ fn stages<'s>(body: &'s FlexBody, cases: &'s LoadCases) -> Result<Vec<OnStage<'s
 fn demands<'d>(
     stages: &'d [OnStage<'_>],
     cases: &'d LoadCases,
-    memory: Option<u64>,
+    context: &Context<'d>,
     tier_1: bool,
 ) -> Result<Vec<Demand<'d>>> {
-    let demand = |(at, stage)| Demand::new(stage, cases.case_name(at), memory, tier_1);
+    let demand = |(at, stage)| Demand::new(stage, cases.case_name(at), context, tier_1);
     stages.iter().enumerate().map(demand).collect()
 }
 

@@ -9,6 +9,7 @@ use super::variation::Variation;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
     ErrorHistory, LEAST_REACTION, Load, Measure, OutputErrors, Recording, Resolution, Scene, Spin, Trace,
@@ -75,8 +76,8 @@ pub struct TrialRuns<'a> {
     pub loads: &'a [BodyPoint],
     /// Watched points.
     pub watched: &'a [BodyPoint],
-    /// Memory for recordings.
-    pub memory: Option<u64>,
+    /// The limits of recordings.
+    pub context: Context<'a>,
 }
 
 impl TrialRuns<'_> {
@@ -87,7 +88,7 @@ impl TrialRuns<'_> {
     pub fn motion(&self, kept: TermGroups) -> Result<(Trace, Vec<Diagnostic>)> {
         let mut scene = self.scene.clone();
         scene.run.terms = Terms::ALL.held(kept);
-        trace(self.body, &scene, self.memory, |_| ())
+        trace(self.body, &scene, &self.context)
     }
 
     /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the
@@ -107,7 +108,7 @@ impl TrialRuns<'_> {
         }
         scene.run.outputs = (followed as usize).max(LEAST_INSTANTS);
         scene.run.terms = Terms::ALL.held(kept);
-        let (motion, _) = simulate(self.body, &scene, self.memory, |_| ())?;
+        let (motion, _) = simulate(self.body, &scene, &self.context)?;
         let is_followed = wanted(self.liveliest(&motion)) <= followed.max(LEAST_INSTANTS as f64);
         Ok(is_followed.then_some(motion))
     }
@@ -166,7 +167,7 @@ impl TrialRuns<'_> {
         scene.run.terms = Terms::ALL.held(kept);
         // The same steps: errors are those of the model.
         scene.run.scheme = measure.trace().scheme;
-        let history = match trace_at(body, &scene, &measure.trace().time, self.memory) {
+        let history = match trace_at(body, &scene, &measure.trace().time, &self.context) {
             Ok(trace) => Ok(measure.of_subset(&trace, modes)),
             Err(error) if error.diagnostics().iter().all(|d| ends_a_run(d.code())) => {
                 Err(error.first_error().message().to_owned())

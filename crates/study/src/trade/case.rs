@@ -1,11 +1,11 @@
 //! The motion of a load case that candidates are measured against.
 
-use super::{Allowed, Candidate, InCase, NodalReference, Source, TradeSettings, timing};
+use super::{Candidate, InCase, NodalReference, Source, timing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_base::memory::refuse_beyond;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::integration::Work;
@@ -36,26 +36,23 @@ impl<'m> StudyCase<'m> {
         scene: &Scene,
         name: Option<String>,
         nodal: Option<&'m FeModel>,
-        settings: &TradeSettings<'_>,
         reserved: f64,
-        watch: Watch<'_>,
+        context: &Context<'_>,
     ) -> Result<Self> {
-        watch(Event::Phase("reference"));
+        context.phase("reference");
         let whole = sources[0].body();
-        nodal.map(|model| NodalReference::refuse(model, whole, scene, settings.longest)).transpose()?;
+        nodal.map(|model| NodalReference::refuse(model, whole, scene, context)).transpose()?;
         let stage = Stage::new(whole, scene)?;
         let sources = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
         // Groups are what candidates differ in.
         let mut scene = stage.scene.into_owned();
         scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
-        let full = |part| watch(Event::Fraction(part));
-        let (motion, said) = trace(sources[0].body(), &scene, settings.memory, full)?;
-        refuse_too_much(&sources, &motion, settings.memory)?;
+        let (motion, said) = trace(sources[0].body(), &scene, context)?;
+        refuse_too_much(&sources, &motion, context.memory)?;
         let nodal = match nodal {
             Some(model) => {
-                watch(Event::Phase("nodal reference"));
-                let allowed = Allowed { memory: settings.memory, longest: settings.longest };
-                Some(NodalReference::new(model, sources[0].body(), &scene, &motion, allowed, watch)?)
+                context.phase("nodal reference");
+                Some(NodalReference::new(model, sources[0].body(), &scene, &motion, context)?)
             }
             None => None,
         };
@@ -104,7 +101,7 @@ impl<'m> StudyCase<'m> {
         let mut scene = self.own_scene(body, candidate);
         scene.run.scheme = self.motion.scheme;
         let instants = self.nodal.as_ref().map_or(&self.motion.time[..], NodalReference::time);
-        let motion = trace_at(body, &scene, instants, None)?;
+        let motion = trace_at(body, &scene, instants, &Context::QUIET)?;
         let history = match &self.nodal {
             Some(nodal) => nodal.errors(body, &motion),
             None => source.errors(measure, body, &candidate.modes, &motion),

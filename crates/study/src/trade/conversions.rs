@@ -1,6 +1,6 @@
 //! Bodies that the settings of a conversion make of one model.
 
-use super::{Allowed, Source};
+use super::Source;
 use crate::reference::{Enriched, Enrichment, MotionBodies, ReferenceError, enrich};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -8,7 +8,7 @@ use flexbody_base::error::Result;
 use flexbody_body::basis::{BasisChoice, FreeSurface, Loads, ModeSettings};
 use flexbody_body::convert::{ConvertSettings, Lumping, convert};
 use flexbody_eigen::{Accuracy, Wanted};
-use flexbody_linalg::progress::Watch;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::LoadCases;
 use std::collections::BTreeMap;
@@ -50,10 +50,9 @@ pub fn conversions(
     model: &FeModel,
     cases: &LoadCases,
     wanted: WantedBodies,
-    allowed: Allowed,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<Conversions> {
-    let making = Making::new(model, allowed, watch);
+    let making = Making::new(model, context);
     let WantedBodies { modes, fine } = wanted;
     let finest =
         Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard, lumped: None };
@@ -62,8 +61,8 @@ pub fn conversions(
         responses.clone_from(loads);
         making.make(&finest, loads, ConvertSettings::default().lumped)
     };
-    let enrichment = Enrichment { memory: allowed.memory, grows: true, is_fine: fine };
-    let enriched = enrich(model, cases, enrichment, watch, make, |(made, _)| made.body())?;
+    let enrichment = Enrichment { grows: true, is_fine: fine };
+    let enriched = enrich(model, cases, enrichment, context, make, |(made, _)| made.body())?;
     let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
     diagnostics.extend(warnings(cases, &lacks, enrichment.enough()));
     let mut sources = vec![reference];
@@ -170,28 +169,22 @@ struct Making<'m> {
     model: &'m FeModel,
     /// Loads of the residual vectors.
     loads: Vec<Loads>,
-    allowed: Allowed,
-    watch: Watch<'m>,
+    context: Context<'m>,
 }
 
 impl<'m> Making<'m> {
-    fn new(model: &'m FeModel, allowed: Allowed, watch: Watch<'m>) -> Self {
+    fn new(model: &'m FeModel, context: &Context<'m>) -> Self {
         let mut loads = vec![Loads::Centrifugal];
         if !model.interfaces().is_empty() {
             loads.push(Loads::Interfaces);
         }
-        Self { model, loads, allowed, watch }
+        Self { model, loads, context: *context }
     }
 
     /// Settings of a conversion with so many modes, without lumped comparators.
     fn settings(&self, modes: usize) -> ConvertSettings {
         ConvertSettings {
-            modes: ModeSettings {
-                wanted: Wanted::Lowest(modes),
-                memory: self.allowed.memory,
-                longest: self.allowed.longest,
-                ..ModeSettings::default()
-            },
+            modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
             lumped: Vec::new(),
             ..ConvertSettings::default()
         }
@@ -214,7 +207,7 @@ impl<'m> Making<'m> {
             ..own
         };
         let start = Instant::now();
-        let conversion = convert(self.model, &settings, self.watch)?;
+        let conversion = convert(self.model, &settings, &self.context)?;
         let seconds = start.elapsed().as_secs_f64();
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
@@ -227,8 +220,7 @@ impl<'m> Making<'m> {
             return Ok(Vec::new());
         }
         let start = Instant::now();
-        let Some(bodies) = MotionBodies::new(self.model, reference.body(), cases, self.allowed.memory)?
-        else {
+        let Some(bodies) = MotionBodies::new(self.model, reference.body(), cases, &self.context)? else {
             return Ok(Vec::new());
         };
         let before = start.elapsed().as_secs_f64() + reference.preprocessing().unwrap_or(0.0);
@@ -249,7 +241,7 @@ impl<'m> Making<'m> {
     fn of_shapes(&self, bodies: &MotionBodies<'_>, count: usize, before: f64) -> Result<Source> {
         let start = Instant::now();
         let settings = ConvertSettings { basis: bodies.basis(count), ..self.settings(usize::MAX) };
-        let body = convert(self.model, &settings, self.watch)?.body;
+        let body = convert(self.model, &settings, &self.context)?.body;
         let name = format!("{count} shape{} of the motion", if count == 1 { "" } else { "s" });
         Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
     }

@@ -14,7 +14,7 @@ mod timing;
 pub use candidate::{Candidate, CandidateKind, LumpedMass};
 pub use conversions::{Conversions, WantedBodies, conversions};
 pub use front::{Recommendation, front};
-pub use nodal::{Allowed, NodalIntegration, NodalReference};
+pub use nodal::{NodalIntegration, NodalReference};
 pub use row::{Failed, InCase, Measured, Timed, TradeRow};
 pub use settings::{TradeSettings, reserved};
 pub use source::Source;

@@ -7,13 +7,9 @@ use crate::reference::ReferenceError;
 pub struct TradeSettings<'s> {
     /// Integrations whose median time counts; of those that take long, fewer.
     pub repeat: usize,
-    /// Bytes that there are; `None` where it is not known.
-    pub memory: Option<u64>,
     /// Part of the tolerances that the reference lacks of its model itself, in each load case: candidates get
     /// the rest. Nothing is known of cases that it does not reach.
     pub reserved: &'s [f64],
-    /// Seconds that the motion of all nodes may take by its estimate, in each case; `None`: any.
-    pub longest: Option<f64>,
 }
 
 /// What the reference of a study lacks of its model in each load case, by the rounds in which it was

@@ -10,7 +10,7 @@ use crate::selection::liveliest_modes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::{FlexBody, Storage, TermGroups};
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
@@ -122,7 +122,7 @@ pub fn trade(
     cases: &LoadCases,
     nodal: Option<&FeModel>,
     settings: &TradeSettings<'_>,
-    watch: Watch<'_>,
+    context: &Context<'_>,
 ) -> Result<Trade> {
     let Some(source) = sources.first() else {
         return Err(Diagnostic::new(Code::Usage, "there is nothing to compare").into());
@@ -130,15 +130,14 @@ pub fn trade(
     let studied = |(at, scene): (usize, &Scene)| {
         let reserved = settings.reserved.get(at).copied().unwrap_or(0.0);
         let name = cases.case_name(at).map(str::to_owned);
-        StudyCase::new(sources, scene, name, nodal, settings, reserved, watch)
-            .map_err(|error| cases.about(at, error))
+        StudyCase::new(sources, scene, name, nodal, reserved, context).map_err(|error| cases.about(at, error))
     };
     let allowed = cases.iter().filter_map(|scene| scene.requirements.multiplications).min();
     let (scene, tolerance) = (cases.name().to_owned(), cases.least_tolerance());
     let cases = cases.iter().enumerate().map(studied).collect::<Result<Vec<_>>>()?;
     let measures = cases.iter().map(StudyCase::measure).collect();
     let job = Job { cases: &cases, measures, allowed };
-    let rows = job.rows(settings.repeat, watch)?;
+    let rows = job.rows(settings.repeat, context)?;
     let recommended = Recommendation::new(&rows, allowed);
     let seen = |at: usize| TradeCase::new(at, &cases[at], &rows, recommended);
     Ok(Trade {
@@ -179,20 +178,20 @@ impl TradeCase {
 
 /// Candidates that are done, told as the fraction of all.
 struct Progress<'w> {
-    watch: Watch<'w>,
+    context: &'w Context<'w>,
     count: f64,
     done: AtomicUsize,
 }
 
 impl<'w> Progress<'w> {
-    fn new(watch: Watch<'w>, phase: &'static str, count: usize) -> Self {
-        watch(Event::Phase(phase));
-        Self { watch, count: count as f64, done: AtomicUsize::new(0) }
+    fn new(context: &'w Context<'w>, phase: &'static str, count: usize) -> Self {
+        context.phase(phase);
+        Self { context, count: count as f64, done: AtomicUsize::new(0) }
     }
 
     fn step(&self) {
         let finished = self.done.fetch_add(1, Ordering::Relaxed) + 1;
-        (self.watch)(Event::Fraction(finished as f64 / self.count));
+        self.context.fraction(finished as f64 / self.count);
     }
 }
 
@@ -213,10 +212,10 @@ impl Job<'_> {
 
     /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one
     /// after the other.
-    fn rows(&self, repeat: usize, watch: Watch<'_>) -> Result<Vec<TradeRow>> {
+    fn rows(&self, repeat: usize, context: &Context<'_>) -> Result<Vec<TradeRow>> {
         let carried = self.cases.iter().any(|case| case.scene.carried.is_some());
         let whole = whole_candidates(self.sources(), carried);
-        let mut rows = self.errors(whole, "errors of whole bodies", watch)?;
+        let mut rows = self.errors(whole, "errors of whole bodies", context)?;
         let worst_of = |groups: TermGroups| {
             let has_groups = |row: &&TradeRow| {
                 let own = &row.candidate;
@@ -228,9 +227,9 @@ impl Job<'_> {
         let motions = self.cases.iter().map(|case| (case.sources[0].body(), &case.scene, &case.motion));
         let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
         let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
-        rows.extend(self.errors(some_modes, "errors of fewer modes", watch)?);
+        rows.extend(self.errors(some_modes, "errors of fewer modes", context)?);
         self.refine(&liveliest, &mut rows)?;
-        self.time_what_is_worth_it(&mut rows, repeat, watch)?;
+        self.time_what_is_worth_it(&mut rows, repeat, context)?;
         Ok(rows)
     }
 
@@ -274,12 +273,17 @@ impl Job<'_> {
         Ok(())
     }
 
-    fn time_what_is_worth_it(&self, rows: &mut [TradeRow], repeat: usize, watch: Watch<'_>) -> Result<()> {
+    fn time_what_is_worth_it(
+        &self,
+        rows: &mut [TradeRow],
+        repeat: usize,
+        context: &Context<'_>,
+    ) -> Result<()> {
         let recommended = Recommendation::new(rows, self.allowed).row();
         let mut worth_it: Vec<usize> = front(rows).into_iter().chain(recommended).chain([0]).collect();
         worth_it.sort_unstable();
         worth_it.dedup();
-        let progress = Progress::new(watch, "times", worth_it.len());
+        let progress = Progress::new(context, "times", worth_it.len());
         for at in worth_it {
             self.time(&mut rows[at], repeat)?;
             progress.step();
@@ -288,8 +292,13 @@ impl Job<'_> {
     }
 
     /// The rows of candidates, without times.
-    fn errors(&self, all: Vec<Candidate>, phase: &'static str, watch: Watch<'_>) -> Result<Vec<TradeRow>> {
-        let progress = Progress::new(watch, phase, all.len());
+    fn errors(
+        &self,
+        all: Vec<Candidate>,
+        phase: &'static str,
+        context: &Context<'_>,
+    ) -> Result<Vec<TradeRow>> {
+        let progress = Progress::new(context, phase, all.len());
         let measured = |candidate| {
             let row = self.measure(candidate);
             progress.step();

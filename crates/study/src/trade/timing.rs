@@ -2,6 +2,7 @@
 
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, NotPositiveDefinite, Terms};
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{Scene, simulate};
@@ -43,7 +44,7 @@ pub(super) fn integration(body: &FlexBody, scene: &Scene, repeat: usize) -> Resu
     let (mut times, mut work) = (Vec::new(), Work::default());
     while times.len() < repeat.max(1) && times.iter().sum::<Duration>() < LONG {
         let start = Instant::now();
-        work = simulate(body, scene, None, |_| ())?.0.work;
+        work = simulate(body, scene, &Context::QUIET)?.0.work;
         times.push(start.elapsed());
     }
     Ok((median(&mut times).as_secs_f64(), work))

@@ -3,7 +3,7 @@
 
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::FlexBody;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
     Axes, History, Initial, Load, PerQuantity, Point, Recording, Requirements, Run, Scene, Scheme, Stage,
@@ -63,7 +63,7 @@ fn pulse(body: &FlexBody, periods: f64) -> History {
 }
 
 fn motion(body: &FlexBody, scene: &Scene) -> Recording {
-    simulate(body, scene, None, |_| ()).expect("a motion").0
+    simulate(body, scene, &Context::QUIET).expect("a motion").0
 }
 
 /// Largest deflection of the watched points at the instants that were written.
@@ -112,7 +112,7 @@ fn a_selection_for_a_pulse_holds_at_every_instant() {
     let mut scene = scene(&body, 40.0, 100, &pulse(&body, 40.0));
     scene.requirements.tolerance.errors.deflection = 0.02;
     scene.requirements.tolerance.errors.stress = 0.05;
-    let selection = select(&body, &[], &scene.clone().into(), None, SILENT).expect("a selection");
+    let selection = select(&body, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");
     assert!(selection.holds() && selection.modes.len() > 1, "{:?}", selection.modes);
     let own = body.reduced(&selection.modes, selection.groups, selection.terms.clone()).expect("a body");
     scene.run.outputs = 20_000;
@@ -130,7 +130,7 @@ fn a_load_that_is_sampled_once_in_its_period_is_seen() {
     let history = History::Sine { amplitude: 1.0, frequency: 5.0 * rate / TAU, phase: 0.0 };
     let of = |outputs| {
         let scene = scene(&body, 20.0, outputs, &history);
-        select(&body, &[], &scene.into(), None, SILENT).expect("a selection")
+        select(&body, &[], &scene.into(), &Context::QUIET).expect("a selection")
     };
     let (sparse, dense) = (of(100), of(20_000));
     assert_eq!(sparse, dense);
@@ -152,10 +152,10 @@ proptest! {
         doing.rate *= 0.1;
         let mut scene = doing.scene(whole, free);
         scene.requirements.tolerance.errors = PerQuantity::all(tolerance);
-        prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
-        let first = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
+        prop_assume!(simulate(whole, &scene, &Context::QUIET).is_ok());
+        let first = select(whole, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");
         scene.run.outputs = outputs;
-        let again = select(whole, &[], &scene.clone().into(), None, SILENT).expect("a selection");
+        let again = select(whole, &[], &scene.clone().into(), &Context::QUIET).expect("a selection");
         prop_assert_eq!(&first, &again);
 
         // What is written is within the extremes, and where it is dense reaches them.
@@ -218,8 +218,9 @@ fn a_body_at_rest_does_not_drift() {
 #[test]
 fn runs_of_more_steps_than_allowed_are_refused_before_they_begin() {
     let body = soft_block(4);
-    let refused =
-        |scene: &Scene| simulate(&body, scene, None, |_| ()).expect_err("too long").diagnostics()[0].code();
+    let refused = |scene: &Scene| {
+        simulate(&body, scene, &Context::QUIET).expect_err("too long").diagnostics()[0].code()
+    };
     let fast = History::Sine { amplitude: 1.0, frequency: 1e12, phase: 0.0 };
     assert_eq!(refused(&scene(&body, 5.0, 10, &fast)), Code::RunTooLong);
     let mut conserving = scene(&body, 5.0, 10, &fast);
@@ -234,9 +235,9 @@ fn runs_of_more_steps_than_allowed_are_refused_before_they_begin() {
     let pulse = History::Table { times: vec![0.0, 0.5, 0.6, 0.8], values: vec![0.0, 0.0, 1.0, 0.0] };
     let mut exact = scene(&body, 1.0, 10, &pulse);
     exact.run.scheme = Scheme::Conserving { order: 4, step: Some(0.01) };
-    let taken = simulate(&body, &exact, None, |_| ()).expect("a motion").0.work.steps;
+    let taken = simulate(&body, &exact, &Context::QUIET).expect("a motion").0.work.steps;
     exact.run.most_steps = taken;
-    simulate(&body, &exact, None, |_| ()).expect("as many steps as are allowed");
+    simulate(&body, &exact, &Context::QUIET).expect("as many steps as are allowed");
     exact.run.most_steps = taken - 1;
     assert_eq!(refused(&exact), Code::RunTooLong);
 }

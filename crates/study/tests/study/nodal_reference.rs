@@ -6,13 +6,13 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_eigen::Wanted;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Initial, Load, OutputErrors, Point, Requirements, Scene,
     Scheme, Spin, Stage, Trace, VectorHistory, trace, trace_at,
 };
-use flexbody_study::trade::{Allowed, NodalReference};
+use flexbody_study::trade::NodalReference;
 use nalgebra::Vector3;
 use oracle::beams::{BeamMass, star};
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -80,7 +80,9 @@ fn model_of(raw: RawModel) -> FeModel {
 
 fn body_of(model: &FeModel, modes: usize) -> FlexBody {
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
-    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, SILENT).expect("a body").body
+    convert(model, &ConvertSettings { modes, ..ConvertSettings::default() }, &Context::QUIET)
+        .expect("a body")
+        .body
 }
 
 /// First circular frequency, mass, and length of a body: what forces and rates are measured in. Forces and the
@@ -199,14 +201,14 @@ impl Size {
 /// The motion of a body, that of the nodes of its model, and the errors between them.
 fn errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> (Trace, OutputErrors) {
     let stage = Stage::new(body, scene).expect("a stage");
-    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ()).expect("a motion");
-    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)
-        .expect("a reference");
+    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET).expect("a motion");
+    let nodal =
+        NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET).expect("a reference");
     if matches!(scene.run.scheme, Scheme::Conserving { .. }) {
         // Steps end where they do.
         assert_eq!(nodal.time(), motion.time, "the same steps");
     }
-    let own = trace_at(&stage.body, &stage.scene, nodal.time(), None).expect("a motion");
+    let own = trace_at(&stage.body, &stage.scene, nodal.time(), &Context::QUIET).expect("a motion");
     let errors = nodal.errors(&stage.body, &own).expect("of one model").largest();
     (motion, errors)
 }
@@ -431,11 +433,11 @@ fn implicit_and_explicit_steps_meet_in_one_motion() {
         let stage = Stage::new(&whole, &scene(Scheme::Conserving { order: 4, step: Some(step / size.rate) }))
             .map(|stage| (stage.body.into_owned(), stage.scene.into_owned()))
             .expect("a stage");
-        let (motion, _) = trace(&stage.0, &stage.1, None, |_| ()).expect("a motion");
-        let nodal = NodalReference::new(&model, &stage.0, &stage.1, &motion, Allowed::default(), SILENT)
-            .expect("a reference");
+        let (motion, _) = trace(&stage.0, &stage.1, &Context::QUIET).expect("a motion");
+        let nodal =
+            NodalReference::new(&model, &stage.0, &stage.1, &motion, &Context::QUIET).expect("a reference");
         let staged = Stage::new(&whole, &exact).expect("a stage");
-        let own = trace_at(&staged.body, &staged.scene, nodal.time(), None).expect("a motion");
+        let own = trace_at(&staged.body, &staged.scene, nodal.time(), &Context::QUIET).expect("a motion");
         nodal.errors(&whole_of(&staged), &own).expect("of one model").largest().stress.expect("deformed")
     };
     let errors = [0.1, 0.05, 0.025].map(error);
@@ -454,13 +456,18 @@ fn long_work_is_refused_with_what_it_takes() {
     let size = Size::new(&body);
     let mut scene = size.scene(Scheme::Adaptive { tolerance: 1e-9 });
     scene.run.duration = Some(1e12 / size.rate);
-    let error = NodalReference::refuse(&model, &body, &scene, Some(1800.0)).expect_err("too long");
+    let error =
+        NodalReference::refuse(&model, &body, &scene, &Context { longest: Some(1800.0), ..Context::QUIET })
+            .expect_err("too long");
     let found = &error.diagnostics()[0];
     assert_eq!(found.code(), Code::WorkLong);
     assert!(found.message().contains("1800 s are allowed"), "{}", found.message());
-    assert!(NodalReference::refuse(&model, &body, &scene, None).is_ok());
+    assert!(NodalReference::refuse(&model, &body, &scene, &Context::QUIET).is_ok());
     scene.run.duration = Some(1.0 / size.rate);
-    assert!(NodalReference::refuse(&model, &body, &scene, Some(1800.0)).is_ok());
+    assert!(
+        NodalReference::refuse(&model, &body, &scene, &Context { longest: Some(1800.0), ..Context::QUIET })
+            .is_ok()
+    );
 }
 
 #[test]
@@ -468,12 +475,13 @@ fn geometric_stiffness_is_refused_unless_the_body_is_carried() {
     let model = model_of(raw_fixture("turbine_blade"));
     let body = body_of(&model, 4);
     let mut scene = Size::new(&body).scene(Scheme::Adaptive { tolerance: 1e-9 });
-    let error = NodalReference::refuse(&model, &body, &scene, None).expect_err("geometric stiffness");
+    let error =
+        NodalReference::refuse(&model, &body, &scene, &Context::QUIET).expect_err("geometric stiffness");
     let found = &error.diagnostics()[0];
     assert_eq!(found.code(), Code::Usage);
     assert!(found.message().contains("geometric stiffness"), "{}", found.message());
     scene.carried = Some(Carried { by: Point::Interface("root".to_owned()), spin: None, translation: None });
-    assert!(NodalReference::refuse(&model, &body, &scene, None).is_ok());
+    assert!(NodalReference::refuse(&model, &body, &scene, &Context::QUIET).is_ok());
 }
 
 proptest! {

@@ -9,8 +9,8 @@ use flexbody_body::basis::ModeSettings;
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
-use flexbody_eigen::{Resume, Wanted};
-use flexbody_linalg::progress::SILENT;
+use flexbody_eigen::Wanted;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, NodeSet, RawModel, Reference};
 use flexbody_motion::dynamics::Terms;
 use flexbody_motion::scene::{
@@ -19,7 +19,7 @@ use flexbody_motion::scene::{
 };
 use flexbody_study::selection::select;
 use flexbody_study::tailoring::Tailoring;
-use flexbody_study::trade::{Allowed, NodalReference};
+use flexbody_study::trade::NodalReference;
 use nalgebra::Vector3;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::general::raw_fixture;
@@ -231,7 +231,7 @@ fn case(seed: u64) -> Case {
     let mut random = Random(seed.wrapping_mul(0x5851_f42d_4c95_7f2d));
     let random = &mut random;
     let (name, model) = model(random);
-    let probe = convert(&model, &settings(6), SILENT).expect("a body").body;
+    let probe = convert(&model, &settings(6), &Context::QUIET).expect("a body").body;
     let rate = probe.modes().eigenvalue[0].sqrt();
     let duration = between(random, 0.5, 2.0) * TAU / rate;
     let start = if pick(random, 4) == 0 { Start::Shock } else { Start::Calm };
@@ -294,7 +294,7 @@ fn driven_case(seed: u64) -> Case {
     let random = &mut Random(seed.wrapping_mul(0xd134_2543_de82_ef95));
     let rigid = if case.model.dimension() == 2 { 3 } else { 6 };
     let count = case.model.rows().len() - rigid;
-    let all = convert(&case.model, &settings(count), SILENT).expect("a body").body;
+    let all = convert(&case.model, &settings(count), &Context::QUIET).expect("a body").body;
     let beyond = case.modes as u64 + pick(random, (2 * case.modes as u64).min((count - case.modes) as u64));
     let frequency = all.modes().eigenvalue[beyond as usize].sqrt() / TAU;
     let duration = case.scene.run.duration.expect("a run").max(between(random, 10.0, 40.0) / frequency);
@@ -364,7 +364,7 @@ fn scale_loads(scene: &mut Scene, probe: &FlexBody) {
     // Deflections of a load this small are linear in it.
     let small = 1e-9 * probe.modes().eigenvalue[0] * probe.invariants().mass() * probe.extent();
     alone.loads.iter_mut().for_each(|load| load.force = load.force.scaled(small));
-    let (motion, _) = trace(probe, &alone, None, |_| ()).expect("a motion");
+    let (motion, _) = trace(probe, &alone, &Context::QUIET).expect("a motion");
     let factor = small * DEFLECTION / motion.extremes.deflection.value.max(f64::MIN_POSITIVE);
     scene.loads.iter_mut().for_each(|load| load.force = load.force.scaled(factor));
 }
@@ -372,8 +372,8 @@ fn scale_loads(scene: &mut Scene, probe: &FlexBody) {
 /// Errors of `body` in `scene` against the motion of all nodes.
 fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> Result<OutputErrors> {
     let stage = Stage::new(body, scene)?;
-    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ())?;
-    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)?;
+    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET)?;
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET)?;
     errors_beside(&nodal, &stage.body, &stage.scene, &motion)
 }
 
@@ -385,7 +385,7 @@ fn errors_beside(
 ) -> Result<OutputErrors> {
     let mut scene = scene.clone();
     scene.run.scheme = motion.scheme;
-    let own = trace_at(body, &scene, nodal.time(), None)?;
+    let own = trace_at(body, &scene, nodal.time(), &Context::QUIET)?;
     Ok(nodal.errors(body, &own).expect("a body of the model").largest())
 }
 
@@ -403,10 +403,10 @@ fn outcome(case: &Case) -> Result<Outcome> {
     let tolerance = scene.requirements.tolerance;
     let tailoring = Tailoring { settings: settings(*modes), by_band: false, of_motion: false };
     let cases = scene.clone().into();
-    let enriched = tailoring.convert(model, &cases, Resume::default(), SILENT)?;
+    let enriched = tailoring.convert(model, &cases, &Context::QUIET)?;
     let rounds = &enriched.rounds[0];
     let made = &enriched.made.body;
-    let plain = convert(model, &settings(*modes), SILENT)?.body;
+    let plain = convert(model, &settings(*modes), &Context::QUIET)?.body;
     let mut effectivity = Vec::new();
     if let Some(first) = rounds.first() {
         effectivity.extend(effectivities(
@@ -415,10 +415,10 @@ fn outcome(case: &Case) -> Result<Outcome> {
             tolerance.errors.stress,
         ));
     }
-    let selection = select(made, &enriched.rounds, &cases, None, SILENT)?;
+    let selection = select(made, &enriched.rounds, &cases, &Context::QUIET)?;
     let stage = Stage::new(made, scene)?;
-    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ())?;
-    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)?;
+    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET)?;
+    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET)?;
     if rounds.len() > 1 {
         let found = errors_beside(&nodal, &stage.body, &stage.scene, &motion)?;
         let last = rounds.last().expect("a round");

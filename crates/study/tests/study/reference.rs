@@ -7,9 +7,9 @@ use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
 use flexbody_body::verification::accept;
-use flexbody_eigen::{Resume, Wanted};
+use flexbody_eigen::Wanted;
+use flexbody_linalg::context::Context;
 use flexbody_linalg::gram;
-use flexbody_linalg::progress::SILENT;
 use flexbody_model::{Coupling, Damping, FeModel, NodeSet, RawModel};
 use flexbody_motion::scene::{
     Axes, Carried, CarriedSpin, Drive, History, Initial, Load, LoadCases, Measure, ModeStart, OtherModes,
@@ -17,7 +17,7 @@ use flexbody_motion::scene::{
 };
 use flexbody_study::reference::{Enriched, Enrichment, PART_OF_REFERENCE, ReferenceError, enrich};
 use flexbody_study::tailoring::{Tailoring, convert_for};
-use flexbody_study::trade::{Allowed, NodalReference};
+use flexbody_study::trade::NodalReference;
 use nalgebra::Vector3;
 use oracle::elements::{ElementKind, MassRule, Material};
 use oracle::mesh::{Mesh, grid};
@@ -68,7 +68,7 @@ fn settings(modes: usize) -> ConvertSettings {
 }
 
 fn body(model: &FeModel, modes: usize) -> FlexBody {
-    convert(model, &settings(modes), SILENT).expect("a body").body
+    convert(model, &settings(modes), &Context::QUIET).expect("a body").body
 }
 
 /// The first circular frequency of the model.
@@ -109,8 +109,8 @@ fn estimated(model: &FeModel, body: &FlexBody, scene: &Scene) -> ReferenceError 
     let found = enrich(
         model,
         &scene.clone().into(),
-        Enrichment { memory: None, grows: false, is_fine: false },
-        SILENT,
+        Enrichment { grows: false, is_fine: false },
+        &Context::QUIET,
         |_| Ok(body.clone()),
         |body| body,
     )
@@ -127,9 +127,9 @@ fn true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> [f64; 2] {
 /// All errors against the motion of all nodes.
 fn all_true_errors(model: &FeModel, body: &FlexBody, scene: &Scene) -> OutputErrors {
     let stage = Stage::new(body, scene).expect("a stage");
-    let (motion, _) = trace(&stage.body, &stage.scene, None, |_| ()).expect("a motion");
-    let nodal = NodalReference::new(model, &stage.body, &stage.scene, &motion, Allowed::default(), SILENT)
-        .expect("a reference");
+    let (motion, _) = trace(&stage.body, &stage.scene, &Context::QUIET).expect("a motion");
+    let nodal =
+        NodalReference::new(model, &stage.body, &stage.scene, &motion, &Context::QUIET).expect("a reference");
     nodal.errors(&stage.body, &motion).expect("of one model").largest()
 }
 
@@ -239,7 +239,7 @@ fn responses_join_a_body_that_is_carried() {
     scene.requirements.tolerance.errors.reaction = 0.05;
     let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: false };
     let Enriched { made, rounds } =
-        tailoring.convert(&model, &scene.clone().into(), Resume::default(), SILENT).expect("a body");
+        tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
     let rounds = &rounds[0];
     let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
     assert!(first.worst > 1.0 && last.worst < PART_OF_REFERENCE, "{rounds:?}");
@@ -314,7 +314,7 @@ fn responses_join_until_what_is_lacking_does_not_count() {
     scene.requirements.tolerance.errors.deflection = 0.2;
     let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: false };
     let Enriched { made, rounds } =
-        tailoring.convert(&model, &scene.clone().into(), Resume::default(), SILENT).expect("a body");
+        tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
     let rounds = &rounds[0];
     let (first, last) = (&rounds[0], &rounds[rounds.len() - 1]);
     assert!(first.modes == 4 && first.worst > 1.0, "{rounds:?}");
@@ -339,14 +339,13 @@ fn a_shock_is_no_reason_for_modes_without_end() {
     scene.requirements.tolerance.errors.stress = 1e-3;
     scene.requirements.tolerance.errors.deflection = 1e-3;
     let tailoring = Tailoring { settings: settings(6), by_band: false, of_motion: false };
-    let shocked =
-        tailoring.convert(&model, &scene.clone().into(), Resume::default(), SILENT).expect("a body");
+    let shocked = tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
     let lack = shocked.rounds[0].last().expect("an estimate");
     assert!(lack.worst > 1.0 && lack.modes == shocked.made.body.n_modes(), "{:?}", shocked.rounds);
     assert!(lack.modes < model.rows().len() / 2, "{:?}", shocked.rounds);
     // The same load is there before.
     scene.initial.settled = true;
-    let calm = tailoring.convert(&model, &scene.clone().into(), Resume::default(), SILENT).expect("a body");
+    let calm = tailoring.convert(&model, &scene.clone().into(), &Context::QUIET).expect("a body");
     assert!(calm.rounds[0].last().expect("an estimate").worst < PART_OF_REFERENCE, "{:?}", calm.rounds);
 }
 
@@ -360,7 +359,7 @@ fn shapes_of_the_motion_hold_the_tolerances_and_are_no_more_than_free_modes() {
     scene.requirements.tolerance.errors.deflection = 0.05;
     let made = |of_motion: bool| {
         let tailoring = Tailoring { settings: settings(12), by_band: false, of_motion };
-        convert_for(&model, &tailoring, &scene.clone().into(), Resume::default(), SILENT).expect("a body")
+        convert_for(&model, &tailoring, &scene.clone().into(), &Context::QUIET).expect("a body")
     };
     let ((free, _), (own, selection)) = (made(false), made(true));
     assert!(own.body.n_modes() <= free.body.n_modes(), "{} {}", own.body.n_modes(), free.body.n_modes());
@@ -386,7 +385,7 @@ fn shapes_of_several_motions_serve_all_of_them() {
     let made = |cases: &[Scene]| {
         let cases = LoadCases::new(cases.to_vec()).expect("a case");
         let tailoring = Tailoring { settings: settings(12), by_band: false, of_motion: true };
-        convert_for(&model, &tailoring, &cases, Resume::default(), SILENT).expect("a body")
+        convert_for(&model, &tailoring, &cases, &Context::QUIET).expect("a body")
     };
     let holds = |body: &FlexBody| {
         cases.each_ref().map(|case| true_errors(&model, body, case).iter().all(|error| *error < 0.05))
@@ -406,7 +405,7 @@ fn a_basis_made_of_a_motion_needs_a_motion_without_numbered_modes() {
     scene.initial.settled = false;
     scene.initial.modes = vec![ModeStart { mode: 0, amplitude: 0.01, rate: 0.0 }];
     let tailoring = Tailoring { settings: settings(4), by_band: false, of_motion: true };
-    let refused = convert_for(&model, &tailoring, &scene.clone().into(), Resume::default(), SILENT);
+    let refused = convert_for(&model, &tailoring, &scene.clone().into(), &Context::QUIET);
     assert!(refused.expect_err("a refusal").has(Code::Usage));
 }
 
@@ -426,7 +425,7 @@ fn a_static_start_stays_as_it_is() {
     });
     scene.run.scheme = Scheme::Adaptive { tolerance: 1e-12 };
     let energies = |scene: &Scene| -> Vec<f64> {
-        let (recording, _) = simulate(&body, scene, None, |_| ()).expect("a motion");
+        let (recording, _) = simulate(&body, scene, &Context::QUIET).expect("a motion");
         recording.balances.iter().map(|balance| balance.elastic).collect()
     };
     let spread = |energies: &[f64]| {
@@ -460,10 +459,10 @@ fn what_is_lacking_is_damped_as_the_model_is() {
 /// Errors of the motion of `body` against that of `whole`, both of one model.
 fn errors_beside(model: &FeModel, whole: &FlexBody, body: &FlexBody, scene: &Scene) -> OutputErrors {
     let [of_whole, own] = [whole, body].map(|body| Stage::new(body, scene).expect("a stage"));
-    let (motion, _) = trace(&of_whole.body, &of_whole.scene, None, |_| ()).expect("a motion");
+    let (motion, _) = trace(&of_whole.body, &of_whole.scene, &Context::QUIET).expect("a motion");
     let mut same_steps = own.scene.clone().into_owned();
     same_steps.run.scheme = motion.scheme;
-    let moved = trace_at(&own.body, &same_steps, &motion.time, None).expect("a motion");
+    let moved = trace_at(&own.body, &same_steps, &motion.time, &Context::QUIET).expect("a motion");
     let [psi, all] = [&own, &of_whole].map(|stage| stage.body.vectors_of(model).expect("of this model"));
     let shared = gram(psi.as_ref(), model.pencil().apply_stiffness(all.as_ref()).as_ref());
     let modes = OtherModes::new(&own.body, &of_whole.body, shared.as_ref()).expect("of one model");
@@ -479,7 +478,7 @@ fn a_rigid_interface_is_rigid_in_the_model_that_the_body_is_compared_with() {
     let basis = BasisChoice::CraigBampton(CraigBampton);
     let of = |modes: usize| {
         let settings = ConvertSettings { basis: basis.clone(), ..settings(modes) };
-        convert(&model, &settings, SILENT).expect("a body").body
+        convert(&model, &settings, &Context::QUIET).expect("a body").body
     };
     let (whole, few) = (of(usize::MAX), of(4));
     let force = Vector3::new(2e-4, 5e-4, -3e-4);

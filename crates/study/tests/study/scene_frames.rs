@@ -3,7 +3,7 @@
 
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::BodyFrame;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{Orientation, RotationVector};
 use flexbody_motion::scene::{LoadCases, Recording, Scene, simulate};
 use flexbody_study::selection::select;
@@ -75,7 +75,7 @@ fn apart(a: &Recording, b: &Recording) -> f64 {
 fn one_scene_is_one_motion_in_three_frames() {
     let bodies = bodies();
     for (name, scene) in golden() {
-        let motions = bodies.iter().map(|body| simulate(body, &scene, None, |_| ()).expect("a motion").0);
+        let motions = bodies.iter().map(|body| simulate(body, &scene, &Context::QUIET).expect("a motion").0);
         let motions: Vec<Recording> = motions.collect();
         for other in &motions[1..] {
             let apart = apart(&motions[0], other);
@@ -102,7 +102,7 @@ fn vectors_along_other_axes_say_the_same() {
     };
     let turn = RotationVector(start).axes();
     for body in &bodies {
-        let run = |scene: &Scene| simulate(body, scene, None, |_| ()).expect("a motion").0;
+        let run = |scene: &Scene| simulate(body, scene, &Context::QUIET).expect("a motion").0;
         let model = run(&text("model", "model", vectors));
         let axes = body.frame().axes;
         let own = run(&text("body", "body", vectors.map(|v| axes.tr_mul(&v))));
@@ -124,7 +124,7 @@ fn selections_and_studies_do_not_know_the_frame() {
         scene.run.outputs = 20;
         let selections = bodies
             .iter()
-            .map(|body| select(body, &[], &scene.clone().into(), None, SILENT).expect("a selection"));
+            .map(|body| select(body, &[], &scene.clone().into(), &Context::QUIET).expect("a selection"));
         let selections: Vec<_> = selections.collect();
         for other in &selections[1..] {
             assert_eq!((other.groups, &other.modes), (selections[0].groups, &selections[0].modes), "{name}");
@@ -134,10 +134,10 @@ fn selections_and_studies_do_not_know_the_frame() {
         }
     }
     let [_, _, (name, scene), _] = golden();
-    let settings = TradeSettings { repeat: 1, memory: None, reserved: &[], longest: None };
+    let settings = TradeSettings { repeat: 1, reserved: &[] };
     let studies = bodies.iter().map(|body| {
         let source = Source::new("body", body.clone(), None).expect("a body");
-        trade(&[source], &scene.clone().into(), None, &settings, SILENT).expect("a study")
+        trade(&[source], &scene.clone().into(), None, &settings, &Context::QUIET).expect("a study")
     });
     let studies: Vec<_> = studies.collect();
     for other in &studies[1..] {

@@ -1,6 +1,7 @@
 //! Guaranteed bounds of the selection, and a random search for a motion that breaks them.
 
 use flexbody_body::flex_body::{FlexBody, TermGroups};
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{BodyPoint, EquationsOfMotion, Evaluation, Terms};
 use flexbody_motion::scene::{
     Axes, Interpolation, Load, Measure, OutputErrors, Point, Recording, Samples, Scene, Stage, Trace,
@@ -59,12 +60,12 @@ impl<'t> Tested<'t> {
 
     fn runs(&self) -> TrialRuns<'_> {
         let Self { body, scene, situation, loads, watched } = self;
-        TrialRuns { body, scene, situation, loads, watched, memory: None }
+        TrialRuns { body, scene, situation, loads, watched, context: Context::QUIET }
     }
 
     /// The motion at the instants of the scene.
     fn recording(&self, kept: TermGroups) -> Recording {
-        simulate(self.body, &self.with(kept), None, |_| ()).expect("a motion").0
+        simulate(self.body, &self.with(kept), &Context::QUIET).expect("a motion").0
     }
 
     /// The continuous motion of the whole body.
@@ -74,7 +75,7 @@ impl<'t> Tested<'t> {
 
     /// That with some groups, where that of the whole body was looked at.
     fn beside(&self, whole: &Trace, kept: TermGroups) -> Trace {
-        trace_at(self.body, &self.with(kept), &whole.time, None).expect("a motion")
+        trace_at(self.body, &self.with(kept), &whole.time, &Context::QUIET).expect("a motion")
     }
 
     fn with(&self, kept: TermGroups) -> Scene {

@@ -2,7 +2,7 @@
 //! at the limits of it.
 
 use flexbody_body::flex_body::{FlexBody, TermGroups};
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::scene::{
     AttachmentKind, Measure, MotionRange, PerQuantity, Range, Requirements, Scene, simulate, trace, trace_at,
@@ -16,7 +16,7 @@ use proptest::prelude::*;
 const INTEGRATION: f64 = 1e-5;
 
 fn selected(body: &FlexBody, scene: &Scene) -> Selection {
-    select(body, &[], &scene.clone().into(), None, SILENT).expect("a selection")
+    select(body, &[], &scene.clone().into(), &Context::QUIET).expect("a selection")
 }
 
 fn reduced(body: &FlexBody, selection: &Selection) -> FlexBody {
@@ -37,9 +37,10 @@ fn faster(scene: &Scene, factor: f64) -> Scene {
 /// The largest error over its tolerance of a selected body in a scene; `None` where the whole body cannot
 /// follow it.
 fn measured(whole: &FlexBody, selection: &Selection, scene: &Scene) -> Option<f64> {
-    let (reference, _) = trace(whole, scene, None, |_| ()).ok()?;
+    let (reference, _) = trace(whole, scene, &Context::QUIET).ok()?;
     let own = reduced(whole, selection);
-    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, None).expect("a motion");
+    let motion = trace_at(&own, &scene.of_modes(&selection.modes), &reference.time, &Context::QUIET)
+        .expect("a motion");
     let errors = Measure::new(whole, &reference).of_subset(&motion, &selection.modes).largest();
     Some(errors.worst(&scene.requirements.tolerance))
 }
@@ -68,7 +69,7 @@ proptest! {
             None => scene.initial.angular_velocity.norm(),
         };
         scene.requirements.motion.angular_velocity = range.map(|range| Range::Any(range * own));
-        prop_assume!(simulate(&whole, &faster(&scene, range.unwrap_or(1.0)), None, |_| ()).is_ok());
+        prop_assume!(simulate(&whole, &faster(&scene, range.unwrap_or(1.0)), &Context::QUIET).is_ok());
         let selection = selected(&whole, &scene);
         for factor in [Some(1.0), range].into_iter().flatten() {
             let Some(worst) = measured(&whole, &selection, &faster(&scene, factor)) else { continue };
@@ -91,7 +92,7 @@ proptest! {
         let mut doing = doing;
         doing.rate *= 0.1;
         let mut scene = doing.scene(whole, free);
-        prop_assume!(simulate(whole, &scene, None, |_| ()).is_ok());
+        prop_assume!(simulate(whole, &scene, &Context::QUIET).is_ok());
         let cost = |body: &FlexBody| EquationsOfMotion::new(body, Terms::ALL).multiplications();
         let least = cost(&whole.reduced(&[0], TermGroups::NONE, selected(whole, &scene).terms.iter().map(|term| {
             let mut term = term.clone();

@@ -5,7 +5,7 @@ use flexbody_body::basis::{BasisChoice, CraigBampton};
 use flexbody_body::convert::{ConvertSettings, convert};
 use flexbody_body::verification::verify;
 use flexbody_linalg::CscMatrix;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, RawModel};
 use nalgebra::DMatrix;
 use oracle::turning::dense;
@@ -46,7 +46,7 @@ fn interfaces_without_mass_leave_all_modes() {
         let modes = lowest(usize::MAX);
         let basis = BasisChoice::CraigBampton(CraigBampton);
         let settings = ConvertSettings { modes, basis, lumped: Vec::new(), ..ConvertSettings::default() };
-        let body = convert(&model, &settings, SILENT).expect("a body").body;
+        let body = convert(&model, &settings, &Context::QUIET).expect("a body").body;
         assert_eq!(body.n_modes(), exact.len(), "{couplings:?}");
         for (own, exact) in body.modes().eigenvalue.iter().zip(&exact) {
             assert!((own / exact - 1.0).abs() < 1e-8, "{couplings:?}: {own} {exact}");

@@ -6,9 +6,9 @@ use flexbody_body::invariants::{
     BodyFrame, Expected, Invariants, LumpedMasses, Turning, choose_frame, condense, condense_lumped,
     identities,
 };
-use flexbody_eigen::{EigenProblem, EigenSettings, Resume, Wanted, solve};
+use flexbody_eigen::{EigenProblem, EigenSettings, Wanted, solve};
 use flexbody_linalg::Pencil;
-use flexbody_linalg::progress::SILENT;
+use flexbody_linalg::context::Context;
 use flexbody_model::rigid_fields;
 use oracle::models::{self, Model};
 
@@ -26,16 +26,10 @@ fn modes(model: &Model, positions: &[[f64; 3]], count: usize) -> Modes {
     let rigid = orthonormalised(&model.scalar_mass, positions, &rigid, false);
     // CalculiX writes 14 digits.
     let first_estimate = 2.0 * model.reference["flexible_eigenvalues"][0].as_f64().expect("number");
-    let problem = EigenProblem {
-        pencil,
-        rigid: rigid.as_ref(),
-        first_estimate,
-        input_error: 0.5e-13,
-        order: None,
-        resume: Resume::default(),
-    };
+    let problem =
+        EigenProblem { pencil, rigid: rigid.as_ref(), first_estimate, input_error: 0.5e-13, order: None };
     let settings = EigenSettings { wanted: Wanted::Lowest(count), ..EigenSettings::default() };
-    let solution = solve(&problem, &settings, SILENT).expect("modes");
+    let solution = solve(&problem, &settings, &Context::QUIET).expect("modes");
     let product = pencil.apply_stiffness(solution.vectors.as_ref());
     Modes {
         stiffness: solution.vectors.transpose() * product,

@@ -5,4 +5,4 @@ mod reference;
 mod seen;
 mod staged;
 
-pub use reference::{Allowed, NodalIntegration, NodalReference};
+pub use reference::{NodalIntegration, NodalReference};

@@ -6,7 +6,7 @@ use super::staged::{Staged, refused};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, LoadKind};
-use flexbody_linalg::progress::{Event, Watch};
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{ErrorHistory, Scene, Scheme, Trace, liveliest_rate, nodal_point};
 
@@ -19,15 +19,6 @@ const PART_OF_STEPS: f64 = 0.01;
 
 /// Part that is a reference for others no longer without a word.
 const WORTH_A_WORD: f64 = 0.1;
-
-/// What a reference may take.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Allowed {
-    /// Bytes; `None` where it is not known.
-    pub memory: Option<u64>,
-    /// Seconds by the estimate; `None`: any.
-    pub longest: Option<f64>,
-}
 
 /// How the equations of all nodes were integrated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,7 +50,7 @@ impl<'m> NodalReference<'m> {
     ///
     /// # Errors
     /// FB801 for geometric stiffness; FB212 for places that the model does not have; FB604.
-    pub fn refuse(model: &FeModel, body: &FlexBody, scene: &Scene, longest: Option<f64>) -> Result<()> {
+    pub fn refuse(model: &FeModel, body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<()> {
         let stiffened =
             body.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)));
         if stiffened && scene.run.terms.geometric_stiffness && scene.carried.is_none() {
@@ -77,7 +68,7 @@ impl<'m> NodalReference<'m> {
             Scheme::Conserving { .. } => fastest_mode(body),
         };
         let (_, seconds) = effort.plan(scene, scene.run.scheme, liveliest);
-        effort.refuse_long(seconds, longest)
+        effort.refuse_long(seconds, context.longest)
     }
 
     /// Integrates the unreduced equations of `model` in `scene` from where `motion`, that of a body of the
@@ -95,22 +86,20 @@ impl<'m> NodalReference<'m> {
         body: &FlexBody,
         scene: &Scene,
         motion: &Trace,
-        allowed: Allowed,
-        watch: Watch<'_>,
+        context: &Context<'_>,
     ) -> Result<Self> {
         let effort = Effort::new(model, scene, body.n_modes());
         // Modes that count less need no steps of their own to begin with.
         let liveliest = liveliest_rate(body, scene, motion, 1.0).max(body.modes().eigenvalue[0].sqrt());
         let (way, seconds) = effort.plan(scene, motion.scheme, liveliest);
-        effort.refuse_long(seconds, allowed.longest)?;
+        effort.refuse_long(seconds, context.longest)?;
         let instants = match way {
             Way::Explicit => motion.time.len() as f64,
             Way::Implicit { step, .. } => effort.instants(step),
         };
-        effort.refuse_large(instants, way, allowed.memory)?;
+        effort.refuse_large(instants, way, context.memory)?;
         let staged = Staged::new(model, body, scene, motion)?;
         let end = motion.time.last().copied().unwrap_or(0.0);
-        let mut told = |part: f64| watch(Event::Fraction(part));
         let whole = |seen: Seen, error: Option<f64>| {
             let largest_deflection = seen.largest_deflection(model);
             Ok(Self { model, seen, largest_deflection, error })
@@ -121,16 +110,16 @@ impl<'m> NodalReference<'m> {
                     Scheme::Adaptive { tolerance } => tolerance.max(TOLERANCE),
                     Scheme::Conserving { .. } => TOLERANCE,
                 };
-                whole(staged.explicit(tolerance, &motion.time, &mut told)?, None)
+                whole(staged.explicit(tolerance, &motion.time, context)?, None)
             }
             (Way::Implicit { order, step, given: true }, _) => {
-                let is_allowed = |parts| effort.is_allowed(order, step, parts, allowed.longest);
-                let in_parts = |parts| staged.implicit(order, step, parts, end, &mut told);
+                let is_allowed = |parts| effort.is_allowed(order, step, parts, context.longest);
+                let in_parts = |parts| staged.implicit(order, step, parts, end, context);
                 whole(divided(in_parts, is_allowed)?.0, None)
             }
             (Way::Implicit { step, .. }, _) => {
-                let halving = Halving { model, staged: &staged, effort, longest: allowed.longest, end };
-                let (seen, error) = halving.run(step, &mut told)?;
+                let halving = Halving { model, staged: &staged, effort, longest: context.longest, end };
+                let (seen, error) = halving.run(step, context)?;
                 whole(seen, Some(error))
             }
         }
@@ -187,14 +176,14 @@ struct Halving<'h, 'm> {
 impl Halving<'_, '_> {
     /// The motion with the shortest steps, looked at where the first ones of length `step` end, and what
     /// twice their length changes of it over the tolerances of the scene.
-    fn run(&self, step: f64, told: &mut dyn FnMut(f64)) -> Result<(Seen, f64)> {
+    fn run(&self, step: f64, context: &Context<'_>) -> Result<(Seen, f64)> {
         let tolerance = &self.staged.scene.requirements.tolerance;
         let is_allowed = |parts| self.effort.is_allowed(ORDER, step, parts, self.longest);
-        let in_parts = |parts| self.staged.implicit(ORDER, step, parts, self.end, told);
+        let in_parts = |parts| self.staged.implicit(ORDER, step, parts, self.end, context);
         let (mut coarse, parts) = divided(in_parts, is_allowed)?;
         let mut refinement = 2 * parts;
         loop {
-            let mut fine = self.staged.implicit(ORDER, step, refinement, self.end, told)?;
+            let mut fine = self.staged.implicit(ORDER, step, refinement, self.end, context)?;
             // Ends of the same steps, whose times differ by rounding.
             fine.trace.time.clone_from(&coarse.trace.time);
             let scale = fine.largest_deflection(self.model);

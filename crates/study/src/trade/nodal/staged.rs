@@ -4,6 +4,7 @@ use super::seen::Seen;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::FlexBody;
+use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::dynamics::{
     LoadAxes, NodalEquations, NodalEvaluation, NodalModes, NodalMotion, NodalPoint, ReferenceConditions,
@@ -112,16 +113,11 @@ impl<'a> Staged<'a> {
     }
 
     /// Integrates with the explicit method and sees the motion at `instants`.
-    pub(super) fn explicit(
-        &self,
-        tolerance: f64,
-        instants: &[f64],
-        watch: &mut dyn FnMut(f64),
-    ) -> Result<Seen> {
+    pub(super) fn explicit(&self, tolerance: f64, instants: &[f64], context: &Context<'_>) -> Result<Seen> {
         let end = instants.last().copied().unwrap_or(0.0);
         let method = Method::Explicit(Explicit::new(self.start.len(), tolerance, end));
         let scheme = Scheme::Adaptive { tolerance };
-        self.integrate(method, scheme, instants, watch, |sight| sight == Sight::Instant)
+        self.integrate(method, scheme, instants, context, |sight| sight == Sight::Instant)
     }
 
     /// Integrates to `end` with the collocation of an `order` in steps of at most `step`, each divided into
@@ -132,12 +128,12 @@ impl<'a> Staged<'a> {
         step: f64,
         refinement: u32,
         end: f64,
-        watch: &mut dyn FnMut(f64),
+        context: &Context<'_>,
     ) -> Result<Seen> {
         let method = Gauss::new(self.start.len(), order).solved_to(SOLVED).refined(refinement);
         let scheme = Scheme::Conserving { order, step: Some(step / f64::from(refinement)) };
         let mut taken = 0;
-        self.integrate(Method::Gauss { method, step }, scheme, &[0.0, end], watch, |sight| match sight {
+        self.integrate(Method::Gauss { method, step }, scheme, &[0.0, end], context, |sight| match sight {
             Sight::Start => {
                 taken = 0;
                 true
@@ -155,7 +151,7 @@ impl<'a> Staged<'a> {
         mut method: Method,
         scheme: Scheme,
         instants: &[f64],
-        watch: &mut dyn FnMut(f64),
+        context: &Context<'_>,
         mut counts: impl FnMut(Sight) -> bool,
     ) -> Result<Seen> {
         let end = instants.last().copied().unwrap_or(0.0);
@@ -166,7 +162,7 @@ impl<'a> Staged<'a> {
             if counts(sight) {
                 seen.see(time, state, &mut observer, &self.watched, &mut room)?;
             }
-            watch(time / end);
+            context.fraction(time / end);
             Ok::<(), Failure>(())
         };
         integrate_closely(&mut method, &mut motion, &mut state, instants, &self.scene.breaks(), 1, look)

@@ -1,0 +1,223 @@
+//! The attempts with factors in double precision: Lanczos with one shift below the modes, or with a second one among
+//! them.
+//!
+//! With a shift below all modes the last of them converge slowest, and many modes take three columns each; with one
+//! between them, two.
+
+use super::attempt::{Attempt, Goal};
+use super::failure::EigenFailure;
+use super::lanczos::{Iteration, Outcome, columns_per_step};
+use super::needs::{Needs, Unusable, basis_columns, factor_needs, peaks, resident, vector_bytes};
+use super::problem::EigenProblem;
+use super::problem::Task;
+use super::refine::{FoundModes, refine};
+use super::settings::{Accuracy, FactorChoice, Precision};
+use super::shift::{factorise, with_suited_shift};
+use flexbody_linalg::context::Context;
+use flexbody_linalg::{Analysis, Cholesky, Indefinite, Solve};
+
+/// Lanczos with a factor in double precision.
+pub(super) struct DoublePrecision;
+
+/// Returns true when double precision is allowed, and fits the memory and the time.
+pub(super) fn is_double_in_reach(task: &Task<'_>, wanted: usize) -> bool {
+    factor_needs(task, wanted, Precision::Double).is_ok()
+}
+
+impl Attempt for DoublePrecision {
+    fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
+        if task.settings.factor == FactorChoice::Always(Precision::Single)
+            && task.settings.accuracy != Accuracy::Certified
+        {
+            return Err(Unusable::Unsuited);
+        }
+        factor_needs(task, wanted, Precision::Double)
+    }
+
+    fn search(&self, task: &Task<'_>, goal: &Goal) -> Result<FoundModes, EigenFailure> {
+        with_suited_shift(task, |factor: Cholesky<'_, f64>| {
+            let block = columns_per_step(goal.wanted);
+            let iteration = Iteration::begin(task.problem, &factor, (goal, block), task.context);
+            find_refined(task, iteration, &factor, goal)
+        })
+    }
+
+    fn is_conclusive(&self, _: &EigenFailure) -> bool {
+        true
+    }
+}
+
+/// Finds the modes with one factor, and refines them with it.
+fn find_refined(
+    task: &Task<'_>,
+    mut iteration: Iteration<'_>,
+    factor: &dyn Solve,
+    goal: &Goal,
+) -> Result<Outcome<FoundModes>, EigenFailure> {
+    let found = match iteration.find(factor)? {
+        Outcome::Reached(found) => found,
+        Outcome::ShiftTooLarge(shift) => return Ok(Outcome::ShiftTooLarge(shift)),
+    };
+    drop(iteration);
+    let refined = refine(task.problem, factor, found.refined, goal.tolerance, task.context)?;
+    Ok(Outcome::Reached(FoundModes { refined, ..found }))
+}
+
+/// Lanczos with a second factor, at a shift among the modes, which takes the place of the first one.
+pub(super) struct SecondShift;
+
+impl Attempt for SecondShift {
+    fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
+        let needs = DoublePrecision.needs(task, wanted).map_err(|_| Unusable::Unsuited)?;
+        if task.settings.accuracy == Accuracy::Certified || !pays(task, wanted) {
+            return Err(Unusable::Unsuited);
+        }
+        // The first factor is given back before, and made again where its modes are to be refined.
+        let vectors = vector_bytes(task.problem, wanted, Precision::Double);
+        let bytes = needs.bytes.max(resident(8 * peaks(task.analysis).kept_inertia + vectors));
+        if bytes > task.context.available() { Err(Unusable::Unsuited) } else { Ok(Needs { bytes, ..needs }) }
+    }
+
+    fn search(&self, task: &Task<'_>, goal: &Goal) -> Result<FoundModes, EigenFailure> {
+        with_suited_shift(task, |factor: Cholesky<'_, f64>| {
+            let block = columns_per_step(goal.wanted);
+            let mut iteration = Iteration::begin(task.problem, &factor, (goal, block), task.context);
+            match iteration.expand_to(goal.wanted, &factor)? {
+                Outcome::ShiftTooLarge(shift) => Ok(Outcome::ShiftTooLarge(shift)),
+                Outcome::Reached(()) => from_midway(task, iteration, factor, goal),
+            }
+        })
+    }
+
+    /// A failure after the change of the shift says nothing about the model.
+    fn is_conclusive(&self, failure: &EigenFailure) -> bool {
+        !matches!(failure, EigenFailure::NotConverged { .. })
+    }
+
+    fn is_repeated(&self) -> bool {
+        false
+    }
+}
+
+/// Goes on with a second shift where the Ritz values show a gap for it, else with the first one.
+fn from_midway(
+    task: &Task<'_>,
+    mut iteration: Iteration<'_>,
+    first: Cholesky<'_, f64>,
+    goal: &Goal,
+) -> Result<Outcome<FoundModes>, EigenFailure> {
+    let Task { problem, analysis, context, .. } = task;
+    if iteration.is_complete() {
+        return find_refined(task, iteration, &first, goal);
+    }
+    let in_vain = || EigenFailure::NotConverged { converged: 0, wanted: goal.wanted };
+    let midway = iteration.look_midway()?;
+    let tau = first.shift();
+    drop(first);
+    let again = || factorise::<f64>(problem, analysis, tau, context);
+    let second = SecondFactor::new(problem, analysis, &midway.eigenvalues, goal.wanted, context);
+    let found = match second {
+        Some(second) => {
+            iteration.change_shift(midway, &second.factor, second.below);
+            iteration.find(&second.factor)
+        }
+        None => iteration.find(&again()?),
+    };
+    // Whatever fails from here on fails for the sake of the second shift.
+    let Ok(Outcome::Reached(FoundModes { mut refined, next, finite, .. })) = found else {
+        return Err(in_vain());
+    };
+    drop(iteration);
+    if refined.excess(goal.tolerance) > 1.0 {
+        refined = refine(problem, &again()?, refined, goal.tolerance, context)?;
+    }
+    if refined.excess(goal.tolerance) > 1.0 {
+        return Err(in_vain());
+    }
+    Ok(Outcome::Reached(FoundModes { refined, next, tau, finite }))
+}
+
+/// Part of the modes wanted that the shift is to have below it by the Ritz values of a basis of as many vectors. These
+/// are too high: it has a tenth more below it, in truth. (Columns solved for 200 modes without a second shift, and with
+/// parts of 0.6 and 0.65: bar of 100,000 rows 632, 440, 440; cube of 100,000 rows 672, 440, 520; tetrahedra of 64,000
+/// rows 600, 521, 400.)
+const PART: f64 = 0.65;
+
+/// Part of the modes wanted within which the widest gap is taken, on either side.
+const REACH: f64 = 0.025;
+
+/// With more modes below it than so many for each one wanted the shift is useless.
+const MOST_BELOW: f64 = 1.2;
+
+/// Backward error of the factor beyond which the shift is left: the modes are asked for to 1e-9 at the best.
+const LARGEST_ERROR: f64 = 1e-12;
+
+/// Modes wanted below which a basis of as many vectors tells too little of them.
+const LEAST: usize = 40;
+
+/// Columns that the shift saves for each mode wanted.
+const SAVED: f64 = 0.9;
+
+/// Operations of a factorisation that take as long as one of solving and orthogonalising.
+const DENSER: f64 = 1.4;
+
+/// The factor at a shift among the modes, and the number of flexible modes below it.
+struct SecondFactor<'a> {
+    factor: Indefinite<'a>,
+    below: usize,
+}
+
+impl<'a> SecondFactor<'a> {
+    /// Places the shift among these Ritz values, ascending. `None` where there is no gap to put it into, or the factor is of no use.
+    fn new(
+        problem: &EigenProblem<'_>,
+        analysis: &'a Analysis,
+        eigenvalues: &[f64],
+        wanted: usize,
+        context: &Context<'_>,
+    ) -> Option<Self> {
+        let sigma = among(eigenvalues, wanted)?;
+        context.count(|work| work.factorizations += 1);
+        let factor = Indefinite::new(analysis, &problem.pencil, sigma);
+        let inertia = factor.inertia();
+        let below = inertia.negative.checked_sub(problem.rigid.ncols())?;
+        let is_good = inertia.zero == 0 && inertia.backward_error <= LARGEST_ERROR;
+        let is_useful = below > 0 && below as f64 <= MOST_BELOW * wanted as f64;
+        (is_good && is_useful).then_some(Self { factor, below })
+    }
+}
+
+/// The middle of the widest gap of these eigenvalues near the [`PART`] of the modes wanted.
+fn among(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
+    let part = |part: f64| (part * wanted as f64).round() as usize;
+    let (middle, reach) = (part(PART), part(REACH).max(1));
+    let near = eigenvalues.get(middle.checked_sub(reach)?..=middle + reach)?;
+    let widest = near.windows(2).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))?;
+    let sigma = 0.5 * (widest[0] + widest[1]);
+    (widest[0] > 0.0 && sigma > widest[0] && sigma < widest[1]).then_some(sigma)
+}
+
+/// Returns true when the columns that a second shift saves take longer than its factor.
+fn pays(task: &Task<'_>, wanted: usize) -> bool {
+    let Task { problem, analysis, .. } = task;
+    let vectors = problem.pencil.n() as f64 * basis_columns(wanted) as f64;
+    let column = 4.0 * analysis.factor_len() as f64 + 8.0 * vectors;
+    wanted >= LEAST && analysis.flops() < DENSER * SAVED * wanted as f64 * column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shift_is_in_the_widest_gap_near_its_place() {
+        let mut eigenvalues: Vec<f64> = (0..200).map(f64::from).collect();
+        // Wider ones are out of reach.
+        eigenvalues[10..].iter_mut().for_each(|lambda| *lambda += 50.0);
+        eigenvalues[118..].iter_mut().for_each(|lambda| *lambda += 2.0);
+        assert_eq!(among(&eigenvalues, 180), Some(168.5));
+        assert_eq!(among(&eigenvalues[..110], 180), None);
+        assert_eq!(among(&[1.0; 200], 200), None);
+        assert_eq!(among(&[-1.0; 200], 200), None);
+    }
+}

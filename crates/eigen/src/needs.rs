@@ -1,0 +1,215 @@
+//! Memory and time that attempts take, known before the work: the symbolic analysis knows what a factor needs.
+
+use super::completeness::Counting;
+use super::failure::EigenFailure;
+use super::problem::{EigenProblem, Task};
+use super::refine::TOGETHER;
+use super::settings::{Accuracy, FactorChoice, Precision};
+use flexbody_linalg::{Analysis, Peaks};
+
+/// Memory and time of an attempt.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Needs {
+    /// Bytes that the process grows by at the most.
+    pub bytes: u64,
+    /// Bytes of the factor that the search solves with; 0 without one.
+    pub factor_bytes: u64,
+    /// About how long the search takes on one processor, in seconds, without the factorisation.
+    pub seconds: f64,
+}
+
+/// A reason why an attempt is not made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unusable {
+    /// Another one is better, or was asked for.
+    Unsuited,
+    /// The attempt takes more memory than there is.
+    Memory(Needs),
+    /// The attempt takes longer than it may.
+    Time(Needs),
+}
+
+impl Unusable {
+    /// Returns the failure of a search that has no other attempt; `None` where another one was preferred.
+    pub(super) fn failure(self, task: &Task<'_>, wanted: usize) -> Option<EigenFailure> {
+        match self {
+            Self::Unsuited => None,
+            Self::Memory(Needs { bytes, .. }) => {
+                Some(EigenFailure::Memory { bytes, available: task.context.available() })
+            }
+            Self::Time(Needs { bytes, seconds, .. }) => {
+                Some(EigenFailure::TooLong { wanted, seconds, bytes })
+            }
+        }
+    }
+}
+
+impl Needs {
+    /// Holds these needs to the limits of the context.
+    pub(super) fn within_limits(self, task: &Task<'_>) -> Result<Self, Unusable> {
+        if self.bytes > task.context.available() {
+            return Err(Unusable::Memory(self));
+        }
+        if task.context.longest.is_some_and(|longest| self.seconds > longest) {
+            return Err(Unusable::Time(self));
+        }
+        Ok(self)
+    }
+}
+
+/// Operations per second that estimates of time assume: what one processor does of the mixed work of a
+/// search.
+const PACE: f64 = 4e9;
+
+/// Returns the needs of a search with a factor of this precision.
+pub(super) fn factor_needs(task: &Task<'_>, wanted: usize, precision: Precision) -> Result<Needs, Unusable> {
+    let Task { problem, analysis, .. } = task;
+    let (n, peaks) = (problem.pencil.n(), peaks(analysis));
+    let size = precision.bytes();
+    let found = (size * peaks.cholesky).max(size * peaks.factor + vector_bytes(problem, wanted, precision));
+    let needs = Needs {
+        bytes: resident(with_bounds(task, wanted, found.max(made_of_modes(n, wanted)))),
+        factor_bytes: size * peaks.factor,
+        seconds: search_seconds(n, wanted, analysis.factor_len() as u64),
+    };
+    needs.within_limits(task)
+}
+
+/// Adds to the bytes of a search what the bounds of [`Accuracy::Certified`] take: they factor a matrix of their own,
+/// beside the modes.
+pub(super) fn with_bounds(task: &Task<'_>, wanted: usize, bytes: u64) -> u64 {
+    if task.settings.accuracy != Accuracy::Certified {
+        return bytes;
+    }
+    let entries = task.problem.pencil.stiffness().as_csc().nnz() as u64;
+    bytes.max(count_bytes(task.problem, &peaks(task.analysis), wanted)) + 12 * entries
+}
+
+/// Returns the most numbers that factorisations hold with the threads there are.
+pub(super) fn peaks(analysis: &Analysis) -> Peaks {
+    analysis.peaks(rayon::current_num_threads())
+}
+
+/// Columns of the Krylov basis. Measured: five for each wanted mode.
+pub(super) fn basis_columns(wanted: usize) -> usize {
+    (5 * wanted + 16).min(2 * wanted + 128)
+}
+
+/// Bytes of a search beside the factor: Krylov basis, blocks in work, modes and products of some of them, and
+/// corrections.
+pub(super) fn vector_bytes(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
+    let basis = basis_columns(wanted);
+    let found = wanted + 3 * wanted.min(TOGETHER) + 24;
+    let columns = match precision {
+        Precision::Double => basis + found,
+        // A span of three times its first size, 1.5 for each wanted mode and 16, with both products; forces and
+        // vectors in work beside it.
+        Precision::Single => (basis + found + 2 * wanted).max(17 * wanted + 180),
+    };
+    8 * (problem.pencil.n() * columns) as u64
+}
+
+/// Bytes of what a caller makes of `wanted` modes: a copy of them, and tables with numbers for each pair of modes.
+pub(super) fn made_of_modes(n: usize, wanted: usize) -> u64 {
+    let (n, wanted) = (n as u64, wanted as u64);
+    8 * (80 * wanted * wanted + 3 * n * wanted)
+}
+
+/// Estimates the seconds of an iterative search: solutions with a factor of so many numbers, orthogonalisation against the
+/// basis, restarts, and the products of all pairs of modes.
+pub(super) fn search_seconds(n: usize, wanted: usize, factor: u64) -> f64 {
+    let (rows, modes) = (n as f64, wanted as f64);
+    let (basis, columns) = (basis_columns(wanted) as f64, 3.0 * modes + 100.0);
+    let search = columns * (4.0 * factor as f64 + 8.0 * rows * basis) + 6.0 * rows * basis * modes;
+    (search + 20.0 * rows * modes * modes) / PACE
+}
+
+/// Estimates the seconds of the dense path: two decompositions, and the products of all pairs of modes.
+pub(super) fn dense_seconds(n: usize, wanted: usize) -> f64 {
+    let (rows, modes) = (n as f64, wanted as f64);
+    (30.0 * rows.powi(3) + 20.0 * rows * modes * modes) / PACE
+}
+
+/// Returns what a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given
+/// back and not yet taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its
+/// own, and buffers of the dense products (measured on models of 18 000 degrees of freedom: 14 to 20 MB on one
+/// thread, 34 to 48 MB on two).
+pub(super) fn resident(bytes: u64) -> u64 {
+    bytes + bytes / 8 + 8_000_000 + 20_000_000 * rayon::current_num_threads() as u64
+}
+
+/// Bytes of an inertia count in double precision, with the modes and their products.
+fn count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
+    8 * (peaks.inertia + (3 * modes * problem.pencil.n()) as u64)
+}
+
+/// Bytes that the process grows by for an inertia count in double precision beside `found` modes.
+pub(super) fn resident_for_count(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
+    resident(count_bytes(problem, &peaks(analysis), found))
+}
+
+/// Bytes of a count in single precision, with the vectors that tell of its rounding.
+fn single_count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
+    4 * peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * problem.pencil.n()) as u64
+}
+
+/// Vectors that are held while the rounding of a count in single precision is measured.
+const PROBE_VECTORS: usize = 40;
+
+/// Part of [`EigenSettings::single_pays`](super::EigenSettings::single_pays) above which a count in single precision is
+/// faster, with the solutions that tell of its rounding.
+const COUNT_PART: f64 = 0.15;
+
+/// The count that proves completeness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CountPlan {
+    /// `None` where there is none.
+    pub counting: Option<Counting>,
+    /// Bytes that it needs.
+    pub bytes: u64,
+    /// The reason why there is none: bytes of the count, bytes there are.
+    pub too_large: Option<(u64, u64)>,
+}
+
+impl CountPlan {
+    /// Plans the count beside so many modes; accuracy `fast` has none. The factor of the search is given back before.
+    pub(super) fn of(task: &Task<'_>, modes: usize) -> Self {
+        if task.settings.accuracy == Accuracy::Fast {
+            return Self { counting: None, bytes: 0, too_large: None };
+        }
+        Self::new(task, modes)
+    }
+
+    /// Plans a count beside so many modes whatever the accuracy.
+    pub(super) fn new(task: &Task<'_>, modes: usize) -> Self {
+        let Task { problem, settings, analysis, context } = task;
+        let (peaks, available) = (peaks(analysis), context.available());
+        let (single, double) =
+            (single_count_bytes(problem, &peaks, modes), count_bytes(problem, &peaks, modes));
+        let fits = |bytes: u64| resident(bytes) <= available;
+        let double_fits = fits(double);
+        let pays = match settings.factor {
+            _ if settings.accuracy == Accuracy::Certified => false,
+            FactorChoice::Always(precision) => precision == Precision::Single,
+            FactorChoice::Auto => !double_fits || analysis.flops() > COUNT_PART * settings.single_pays,
+        };
+        if pays && fits(single) {
+            let bytes = if double_fits { single.max(double) } else { single };
+            Self { counting: Some(Counting::Single { double_fits }), bytes, too_large: None }
+        } else if double_fits {
+            Self { counting: Some(Counting::Double), bytes: double, too_large: None }
+        } else {
+            let least = if pays { single.min(double) } else { double };
+            Self { counting: None, bytes: 0, too_large: Some((resident(least), available)) }
+        }
+    }
+}
+
+/// Bytes in GB, or MB where that is less.
+pub(super) fn gigabytes(bytes: u64) -> String {
+    if bytes < 1_000_000_000 {
+        format!("{:.0} MB", bytes as f64 * 1e-6)
+    } else {
+        format!("{:.3} GB", bytes as f64 * 1e-9)
+    }
+}
