@@ -181,3 +181,32 @@ fn a_factor_stays_where_it_is_cheaper_or_asked_for() {
     assert_eq!(with(Accuracy::Standard, 0.0), Way::Cycles);
     assert_eq!(with(Accuracy::Fast, 0.0), Way::Cycles);
 }
+
+/// A compact block with thin bars on one of its faces, whose bending no coarse level sees.
+fn whiskers(cells: i32, long: i32) -> FeModel {
+    let size = 0.1 / f64::from(cells);
+    let all = [cells, cells, cells + long];
+    let mesh = Mesh::block(ElementKind::Hex8, all, all.map(|count| size * f64::from(count)));
+    let is_bar = |x: f64| ((x / size) as i32) % 4 == 1;
+    steel(&mesh.part(|[x, y, z]| z < 0.1 || (is_bar(x) && is_bar(y))))
+}
+
+/// Corrections that gain nothing are given up after two rounds, whatever the accuracy: four took longer than the factor and
+/// all its columns.
+#[test]
+#[ignore = "slow"]
+fn thin_bars_on_a_block_are_factored_before_many_cycles() {
+    let model = whiskers(16, 30);
+    for accuracy in [Accuracy::Fast, Accuracy::Standard] {
+        let modes = ModeSettings {
+            wanted: Wanted::Lowest(20),
+            accuracy,
+            multigrid_pays: 0.0,
+            ..ModeSettings::default()
+        };
+        let settings = ConvertSettings { modes, ..ConvertSettings::default() };
+        let found = convert(&model, &settings, &Context::QUIET).expect("modes");
+        assert!(plan(&found).has_failed(Way::Cycles), "{accuracy:?}: {:?}", found.plan);
+        assert!(found.work.solved_columns < 350, "{accuracy:?}: {:?}", found.work);
+    }
+}
