@@ -6,7 +6,7 @@ project = "flexbody"
 author = "the flexbody developers"
 extensions = ["myst_parser", "sphinx.ext.mathjax"]
 root_doc = "README"
-include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "fixtures/README.md", "fixtures/codes/README.md", "python/README.md", "docs/*.md", "docs/how_to/*.md", "docs/formats/*.md"]
+include_patterns = ["README.md", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md", "fixtures/README.md", "fixtures/cases/README.md", "python/README.md", "docs/*.md", "docs/how_to/*.md", "docs/formats/*.md"]
 # Headings are link targets and formulas stand between dollars, as where the sources are read.
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
@@ -21,7 +21,7 @@ CONTENTS = {
     "Theory": ["docs/theory", "docs/plausibility", "docs/craig_bampton", "docs/cutoff"],
     "Measured": ["docs/accuracy", "docs/trade", "docs/verdicts", "docs/seeds", "docs/stability", "docs/performance", "docs/dynamics"],
     "Files": ["docs/format", "docs/formats/*"],
-    "Project": ["docs/releases", "python/README", "ARCHITECTURE", "fixtures/README", "fixtures/codes/README", "CHANGELOG"],
+    "Project": ["docs/releases", "python/README", "ARCHITECTURE", "fixtures/README", "fixtures/cases/README", "CONTRIBUTING", "CHANGELOG"],
 }
 
 

@@ -1,35 +1,6 @@
-//! Every broken input of `fixtures/codes/<code>/<case>/` gives exactly the report that lies beside it, the
-//! exit code of the table, and leaves nothing behind.
-//!
-//! A case is a folder with two files: `case.toml`, and `expected.txt`, which is what the program then tells
-//! on stderr (of `audit` also the findings on stdout), warnings of a case that succeeds included. A new case
-//! needs no code:
-//!
-//! ```toml
-//! what = "The damping ratio is given in percent."   # one sentence, shown when the case fails
-//! command = "convert model.toml --modes 4"          # the words after `flexbody`; where the result goes is added
-//! base = "small/brick"                              # a folder of fixtures/ whose files the case begins with
-//! replace = [["nodes.csv", "8,0.0", "8,0.5"]]       # in this file this text, which is there once, by that one
-//!
-//! [append]                                          # texts at the end of files
-//! "model.toml" = """
-//! [damping]
-//! ratio = 2
-//! """
-//! ```
-//!
-//! | key | meaning |
-//! |---|---|
-//! | `base` | without it the case begins with an empty folder |
-//! | `body` | a model of `fixtures/models`: a body of four of its modes is there as `body.flex.h5` |
-//! | `[take]` | other files of `fixtures/` by the names that they have here: `"K.h5" = "small/tet4_two_groups/K.h5"` |
-//! | `[files]` | whole texts of files, for short ones: `"scene.toml" = """..."""` |
-//!
-//! Any other file beside `case.toml`, binary or long, is there too. Files come in the order base, `[take]`,
-//! beside, `[files]`, and each replaces one of the same name; then texts are replaced, then appended. All of
-//! it is put together in a folder of its own, in which the command runs. Keys that are not known are errors,
-//! and so is a file that is that of the base. `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes
-//! the reports; read the difference.
+//! Every broken input of `fixtures/cases/` gives exactly the report that stands in it and the exit code of the table, and
+//! leaves nothing behind. `fixtures/cases/README.md` describes the form of a case; a new one needs no code.
+//! `FLEXBODY_BLESS=1 cargo test --test program bad_input` writes the reports; read the difference.
 
 use crate::program::flexbody;
 use flexbody_base::diagnostic::Code;
@@ -43,13 +14,6 @@ use tempfile::TempDir;
 fn subfolders(folder: &Path) -> Vec<PathBuf> {
     let paths = members(folder).into_iter().map(|name| folder.join(name));
     paths.filter(|path| path.is_dir()).collect()
-}
-
-/// Code and folder of every case.
-fn cases() -> Vec<(String, PathBuf)> {
-    let codes = subfolders(&fixtures().join("codes"));
-    let id = |code: &Path| code.file_name().expect("a name").to_string_lossy().into_owned();
-    codes.iter().flat_map(|code| subfolders(code).into_iter().map(|case| (id(code), case))).collect()
 }
 
 /// Bodies of four modes, each made when it is first asked for.
@@ -85,7 +49,7 @@ fn result_option(command: &str) -> Option<(&'static str, &'static str)> {
     match command {
         "convert" | "assemble" | "simulate" | "view" | "export" => Some(("--output", "body.flex.h5")),
         "select" | "response" | "trade" | "batch" => Some(("--report", "report.json")),
-        "audit" => None,
+        "audit" | "check" | "compare" => None,
         other => panic!("no case ran `{other}` before: name the option for its result here"),
     }
 }
@@ -95,8 +59,9 @@ fn run(case: &Case, bodies: &Bodies) -> Run {
     for (name, content) in case.files() {
         fs::write(inputs.path().join(name), content).unwrap();
     }
-    if let Some(model) = &case.body {
-        fs::copy(bodies.of(model), inputs.path().join("body.flex.h5")).unwrap();
+    let body = case.body.iter().map(|model| ("body.flex.h5", model));
+    for (name, model) in body.chain(case.bodies.iter().map(|(name, model)| (name.as_str(), model))) {
+        fs::copy(bodies.of(model), inputs.path().join(name)).unwrap();
     }
     let before = contents(inputs.path());
     let mut words: Vec<&str> = case.command.split_whitespace().collect();
@@ -153,57 +118,88 @@ fn problems(run: &Run, id: &str, expected: &str) -> Vec<String> {
 }
 
 #[test]
-fn every_broken_input_gives_the_report_beside_it() {
+fn every_broken_input_gives_the_report_that_stands_in_it() {
     let bless = std::env::var_os("FLEXBODY_BLESS").is_some();
     let bodies = Bodies(tempfile::tempdir().unwrap());
-    let (cases, mut wrong) = (cases(), Vec::new());
-    for (id, folder) in &cases {
-        let case = Case::read(folder);
-        let run = run(&case, &bodies);
-        let report = folder.join("expected.txt");
+    let (cases, mut wrong) = (Case::all(), Vec::new());
+    for case in &cases {
+        let run = run(case, &bodies);
         if bless {
-            fs::write(&report, &run.report).unwrap();
+            case.bless(&run.report);
         }
-        let expected = fs::read_to_string(&report).unwrap_or_default();
-        let found = problems(&run, id, &expected);
-        wrong.extend(found.iter().map(|problem| format!("{} ({}): {problem}", folder.display(), case.what)));
+        let expected = if bless { &run.report } else { &case.expected };
+        let found = problems(&run, &case.code(), expected);
+        wrong.extend(found.iter().map(|problem| format!("{} ({}): {problem}", case.name(), case.what)));
     }
     assert!(wrong.is_empty(), "{} problems:\n\n{}", wrong.len(), wrong.join("\n"));
-    assert!(cases.len() >= 240, "{} cases", cases.len());
 }
 
+/// Codes that no files and no command line reach, with the test that does.
+const ELSEWHERE: &[(&str, &str)] = &[
+    ("FB104", "crates/file/tests/file/store_output.rs"),
+    ("FB105", "tests/program/command_line.rs"),
+    ("FB107", "tests/program/odd_files.rs"),
+    ("FB121", "crates/file/tests/file/store_output.rs"),
+    ("FB132", "tests/program/hostile_files.rs"),
+    ("FB501", "crates/body/tests/body/single_precision.rs"),
+    ("FB505", "crates/body/tests/body/single_precision.rs"),
+    ("FB506", "tests/program/cluster.rs"),
+    ("FB513", "crates/body/tests/body/single_precision.rs"),
+    ("FB554", "crates/motion/tests/motion/settled_rates.rs"),
+    ("FB602", "tests/program/limits.rs"),
+    ("FB605", "tests/program/front_door.rs"),
+    ("FB606", "python/tests/test_running.py"),
+    ("FB702", "crates/file/tests/file/store_refusals.rs"),
+    ("FB703", "crates/file/tests/file/store_refusals.rs"),
+    ("FB704", "crates/file/tests/file/store_refusals.rs"),
+    ("FB712", "crates/file/tests/file/store_digest.rs"),
+    ("FB713", "crates/file/tests/file/store_digest.rs"),
+    ("FB714", "crates/body/tests/body/accepted.rs"),
+    ("FB735", "tests/program/view.rs"),
+    ("FB763", "tests/program/cluster.rs"),
+    ("FB764", "tests/program/cluster.rs"),
+    ("FB765", "tests/program/cluster.rs"),
+    ("FB767", "tests/program/cluster.rs"),
+    ("FB771", "tests/program/cluster.rs"),
+    ("FB999", "tests/program/ends.rs"),
+];
+
 #[test]
-fn every_code_about_inputs_and_models_has_a_case() {
-    let codes: BTreeSet<String> = cases().into_iter().map(|(id, _)| id).collect();
+fn every_code_has_a_case() {
+    let codes: BTreeSet<String> = Case::all().iter().map(Case::code).collect();
     let known: BTreeSet<&str> = Code::ALL.iter().map(|code| code.id()).collect();
     let unknown: Vec<&String> = codes.iter().filter(|id| !known.contains(id.as_str())).collect();
     assert!(unknown.is_empty(), "no codes: {unknown:?}");
-    // These need another state of the program; outputs are in crates/file/tests/file/store_output.rs and
-    // tests/program/command_line.rs, files that change while they are read in tests/program/hostile_files.rs.
-    let elsewhere = ["FB104", "FB105", "FB107", "FB121", "FB132"];
-    let missing: Vec<&str> = known
-        .into_iter()
-        .filter(|id| *id < "FB5" && !codes.contains(*id) && !elsewhere.contains(id))
-        .collect();
+    let elsewhere = |id: &str| ELSEWHERE.iter().any(|(code, _)| *code == id);
+    let missing: Vec<&str> =
+        known.iter().copied().filter(|id| !codes.contains(*id) && !elsewhere(id)).collect();
     assert!(missing.is_empty(), "codes without a case: {missing:?}");
+    for (id, file) in ELSEWHERE {
+        let code = Code::ALL.iter().find(|code| code.id() == *id).expect("a code");
+        let text = fs::read_to_string(oracle::root().join(file)).expect("a test");
+        assert!(text.contains(id) || text.contains(&format!("Code::{code:?}")), "{id} is not in {file}");
+    }
+    let needless: Vec<_> = ELSEWHERE.iter().filter(|(id, _)| codes.contains(*id)).collect();
+    assert!(needless.is_empty(), "codes that have a case: {needless:?}");
 }
 
 #[test]
 fn no_case_repeats_a_file() {
-    let mut places: BTreeMap<Vec<u8>, PathBuf> = BTreeMap::new();
+    let mut places: BTreeMap<Vec<u8>, String> = BTreeMap::new();
     for base in subfolders(&fixtures().join("small")) {
-        places.extend(contents(&base).into_iter().map(|(name, content)| (content, base.join(name))));
+        let files = contents(&base).into_iter();
+        places.extend(files.map(|(name, content)| (content, base.join(name).display().to_string())));
     }
-    for (_, folder) in cases() {
-        for (name, content) in Case::read(&folder).own_files() {
-            let place = folder.join(name);
+    for case in Case::all() {
+        for (name, content) in case.own_files() {
+            let place = format!("{} of {}", name, case.name());
             let same = places.insert(content, place.clone());
-            assert!(
-                same.is_none(),
-                "{} is a copy of {}",
-                place.display(),
-                same.unwrap_or_default().display()
-            );
+            assert!(same.is_none(), "{place} is a copy of {}", same.unwrap_or_default());
         }
+    }
+    // What belongs to no case is left over from one.
+    for folder in subfolders(&fixtures().join("cases/files")) {
+        let name = folder.file_name().expect("a name").to_string_lossy().into_owned();
+        assert!(fixtures().join("cases").join(format!("{name}.toml")).exists(), "{name} belongs to no case");
     }
 }

@@ -144,6 +144,7 @@ fn a_body_of_a_cluster_is_that_of_the_built_in_engine() {
     let (exit, said) = job.assemble(&[]);
     assert_eq!(exit, 0, "{said}");
     assert!(said.contains("by the tests (2 ranks)") && said.contains("not recomputed"), "{said}");
+    assert!(said.contains("FB765"), "{said}");
     let model = manifest("bracket_hex20").display().to_string();
     let modes = MODES.to_string();
     let own = flexbody(job.place.path(), &["convert", &model, "--modes", &modes, "-o", "own.flex.h5"]);
@@ -203,7 +204,7 @@ fn what_the_model_or_the_result_contradicts_is_refused() {
     let counted = job.result["count"]["negative"].as_u64().expect("a count");
     job.result["count"]["negative"] = (counted + 1).into();
     job.write();
-    job.refused(&[], "FB5", 3, "its inertia count is 13");
+    job.refused(&[], "FB506", 3, "its inertia count is 13");
     job.result["count"]["negative"] = counted.into();
     job.write();
     assert_eq!(job.assemble(&[]).0, 0, "the result as it was is taken");

@@ -52,7 +52,7 @@ fn recipes_are_those_of_the_page() {
 fn documents() -> Vec<(PathBuf, String)> {
     let root = oracle::root();
     let mut found = Vec::new();
-    for folder in ["", "docs", "docs/formats", "fixtures", "fixtures/codes", "benches/peers"] {
+    for folder in ["", "docs", "docs/formats", "fixtures", "fixtures/cases", "benches/peers"] {
         for entry in std::fs::read_dir(root.join(folder)).unwrap() {
             let path = entry.unwrap().path();
             if path.extension().is_some_and(|e| e == "md") {

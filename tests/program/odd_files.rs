@@ -79,7 +79,7 @@ const INPUTS: &[&str] = &[
     "check body.h5 --against @",
     "compare body.h5 @",
     "view @ -o new.html",
-    "view body.h5 --motion @ -o new.html",
+    "view body.h5 --simulation @ -o new.html",
     "export @ --to npz -o new.npz",
     "audit @",
     "batch @",

@@ -1,5 +1,5 @@
 //! The one table of diagnostics: every message the tool can give has a code, a severity, an exit code, a
-//! title and a default help here. `docs/codes.md` is generated from it; `fixtures/codes/` triggers each.
+//! title and a default help here. `docs/codes.md` is generated from it; `fixtures/cases/` triggers each.
 
 use crate::exit_code::ExitCode;
 use std::borrow::Cow;
@@ -223,12 +223,11 @@ codes! {
     WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
     Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
     Forked = "FB606", Error, Resources, "process has none of the threads that it computes with", "start processes by `spawn` or `forkserver`, or fork before the first work";
-    // FB7xx: flex-body files; FB708 to FB711 were those of checkpoints, and stay free
+    // FB7xx: flex-body files; FB705 and FB708 to FB711 stay free: they were told by earlier versions
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
     BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
     BodyIdentity = "FB704", Error, CheckFailed, "identity violated", "convert the model again; if it stays, report the file to us";
-    BodiesDiffer = "FB705", Error, CheckFailed, "flexible bodies differ", "see the table of quantities and tolerances";
     BodySourceChanged = "FB706", Warning, Done, "input file differs from the one the body was made of", "convert the model again";
     BodyIncomparable = "FB707", Error, BadInput, "flexible bodies cannot be compared", "compare bodies of the same model, dimension and units";
     BodyChanged = "FB712", Error, CheckFailed, "content of a flex-body file changed since it was written", "take the file as it was written, or convert the model again; docs/format.md says how a program that changes files states new digests";

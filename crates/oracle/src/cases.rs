@@ -1,6 +1,6 @@
-//! The cases of `fixtures/codes/`: a command, and its files told as changes of files that are well.
+//! The cases of `fixtures/cases/`: a command, its files told as changes of files that are sound, and its report.
 
-use crate::fixtures;
+use crate::{fixtures, members};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,13 +9,19 @@ use std::path::{Path, PathBuf};
 /// The contents of files by their names.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// What `case.toml` says; the head of `tests/program/bad_input.rs` describes it.
+/// The content of the file of a case; `fixtures/cases/README.md` describes it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
     pub what: String,
     pub command: String,
+    /// The report of the program.
+    #[serde(default)]
+    pub expected: String,
     pub body: Option<String>,
+    /// Models of further bodies by the names of their files.
+    #[serde(default)]
+    pub bodies: BTreeMap<String, String>,
     base: Option<PathBuf>,
     #[serde(default)]
     take: BTreeMap<String, PathBuf>,
@@ -26,15 +32,60 @@ pub struct Case {
     #[serde(default)]
     append: BTreeMap<String, String>,
     #[serde(skip)]
-    folder: PathBuf,
+    file: PathBuf,
 }
 
 impl Case {
-    pub fn read(folder: &Path) -> Case {
-        let file = folder.join("case.toml");
-        let text = fs::read_to_string(&file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    /// Reads the case `name`, for instance `FB201-interfaces`.
+    pub fn read(name: &str) -> Case {
+        Self::open(&fixtures().join("cases").join(name).with_extension("toml"))
+    }
+
+    /// Reads every case, in the order of the names.
+    pub fn all() -> Vec<Case> {
+        let files = members(&fixtures().join("cases")).into_iter().filter(|name| name.ends_with(".toml"));
+        files.map(|name| Self::open(&fixtures().join("cases").join(name))).collect()
+    }
+
+    fn open(file: &Path) -> Case {
+        let text = fs::read_to_string(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
         let case: Case = toml::from_str(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
-        Case { folder: folder.to_owned(), ..case }
+        Case { file: file.to_owned(), ..case }
+    }
+
+    /// Returns the name, which begins with the code.
+    pub fn name(&self) -> String {
+        self.file.file_stem().expect("a name").to_string_lossy().into_owned()
+    }
+
+    /// Returns the code that the case is about.
+    pub fn code(&self) -> String {
+        self.name().split('-').next().expect("a first part").to_owned()
+    }
+
+    /// Writes `report` as the expected one into the file of the case.
+    ///
+    /// # Panics
+    /// For a report with three apostrophes, which would end the text.
+    pub fn bless(&self, report: &str) {
+        const BEGIN: &str = "expected = '''\n";
+        const END: &str = "'''\n";
+        assert!(!report.contains("'''"), "{}: {report}", self.place());
+        let text = fs::read_to_string(&self.file).expect("it was read");
+        let written = match text.split_once(BEGIN) {
+            Some((before, rest)) => {
+                let (_, after) = rest.split_once(END).expect("the report ends");
+                format!("{before}{BEGIN}{report}{END}{after}")
+            }
+            // A new case: before its tables.
+            None => {
+                let tables = ["\n[bodies]", "\n[take]", "\n[files]", "\n[append]"];
+                let at = tables.iter().filter_map(|table| text.find(table)).min().unwrap_or(text.len());
+                let (before, after) = text.split_at(at);
+                format!("{}\n{BEGIN}{report}{END}{after}", before.trim_end())
+            }
+        };
+        fs::write(&self.file, written).expect("a writable case");
     }
 
     /// The files that the command finds, but for the body.
@@ -58,11 +109,10 @@ impl Case {
         files
     }
 
-    /// The files that lie beside `case.toml`, but for the report.
+    /// The files of `fixtures/cases/files` that belong to the case: binary and long ones.
     pub fn own_files(&self) -> Files {
-        let mut files = contents(&self.folder);
-        files.retain(|name, _| name != "case.toml" && name != "expected.txt");
-        files
+        let folder = fixtures().join("cases").join("files").join(self.name());
+        if folder.is_dir() { contents(&folder) } else { Files::new() }
     }
 
     fn text(&self, files: &Files, name: &str) -> String {
@@ -72,7 +122,7 @@ impl Case {
     }
 
     fn place(&self) -> String {
-        self.folder.display().to_string()
+        self.file.display().to_string()
     }
 }
 

@@ -1,0 +1,65 @@
+#!/usr/bin/env bash
+# Makes everything of the repository that programs write, by one command each:
+#
+#   ./scripts/make.sh bless [TEST]     what tests hold and write: reports of broken inputs, golden tables, docs/codes.md, docs/format.md, schemas
+#   ./scripts/make.sh pages [NAME]     pages with measurements: accuracy, cutoff, python, seeds, stability, trade, performance, verdicts
+#   ./scripts/make.sh fixtures [NAME]  fixtures: models, general, frames, broken, foreign, jobs, modes, open, ... (fixtures/make/make_NAME.py)
+#   ./scripts/make.sh site             the documentation as a site
+#   ./scripts/make.sh wheel            the Python package
+#   ./scripts/make.sh release          the program of a release, tested
+#
+# Read the difference (`git diff`) before it is committed. What a page or a fixture needs beside this repository stands in the head of its
+# script; a missing program is named there.
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+
+usage() {
+    sed -n '2,/^set /{/^#/s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}"
+    exit "${1:-2}"
+}
+
+what="${1:-}"
+name="${2:-}"
+case "$what" in
+bless)
+    # shellcheck source=scripts/cmake.sh
+    source scripts/cmake.sh
+    export FLEXBODY_BLESS=1
+    if [ -n "$name" ]; then
+        cargo test --locked "$name" -- --include-ignored
+    else
+        cargo test --locked --test program -- bad_input docs_generated
+        cargo test --locked --package flexbody-body --test body -- --include-ignored work_counters plans
+        cargo test --locked --package flexbody-formats --test formats export_embedded
+        cargo test --locked --package flexbody-report --test report report
+    fi
+    ;;
+pages)
+    case "$name" in
+    performance) ./benches/page.sh ;;
+    verdicts)
+        # shellcheck source=scripts/cmake.sh
+        source scripts/cmake.sh
+        FLEXBODY_BLESS=1 FLEXBODY_VERDICTS="${3:-600}" cargo test --release --locked --package flexbody-study random_verdicts -- --include-ignored
+        ;;
+    "")
+        for page in docs/make_*.py; do python3 "$page"; done
+        ./benches/page.sh
+        ;;
+    *) python3 "docs/make_$name.py" ;;
+    esac
+    ;;
+fixtures)
+    if [ -n "$name" ]; then
+        python3 "fixtures/make/make_$name.py" "${@:3}"
+    else
+        python3 fixtures/make_input_fixtures.py
+        for script in fixtures/make/make_*.py; do python3 "$script"; done
+    fi
+    ;;
+site) ./scripts/site.sh ;;
+wheel) ./scripts/wheel.sh "${@:2}" ;;
+release) ./scripts/release.sh "${@:2}" ;;
+-h | --help | help) usage 0 ;;
+*) usage ;;
+esac
