@@ -17,7 +17,7 @@ html_copy_source = False
 
 # What the side bar has: its groups, and the pages of each in the order of reading.
 CONTENTS = {
-    "Use": ["docs/tutorial", "docs/how_to/rotor", "docs/how_to/robot_link", "docs/how_to/vehicle_frame", "docs/how_to/satellite", "docs/fe_programs", "docs/recipes", "docs/python", "docs/input", "docs/simulate", "docs/select", "docs/response", "docs/export", "docs/audit", "docs/view", "docs/codes"],
+    "Use": ["docs/tutorial", "docs/how_to/rotor", "docs/how_to/robot_link", "docs/how_to/vehicle_frame", "docs/how_to/satellite", "docs/fe_programs", "docs/recipes", "docs/python", "docs/input", "docs/simulate", "docs/select", "docs/response", "docs/export", "docs/audit", "docs/view", "docs/reference", "docs/codes"],
     "Theory": ["docs/theory", "docs/plausibility", "docs/craig_bampton", "docs/cutoff"],
     "Measured": ["docs/accuracy", "docs/trade", "docs/verdicts", "docs/seeds", "docs/stability", "docs/performance", "docs/dynamics"],
     "Files": ["docs/format", "docs/formats/*"],
