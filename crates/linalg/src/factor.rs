@@ -3,6 +3,7 @@
 
 use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
+use super::largest::largest;
 use super::ordering::{nested_dissection, smallest_graph, vertex_graph};
 use super::substitution;
 use super::tree_walk::{Needs, TreeWalk};
@@ -424,12 +425,27 @@ impl<T: Real> Solve for Cholesky<'_, T> {
 /// both: to find its own takes longer than what it saves.
 const NEARLY_FULL: f64 = 0.5;
 
+/// Part of the largest diagonal entry of M up to which entries of a row without a positive diagonal are rounding.
+const NO_MASS: f64 = 1e-14;
+
+/// Returns true when a row without a positive diagonal entry has entries beyond rounding: no semidefinite matrix has
+/// such a row, since m_ij^2 <= m_ii m_jj.
+fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
+    let diagonal = mass.diagonal();
+    let noise = NO_MASS * largest(diagonal.iter().copied());
+    let couples = |row: usize| mass.row(row).1.iter().any(|entry| entry.abs() > noise);
+    diagonal.iter().enumerate().any(|(row, entry)| *entry <= 0.0 && couples(row))
+}
+
 /// Returns true when M is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has been
 /// raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Most masses of
 /// displacements are far from the border: where it succeeds in single precision with a diagonal that is 1e-3 less, that
 /// settles it in half the time. Those of rotations are near it. Uses the order of `analysis`, which is that of the pencil.
 pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> bool {
     let mass = pencil.mass();
+    if has_row_without_mass_that_couples(mass) {
+        return false;
+    }
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
     let by_vertices =
