@@ -1,5 +1,6 @@
-//! Sparse linear algebra: sums beyond rounding, in exact arithmetic.
+//! Sparse linear algebra: factors against dense algebra, sums beyond rounding against exact arithmetic.
 
 #![allow(unreachable_pub)] // nothing outside reads a test
 
 mod arithmetic;
+mod factors;
