@@ -103,3 +103,26 @@ fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
 fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{FORMATS, HEAD};
+    use std::path::Path;
+
+    /// The fuzz test of meshes and the tests of jobs read these files.
+    #[test]
+    fn every_format_has_a_fixture_that_it_alone_reads() {
+        let small = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/small");
+        let mut found = vec![0; FORMATS.len()];
+        for folder in ["meshes", "abaqus", "nastran"] {
+            for entry in std::fs::read_dir(small.join(folder)).expect("fixtures") {
+                let bytes = std::fs::read(entry.expect("an entry").path()).expect("a file");
+                let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
+                if let Some(at) = FORMATS.iter().position(|format| (format.recognises)(&head)) {
+                    found[at] += 1;
+                }
+            }
+        }
+        assert!(found.iter().all(|count| *count > 0), "fixtures of each format: {found:?}");
+    }
+}
