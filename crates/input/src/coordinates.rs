@@ -15,7 +15,7 @@ mod text;
 
 use line::BadLine;
 pub(crate) use line::{Limits, real};
-pub(crate) use text::{Blocks, line_aligned, lines, most_entries};
+pub(crate) use text::{Blocks, line_aligned, most_entries};
 
 /// Number of bad lines that are reported one by one.
 const SHOWN: usize = 5;

@@ -7,6 +7,7 @@ mod op2;
 mod punch;
 mod table;
 
+use super::scanner::expected;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
@@ -60,9 +61,9 @@ fn unreadable(file: &InputFile, message: impl Into<String>, help: &str) -> Vec<D
     vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).with_help(help)]
 }
 
-/// Lines of a text with their numbers, without what ends them.
-fn lines(file: &InputFile) -> impl Iterator<Item = (usize, &[u8])> {
-    file.bytes().split(|&b| b == b'\n').enumerate().map(|(at, line)| (at + 1, line.trim_ascii_end()))
+/// FB128 for a line that is not what was expected.
+fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
+    vec![expected(Code::ModeFileSyntax, what, found).in_file(file.path()).at_line(line)]
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ mod xml_elements;
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
 pub(super) use super::node_file::NodeFile;
+use super::scanner::expected;
 use super::tables::read_nodes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -97,6 +98,11 @@ fn bulk(file: &InputFile) -> Found<NodeFile> {
 /// FB115 at a line.
 fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
+}
+
+/// FB115 for a line that is not what was expected.
+fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
+    vec![expected(Code::NodeFileSyntax, what, found).in_file(file.path()).at_line(line)]
 }
 
 /// FB115 of a file without lines.

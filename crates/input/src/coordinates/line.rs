@@ -2,6 +2,7 @@
 //! and says what is wrong.
 
 use super::{COUNTED, Entry, excerpt, most_entries, written_digits};
+use crate::scanner::words;
 use flexbody_base::diagnostic::Code;
 
 /// What the header says about every line.
@@ -121,8 +122,7 @@ type Bad = (Code, String, Option<&'static str>);
 /// A line with content, trimmed.
 fn slow(line: &[u8], limits: Limits) -> Result<(Entry, &[u8]), Bad> {
     let content = line.split(|&b| b == b'%').next().unwrap_or(line); // a comment may follow the value
-    let fields: Vec<&[u8]> =
-        content.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty()).take(5).collect();
+    let fields: Vec<&[u8]> = words(content).take(5).collect();
     let &[row, col, number] = fields.as_slice() else {
         let message = format!("expected row, column and value, found `{}`", excerpt(line));
         return Err((Code::MatrixSyntax, message, None));

@@ -1,0 +1,102 @@
+//! The text scanner under the line readers: lines with their numbers, words across lines, fields between columns, and
+//! the message about text that is not as expected.
+
+use crate::coordinates::excerpt;
+use flexbody_base::diagnostic::{Code, Diagnostic};
+
+/// A line of a text.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Line<'a> {
+    /// Number of the line, from 1.
+    pub number: usize,
+    /// The line without its end and the blanks before it.
+    pub text: &'a [u8],
+}
+
+/// The lines of a text. What follows the last line end is a line if it has bytes.
+#[derive(Debug, Clone)]
+pub(crate) struct Lines<'a> {
+    text: &'a [u8],
+    /// Where the next line begins.
+    pub at: usize,
+    /// Number of the line that was given last.
+    pub number: usize,
+}
+
+impl<'a> Lines<'a> {
+    pub(crate) fn of(text: &'a [u8]) -> Self {
+        Self::below(text, 0)
+    }
+
+    /// True if all lines were given.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.at >= self.text.len()
+    }
+
+    /// The lines of a part of a file that has so many lines `above`.
+    pub(crate) fn below(text: &'a [u8], above: usize) -> Self {
+        Self { text, at: 0, number: above }
+    }
+}
+
+impl<'a> Iterator for Lines<'a> {
+    type Item = Line<'a>;
+
+    fn next(&mut self) -> Option<Line<'a>> {
+        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let length = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
+        self.at = (self.at + length + 1).min(self.text.len());
+        self.number += 1;
+        Some(Line { number: self.number, text: rest[..length].trim_ascii_end() })
+    }
+}
+
+/// The words of a text that blanks separate.
+pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
+}
+
+/// The field of a line between two columns, trimmed; empty where the line is shorter.
+pub(crate) fn field(line: &[u8], columns: std::ops::Range<usize>) -> &[u8] {
+    line.get(columns.start..columns.end.min(line.len())).unwrap_or_default().trim_ascii()
+}
+
+/// The words of a text on all of its lines.
+#[derive(Debug, Clone)]
+pub(crate) struct Words<'a> {
+    rest: &'a [u8],
+    /// Number of the line of the word that was given last, from 1.
+    pub line: usize,
+}
+
+impl<'a> Words<'a> {
+    pub(crate) fn of(text: &'a [u8]) -> Self {
+        Self { rest: text, line: 1 }
+    }
+
+    /// The rest of the line of the word that was given last.
+    pub(crate) fn rest_of_line(&mut self) -> &'a [u8] {
+        let end = memchr::memchr(b'\n', self.rest).unwrap_or(self.rest.len());
+        let (line, rest) = self.rest.split_at(end);
+        self.rest = rest;
+        line
+    }
+}
+
+impl<'a> Iterator for Words<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let start = self.rest.iter().position(|b| !b.is_ascii_whitespace())?;
+        self.line += self.rest[..start].iter().filter(|&&b| b == b'\n').count();
+        let rest = &self.rest[start..];
+        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        self.rest = &rest[end..];
+        Some(&rest[..end])
+    }
+}
+
+/// The diagnostic about text that is not what was expected.
+pub(crate) fn expected(code: Code, what: &str, found: &[u8]) -> Diagnostic {
+    Diagnostic::new(code, format!("expected {what}, found `{}`", excerpt(found)))
+}
