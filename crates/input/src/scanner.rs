@@ -64,22 +64,32 @@ pub(crate) fn field(line: &[u8], columns: std::ops::Range<usize>) -> &[u8] {
 /// The words of a text on all of its lines.
 #[derive(Debug, Clone)]
 pub(crate) struct Words<'a> {
-    rest: &'a [u8],
-    /// Number of the line of the word that was given last, from 1.
-    pub line: usize,
+    text: &'a [u8],
+    /// Where the text begins that was not given yet.
+    pub at: usize,
 }
 
 impl<'a> Words<'a> {
     pub(crate) fn of(text: &'a [u8]) -> Self {
-        Self { rest: text, line: 1 }
+        Self { text, at: 0 }
     }
 
-    /// The rest of the line of the word that was given last.
-    pub(crate) fn rest_of_line(&mut self) -> &'a [u8] {
-        let end = memchr::memchr(b'\n', self.rest).unwrap_or(self.rest.len());
-        let (line, rest) = self.rest.split_at(end);
-        self.rest = rest;
-        line
+    /// The text that was not given yet.
+    pub(crate) fn rest(&self) -> &'a [u8] {
+        &self.text[self.at..]
+    }
+
+    /// The rest of the line, with its end.
+    pub(crate) fn line(&mut self) -> &'a [u8] {
+        let rest = self.rest();
+        let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
+        self.at += end;
+        &rest[..end]
+    }
+
+    /// Number of the line, from 1, in which the text that was not given begins.
+    pub(crate) fn line_number(&self) -> usize {
+        1 + memchr::memchr_iter(b'\n', &self.text[..self.at]).count()
     }
 }
 
@@ -87,12 +97,11 @@ impl<'a> Iterator for Words<'a> {
     type Item = &'a [u8];
 
     fn next(&mut self) -> Option<&'a [u8]> {
-        let start = self.rest.iter().position(|b| !b.is_ascii_whitespace())?;
-        self.line += self.rest[..start].iter().filter(|&&b| b == b'\n').count();
-        let rest = &self.rest[start..];
-        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        self.rest = &rest[end..];
-        Some(&rest[..end])
+        let rest = self.rest();
+        let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
+        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
+        self.at += start + length;
+        Some(&rest[start..start + length])
     }
 }
 

@@ -60,7 +60,7 @@ fn format(words: &mut MeshWords<'_>) -> Found<i64> {
     Err(vec![
         Diagnostic::new(Code::NodeFileSyntax, message)
             .in_file(words.file.path())
-            .at_line(words.text.line)
+            .at_line(words.text.line_number())
             .with_help(help),
     ])
 }
@@ -69,7 +69,7 @@ impl Mesh {
     fn physical_names(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         for _ in 0..words.whole("a count")? {
             let (dimension, tag) = (words.whole("a dimension")?, words.whole("a tag")?);
-            let name = String::from_utf8_lossy(words.text.rest_of_line()).into_owned();
+            let name = String::from_utf8_lossy(words.text.line()).into_owned();
             self.names.insert((dimension, tag), name.trim().trim_matches('"').to_owned());
         }
         Ok(())
@@ -251,7 +251,7 @@ impl MeshWords<'_> {
     fn wrong<T>(&self, expected: &str, found: Option<&[u8]>) -> Found<T> {
         let found =
             found.map_or("the end of the file".to_owned(), |word| format!("`{}`", word.escape_ascii()));
-        Err(syntax(self.file, self.text.line, format!("expected {expected}, found {found}")))
+        Err(syntax(self.file, self.text.line_number(), format!("expected {expected}, found {found}")))
     }
 
     fn whole(&mut self, expected: &str) -> Found<i64> {
@@ -294,7 +294,7 @@ impl MeshWords<'_> {
     /// Goes behind the end of a section.
     fn skip_to_end(&mut self, section: &str) {
         let end = format!("$End{}", &section[1..]);
-        while let Some(word) = self.text.next() {
+        for word in self.text.by_ref() {
             if word == end.as_bytes() {
                 return;
             }
