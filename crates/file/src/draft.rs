@@ -198,7 +198,7 @@ impl Draft {
     }
 }
 
-/// Indices of nodes. Negative ones become such that no body has.
+/// Puts indices of nodes into their place; negative ones become indices that no body has, and are an error.
 pub(super) fn node_indices(read: ReadValue, place: &mut Option<Vec<u32>>) -> Result<(), String> {
     let values = read.indices();
     let negative = values.iter().copied().find(|index| *index < 0);
@@ -225,7 +225,7 @@ pub(super) struct InvariantEntries {
 }
 
 impl InvariantEntries {
-    /// Those of no modes.
+    /// Returns the entries of a body without modes.
     fn new() -> Self {
         Self {
             mass: 0.0,

@@ -164,7 +164,7 @@ impl ReadValue {
     }
 }
 
-/// What the file stores as one entry.
+/// A type that the file stores as one entry.
 pub(super) trait Stored: Sized {
     /// The value for the file; `None`: no entry.
     fn value(&self) -> Option<Value>;

@@ -13,7 +13,7 @@ pub(crate) struct Line<'a> {
     pub text: &'a [u8],
 }
 
-/// The lines of a text. What follows the last line end is a line if it has bytes.
+/// The lines of a text. Bytes behind the last line end are a line, too.
 #[derive(Debug, Clone)]
 pub(crate) struct Lines<'a> {
     text: &'a [u8],

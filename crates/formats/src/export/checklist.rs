@@ -12,7 +12,7 @@ pub enum Holding {
 }
 
 impl Holding {
-    /// A property that the format has a place for: held, but for what the text says.
+    /// Returns [`Lost`](Self::Lost) with the text, or [`Held`](Self::Held) without one.
     pub(crate) fn held_but_for(lost: Option<String>) -> Self {
         lost.map_or(Self::Held, Self::Lost)
     }

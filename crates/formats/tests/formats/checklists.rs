@@ -139,7 +139,7 @@ fn every_entry_of_every_checklist_is_that_of_the_file() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// What a body does not have cannot be lost.
+/// No format loses a property that the body does not have.
 #[test]
 fn nothing_is_lost_of_a_body_without_it() {
     for format in FORMATS.iter().copied() {
