@@ -109,3 +109,34 @@ impl<'a> Iterator for Words<'a> {
 pub(crate) fn expected(code: Code, what: &str, found: &[u8]) -> Diagnostic {
     Diagnostic::new(code, format!("expected {what}, found `{}`", excerpt(found)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Lines, Words, field};
+
+    #[test]
+    fn lines_have_numbers_and_no_ends() {
+        let of = |text: &'static [u8]| -> Vec<(usize, &[u8])> {
+            Lines::below(text, 4).map(|line| (line.number, line.text)).collect()
+        };
+        assert_eq!(of(b" a \r\n\nb"), [(5, &b" a"[..]), (6, b""), (7, b"b")]);
+        assert_eq!(of(b"a\n"), [(5, &b"a"[..])]);
+        assert_eq!(of(b""), []);
+    }
+
+    #[test]
+    fn words_know_their_lines() {
+        let mut words = Words::of(b"a b\n\n c rest of\nd");
+        let found: Vec<(&[u8], usize)> =
+            (0..3).map(|_| (words.next().expect("a word"), words.line_number())).collect();
+        assert_eq!(found, [(&b"a"[..], 1), (b"b", 1), (b"c", 3)]);
+        assert_eq!((words.line(), words.line_number()), (&b" rest of\n"[..], 4));
+        assert_eq!((words.next(), words.next(), words.rest()), (Some(&b"d"[..]), None, &b""[..]));
+    }
+
+    #[test]
+    fn fields_end_with_their_line() {
+        let line = b"  12  ab";
+        assert_eq!([field(line, 0..4), field(line, 4..12), field(line, 8..12)], [&b"12"[..], b"ab", b""]);
+    }
+}
