@@ -56,6 +56,22 @@ impl Sizes {
         }
     }
 
+    /// A known size; 0 of what no dataset has had.
+    pub(super) fn of(&self, extent: Extent) -> usize {
+        let known = match extent {
+            Extent::Fixed(size) => Some(size),
+            Extent::Nodes => self.nodes,
+            Extent::Modes => self.modes,
+            Extent::ThreeModes => self.modes.map(|nf| 3 * nf),
+            Extent::InterfaceNodes => self.interface_nodes,
+            Extent::InternalRows => self.internal_rows,
+            Extent::Coordinates => self.coordinates,
+            Extent::Triangles => self.triangles,
+            Extent::Edges => self.edges,
+        };
+        known.unwrap_or(0)
+    }
+
     fn show(&self, extent: Extent) -> String {
         let known = |name: &str, size: Option<usize>| match size {
             Some(size) => format!("{name} = {size}"),

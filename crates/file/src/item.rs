@@ -1,6 +1,7 @@
 //! What the table of the flex-body file is made of: entries, their shapes, and where their values come from.
 
-use super::value::{Units, Value, View, text};
+use super::draft::Draft;
+use super::value::{ReadValue, Units, Value, View, text};
 #[cfg(feature = "hdf5")]
 use flexbody_body::flex_body::Storage;
 use flexbody_body::flex_body::{Interface, LumpedBody, Parts, TermGroup};
@@ -51,6 +52,77 @@ use ItemKind::{Float, Floats, Indices, Int, Ints, Named, Text};
 /// Takes the value of an entry from a body; `None` only for entries that are not required.
 pub(super) type Get = fn(&View<'_>) -> Option<Value>;
 
+/// Puts the value that a file has for an entry into the body that is read. The error says what was expected and what
+/// was found.
+pub(super) type Put = fn(&mut Draft, ReadValue) -> Result<(), String>;
+
+/// Both directions of an entry: from a body into a file, and back where the reader takes the entry from the file.
+pub(super) struct Access {
+    pub get: Get,
+    pub put: Option<Put>,
+}
+
+/// An entry that is written and read.
+pub(super) const fn both(get: Get, put: Put) -> Access {
+    Access { get, put: Some(put) }
+}
+
+/// An entry that is written: the reader checks or ignores it, or reads it before all others.
+pub(super) const fn written(get: Get) -> Access {
+    Access { get, put: None }
+}
+
+/// The reading direction of an entry, as an assignment.
+macro_rules! put {
+    (|$draft:ident, $read:ident| $assignment:expr) => {
+        |$draft, $read| {
+            $assignment;
+            Ok(())
+        }
+    };
+}
+pub(super) use put;
+
+/// Both directions of a field: `field!(certificate.shift)` of the body, `field!(guarantee: shift_below)` of a part that
+/// a view and a draft have under this name.
+macro_rules! field {
+    ($part:ident: $($field:tt)+) => {
+        $crate::item::both(
+            |view| $crate::value::Stored::value(&view.$part()?.$($field)+),
+            |draft, read| {
+                draft.$part().$($field)+ = $crate::value::Stored::take(read)?;
+                Ok(())
+            },
+        )
+    };
+    ($($field:tt)+) => {
+        $crate::item::both(
+            |view| $crate::value::Stored::value(&view.body.$($field)+),
+            |draft, read| {
+                draft.body.$($field)+ = $crate::value::Stored::take(read)?;
+                Ok(())
+            },
+        )
+    };
+}
+pub(super) use field;
+
+/// Entries that a file has all or none of. The message about a file with some of them is made of their keys in the order
+/// of the table, each with whether it is there.
+pub(super) struct Together {
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // said where files are read
+    pub problem: fn(&[(String, bool)]) -> String,
+}
+
+/// Membership of an entry in a set of entries that belong together.
+#[derive(Clone, Copy)]
+#[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked where files are read
+pub(super) struct Membership {
+    pub set: &'static Together,
+    /// True if the set needs the entry; false if the entry needs the set alone.
+    pub required: bool,
+}
+
 /// Where the value of an entry comes from.
 #[derive(Clone, Copy)]
 pub(super) enum Origin {
@@ -96,6 +168,12 @@ pub(super) struct Item {
     /// Minor version of the format that brought it.
     pub since: i64,
     pub origin: Origin,
+    /// `None` for entries that the reader does not take from the file, or takes before all others.
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called where files are read
+    pub put: Option<Put>,
+    /// The entries without which this one means nothing.
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked where files are read
+    pub together: Option<Membership>,
     /// The group of the kinetic energy that the entry belongs to: there where the body holds it, required or
     /// not there at all.
     pub of: Option<TermGroup>,
@@ -116,6 +194,18 @@ impl Item {
         if let Primary(get) = self.origin {
             self.origin = Derived(get, from);
         }
+        self
+    }
+
+    /// One of several entries that a file has all or none of.
+    pub(crate) const fn with(mut self, set: &'static Together) -> Self {
+        self.together = Some(Membership { set, required: true });
+        self
+    }
+
+    /// An optional entry beside several that a file has all or none of.
+    pub(crate) const fn beside(mut self, set: &'static Together) -> Self {
+        self.together = Some(Membership { set, required: false });
         self
     }
 

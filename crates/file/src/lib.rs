@@ -18,6 +18,7 @@ mod derived;
 #[cfg(feature = "hdf5")]
 mod digest;
 mod document;
+mod draft;
 #[cfg(feature = "hdf5")]
 mod extents;
 mod item;

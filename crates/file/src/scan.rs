@@ -30,7 +30,8 @@ pub(super) struct Scan {
     instances: BTreeMap<&'static str, Vec<(String, String)>>,
     /// Everything that does not fit.
     pub problems: Vec<Diagnostic>,
-    sizes: Sizes,
+    /// Extents of the datasets; those of an interface are not kept.
+    pub sizes: Sizes,
     stored: Stored,
     /// Fingerprints of the numbers that were read, where the file has digests.
     numbers: Numbers,

@@ -1,21 +1,26 @@
 //! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow
 //! it.
 
-use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, ThreeModes, Triangles};
-use super::item::ItemKind::{Floats, Indices, Int, Ints, Named, Text};
+use super::draft::node_indices;
+use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
+use super::item::ItemKind::{Floats, Indices, Int, Ints, Text};
 use super::item::Origin::{ConstantInt, ConstantText, Primary};
-use super::item::{Get, Item, ItemKind, Origin, Per, SchemaGroup};
-use super::value::{Units, Value, count, indices, matrix, rows, shape_rows, small, text};
-use certificate::{CERTIFICATE, INVARIANT_DIGITS, fixed_interface, guarantee};
+use super::item::{Access, Item, ItemKind, Origin, Per, SchemaGroup, Together, both, field, put, written};
+use super::value::{Stored, Units, Value, indices, json_list, shape_rows, text};
+use certificate::{CERTIFICATE, CERTIFIED, CRAIG_BAMPTON, INVARIANT_DIGITS};
 use flexbody_base::provenance;
-use flexbody_body::flex_body::{Parts, Storage, TermGroup};
+use flexbody_body::flex_body::{MassStructure, Parts, ReferenceConditions, Storage};
+use flexbody_model::NodeMoments;
 use geometric_stiffness::{GEOMETRIC_STIFFNESS, INERTIA_STIFFNESS};
 use interfaces::{COORDINATES, INTERFACES};
+use invariants::{COMPARISON, DAMPING, INVARIANTS, LUMPED};
+use nalgebra::{Matrix3, Vector3};
 use terms::TERMS;
 
 mod certificate;
 mod geometric_stiffness;
 mod interfaces;
+mod invariants;
 pub(super) mod terms;
 
 /// Root attribute with the list: a line `SHA-256  path` for each group and dataset, by path.
@@ -58,7 +63,7 @@ const fn dataset(
     units: Units,
     symbol: &'static str,
     description: &'static str,
-    get: Get,
+    access: Access,
 ) -> Item {
     Item {
         name,
@@ -68,7 +73,9 @@ const fn dataset(
         description,
         required: true,
         since: 0,
-        origin: Primary(get),
+        origin: Primary(access.get),
+        put: access.put,
+        together: None,
         of: None,
         large: false,
     }
@@ -80,9 +87,9 @@ const fn attribute(
     kind: ItemKind,
     units: Units,
     description: &'static str,
-    get: Get,
+    access: Access,
 ) -> Item {
-    dataset(name, kind, units, "", description, get)
+    dataset(name, kind, units, "", description, access)
 }
 
 /// A required attribute of version 1.0 with one value for every file.
@@ -96,6 +103,8 @@ const fn constant(name: &'static str, kind: ItemKind, origin: Origin, descriptio
         required: true,
         since: 0,
         origin,
+        put: None,
+        together: None,
         of: None,
         large: false,
     }
@@ -109,7 +118,7 @@ const ROOT: &[Item] = &[
         Int,
         ONE,
         "additions within the major version; a reader ignores what it does not know",
-        |v| {
+        written(|v| {
             let Parts { conditions, inertia_stiffness, mesh, .. } = v.body;
             Some(Value::Int(match (conditions.is_mean(), inertia_stiffness, mesh) {
                 (false, _, _) => MINOR,
@@ -117,100 +126,145 @@ const ROOT: &[Item] = &[
                 (true, None, Some(_)) => WITHOUT_INERTIA_STIFFNESS,
                 (true, None, None) => WITHOUT_MESH,
             }))
-        },
+        }),
     ),
-    attribute("generator", Text, ONE, "program and version that wrote the file", |_| {
-        text(provenance::generator())
-    }),
+    attribute(
+        "generator",
+        Text,
+        ONE,
+        "program and version that wrote the file",
+        written(|_| text(provenance::generator())),
+    ),
     attribute(
         "dimension",
         Int,
         ONE,
         "3; 2: the body stays in its plane z = 0, all components along z are zero",
-        |v| count(v.body.dimension),
+        field!(dimension),
     ),
     attribute(
         "units_length",
         Text,
         ONE,
         "unit of length: a name (`m mm cm um km in ft`) or its size in m",
-        |v| text(v.body.units.length.name()),
+        written(|v| text(v.body.units.length.name())),
     ),
     attribute(
         "units_mass",
         Text,
         ONE,
         "unit of mass: a name (`kg g t tonne lb slug slinch`) or its size in kg",
-        |v| text(v.body.units.mass.name()),
+        written(|v| text(v.body.units.mass.name())),
     ),
-    attribute("units_time", Text, ONE, "unit of time: a name (`s ms us`) or its size in s", |v| {
-        text(v.body.units.time.name())
-    }),
+    attribute(
+        "units_time",
+        Text,
+        ONE,
+        "unit of time: a name (`s ms us`) or its size in s",
+        written(|v| text(v.body.units.time.name())),
+    ),
     attribute(
         "storage",
         Text,
         ONE,
         "`f32`: shapes and the inertia of the modes are rounded to 32-bit floats, in the datasets marked float32; absent: `f64`, all floats have 64 bits",
-        |v| text((v.body.storage == Storage::F32).then(|| v.body.storage.name())?),
+        written(|v| text((v.body.storage == Storage::F32).then(|| v.body.storage.name())?)),
     )
     .added(3),
-    attribute("units_stated", Int, ONE, "1: the user stated the units; 0: m, kg, s were assumed", |v| {
-        Some(Value::Int(v.body.units.stated.into()))
-    }),
+    attribute(
+        "units_stated",
+        Int,
+        ONE,
+        "1: the user stated the units; 0: m, kg, s were assumed",
+        written(|v| Some(Value::Int(v.body.units.stated.into()))),
+    ),
     attribute(
         LIST,
         Text,
         ONE,
         "SHA-256 of every group and dataset, as described above: a line for each, by path; absent before 1.4",
         // Of what was written: the writer adds it at the end.
-        |_| None,
+        written(|_| None),
     )
     .added(DIGESTS_SINCE),
-    attribute(WHOLE, Text, ONE, "SHA-256 of the text of `digests`: of all content; absent before 1.4", |_| None)
-        .added(DIGESTS_SINCE),
+    attribute(
+        WHOLE,
+        Text,
+        ONE,
+        "SHA-256 of the text of `digests`: of all content; absent before 1.4",
+        written(|_| None),
+    )
+    .added(DIGESTS_SINCE),
 ];
 
+/// Two entries that need each other.
+fn both_or_none(entries: &[(String, bool)]) -> String {
+    format!("{} and {}: expected both or none, found one", entries[0].0, entries[1].0)
+}
+
+static BODY_NUMBER: Together = Together { problem: both_or_none };
+static INTERNAL_ROWS: Together = Together { problem: both_or_none };
+static INERTIA: Together = Together {
+    problem: |entries| {
+        let names: Vec<&str> = entries.iter().map(|(name, _)| name.as_str()).collect();
+        format!("{}: expected all or none, found some", names.join(", "))
+    },
+};
+
 const SOURCE: &[Item] = &[
-    attribute("model", Text, ONE, "name of the model", |v| text(v.body.source.name.as_str())),
+    attribute("model", Text, ONE, "name of the model", field!(source.name)),
     attribute(
         "files",
         Text,
         ONE,
         "input files as a JSON array of objects with `role`, `name`, `sha256`",
-        |v| text(serde_json::to_string(&v.body.source.files).expect("structs of strings are valid JSON")),
+        both(
+            |v| text(serde_json::to_string(&v.body.source.files).expect("structs of strings are valid JSON")),
+            put!(|d, read| d.body.source.files = read.json("a JSON array of files")?),
+        ),
     ),
     attribute(
         "body_number",
         Int,
         ONE,
         "which of several bodies in the same matrices this is, from 1 (`--split`)",
-        |v| count(v.body.source.number?.number),
+        field!(number: number),
     )
+    .with(&BODY_NUMBER)
     .added(2),
-    attribute("bodies", Int, ONE, "how many bodies the matrices hold (`--split`)", |v| {
-        count(v.body.source.number?.of)
-    })
-    .added(2),
-    attribute("n_nodes", Int, ONE, "nodes of the body", |v| count(v.body.nodes.len())).derived(""),
-    attribute("n_dofs", Int, ONE, "rows of the FE matrices; 0: not known, the body comes from another program", |v| count(v.body.source.n_dofs)),
+    attribute("bodies", Int, ONE, "how many bodies the matrices hold (`--split`)", field!(number: of))
+        .with(&BODY_NUMBER)
+        .added(2),
+    attribute("n_nodes", Int, ONE, "nodes of the body", written(|v| v.body.nodes.len().value())).derived(""),
+    attribute("n_dofs", Int, ONE, "rows of the FE matrices; 0: not known, the body comes from another program", field!(source.n_dofs)),
     attribute(
         "mass_structure",
         Text,
         ONE,
         "`rotation-invariant`: every 3x3 node block of M is a multiple of I; `diagonal`: that, and M diagonal; `general`: neither, and `/invariants/W0` is there",
-        |v| text(v.body.source.mass_structure.name()),
+        both(
+            |v| text(v.body.source.mass_structure.name()),
+            put!(|d, read| d.body.source.mass_structure = named(read.text(), &MassStructure::ALL, MassStructure::name)?),
+        ),
     ),
     attribute(
         "approximation",
         Text,
         ONE,
         "what stays approximate for the mass structure `general`; absent: nothing, the invariants are those of the matrices",
-        |v| text(v.body.source.approximation.as_deref()?),
+        field!(source.approximation),
     )
     .added(2),
-    attribute("settings", Text, ONE, "settings of the run that can change the result, as JSON", |v| {
-        text(v.body.source.settings.to_string())
-    }),
+    attribute(
+        "settings",
+        Text,
+        ONE,
+        "settings of the run that can change the result, as JSON",
+        both(
+            |v| text(v.body.source.settings.to_string()),
+            put!(|d, read| d.body.source.settings = read.json("JSON")?),
+        ),
+    ),
 ];
 
 const FRAME: &[Item] = &[
@@ -219,7 +273,16 @@ const FRAME: &[Item] = &[
         Text,
         ONE,
         "what ties the frame to the deformed body: `interface NAME`: its reference point is the origin and rests in every mode; `not stated`: the modes do, as in the file of another program that the body comes from; absent: `mean axes`, C1 = C2 = 0",
-        |v| text((!v.body.conditions.is_mean()).then(|| v.body.conditions.text())?),
+        both(
+            |v| text((!v.body.conditions.is_mean()).then(|| v.body.conditions.text())?),
+            |d, read| {
+                let stated = read.text();
+                d.body.conditions = ReferenceConditions::from_text(&stated).ok_or_else(|| {
+                    format!("expected `mean axes`, `interface NAME` or `not stated`, found {stated:?}")
+                })?;
+                Ok(())
+            },
+        ),
     )
     .added(7),
     dataset(
@@ -228,7 +291,7 @@ const FRAME: &[Item] = &[
         LENGTH,
         "r0",
         "origin of the body frame in model coordinates",
-        |v| small(v.body.frame.origin),
+        field!(frame.origin),
     ),
     dataset(
         "axes",
@@ -236,21 +299,33 @@ const FRAME: &[Item] = &[
         ONE,
         "A0",
         "columns are the body axes in model axes, right-handed: x_model = r0 + A0 x_body",
-        |v| small(v.body.frame.axes),
+        field!(frame.axes),
     ),
 ];
 
 const NODES: &[Item] = &[
-    dataset("id", Ints(&[Nodes]), ONE, "id", "node numbers of the FE model, unique", |v| {
-        Some(Value::Ints(v.body.nodes.ids.clone()))
-    }),
+    dataset(
+        "id",
+        Ints(&[Nodes]),
+        ONE,
+        "id",
+        "node numbers of the FE model, unique",
+        both(
+            |v| v.body.nodes.ids.value(),
+            |d, read| {
+                d.body.nodes.ids = Vec::take(read)?;
+                d.index = d.body.nodes.ids.iter().enumerate().map(|(i, id)| (*id, i)).collect();
+                Ok(())
+            },
+        ),
+    ),
     dataset(
         "position",
         Floats(&[Nodes, Fixed(3)]),
         LENGTH,
         "x",
         "undeformed node positions in the body frame",
-        |v| Some(Value::Floats(v.body.nodes.positions.as_flattened().to_vec())),
+        field!(nodes.positions),
     ),
     dataset(
         "rotational_first_moment",
@@ -258,11 +333,22 @@ const NODES: &[Item] = &[
         MASS_LENGTH,
         "h",
         "moments of the mass that turns with each node, about the frame origin: of director a the sum of E_s over all points (theory section 6); with `rotational_second_moment` what `/inertia_stiffness` follows from",
-        |v| {
-            let moments = &v.body.inertia_stiffness.as_ref()?.moments;
-            Some(Value::Floats(moments.iter().flat_map(|own| own.first.iter().copied()).collect()))
-        },
+        both(
+            |v| {
+                let moments = &v.body.inertia_stiffness.as_ref()?.moments;
+                Some(Value::Floats(moments.iter().flat_map(|own| own.first.iter().copied()).collect()))
+            },
+            |d, read| {
+                let moments = |first: &[f64]| NodeMoments {
+                    first: Vector3::from_column_slice(first),
+                    second: Matrix3::zeros(),
+                };
+                d.inertia().moments = read.floats().chunks_exact(3).map(moments).collect();
+                Ok(())
+            },
+        ),
     )
+    .with(&INERTIA)
     .added(6),
     dataset(
         "rotational_second_moment",
@@ -270,11 +356,20 @@ const NODES: &[Item] = &[
         MASS_LENGTH2,
         "z",
         "row a: of director a the sum of E_s with the places of all points and directors",
-        |v| {
-            let moments = &v.body.inertia_stiffness.as_ref()?.moments;
-            Some(Value::Floats(moments.iter().flat_map(|own| own.second.transpose().as_slice().to_vec()).collect()))
-        },
+        both(
+            |v| {
+                let moments = v.body.inertia_stiffness.as_ref()?.moments.iter();
+                Some(Value::Floats(moments.flat_map(|own| own.second.transpose().as_slice().to_vec()).collect()))
+            },
+            |d, read| {
+                for (own, second) in d.inertia().moments.iter_mut().zip(read.floats().chunks_exact(9)) {
+                    own.second = Matrix3::from_row_slice(second);
+                }
+                Ok(())
+            },
+        ),
     )
+    .with(&INERTIA)
     .added(6),
 ];
 
@@ -285,10 +380,13 @@ const MESH: &[Item] = &[
         ONE,
         "",
         "triangles of the surface by the indices of their nodes in `/nodes`, from 0, counterclockwise seen from outside; absent: lines only",
-        |v| {
-            let triangles = v.body.mesh.as_ref()?.triangles();
-            (!triangles.is_empty()).then(|| indices(triangles.as_flattened()))
-        },
+        both(
+            |v| {
+                let triangles = v.body.mesh.as_ref()?.triangles();
+                (!triangles.is_empty()).then(|| indices(triangles.as_flattened()))
+            },
+            |d, read| node_indices(read, &mut d.triangles),
+        ),
     )
     .added(5),
     dataset(
@@ -297,10 +395,13 @@ const MESH: &[Item] = &[
         ONE,
         "",
         "edges to draw: where the surface turns by more than 30 degrees or ends, and beams; absent: none",
-        |v| {
-            let edges = v.body.mesh.as_ref()?.edges();
-            (!edges.is_empty()).then(|| indices(edges.as_flattened()))
-        },
+        both(
+            |v| {
+                let edges = v.body.mesh.as_ref()?.edges();
+                (!edges.is_empty()).then(|| indices(edges.as_flattened()))
+            },
+            |d, read| node_indices(read, &mut d.edges),
+        ),
     )
     .added(5),
 ];
@@ -311,11 +412,10 @@ const MODES: &[Item] = &[
         Text,
         ONE,
         "JSON array with the `load` of every residual vector and of every interface, and what the modes lack of the static response to it, in the norm of K, `before` (free modes alone) and `after`; absent: not known",
-        |v| {
-            let truncation = &v.body.modes.truncation;
-            let json = || serde_json::to_string(truncation).expect("finite numbers and strings are valid JSON");
-            (!truncation.is_empty()).then(|| Value::Text(json()))
-        },
+        both(
+            |v| json_list(&v.body.modes.truncation),
+            put!(|d, read| d.body.modes.truncation = read.json("a JSON array of loads")?),
+        ),
     )
     .added(2),
     attribute(
@@ -323,11 +423,10 @@ const MODES: &[Item] = &[
         Text,
         ONE,
         "where each mode comes from, as a JSON array of nf texts; absent: not known",
-        |v| {
-            let provenance = &v.body.modes.provenance;
-            let json = || serde_json::to_string(provenance).expect("strings are valid JSON");
-            (!provenance.is_empty()).then(|| Value::Text(json()))
-        },
+        both(
+            |v| json_list(&v.body.modes.provenance),
+            put!(|d, read| d.body.modes.provenance = read.json("a JSON array of texts")?),
+        ),
     )
     .added(2),
     dataset(
@@ -336,7 +435,7 @@ const MODES: &[Item] = &[
         PER_TIME2,
         "lambda",
         "eigenvalues of K psi = lambda M psi, positive, ascending",
-        |v| Some(Value::Floats(v.body.modes.eigenvalue.clone())),
+        field!(modes.eigenvalue),
     ),
     dataset(
         "frequency_hz",
@@ -344,11 +443,11 @@ const MODES: &[Item] = &[
         Units::Hertz,
         "f",
         "sqrt(lambda) / (2 pi), in hertz whatever the unit of time",
-        |v| {
+        written(|v| {
             let hertz = v.body.units.hertz();
             let frequency = |l: &f64| l.sqrt() / std::f64::consts::TAU * hertz;
             Some(Value::Floats(v.body.modes.eigenvalue.iter().map(frequency).collect()))
-        },
+        }),
     )
     .derived("frequency_hz"),
     dataset(
@@ -357,7 +456,7 @@ const MODES: &[Item] = &[
         ONE,
         "rho",
         "|K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), 2-norms",
-        |v| Some(Value::Floats(v.body.modes.residual.clone())),
+        field!(modes.residual),
     ),
     dataset(
         "damping_ratio",
@@ -365,7 +464,7 @@ const MODES: &[Item] = &[
         ONE,
         "zeta",
         "modal damping ratios; 0 where none was given",
-        |v| Some(Value::Floats(v.body.modes.damping_ratio.clone())),
+        field!(modes.damping_ratio),
     ),
     dataset(
         "eigenvalue_lower",
@@ -373,8 +472,9 @@ const MODES: &[Item] = &[
         PER_TIME2,
         "lambda-",
         "guaranteed lower bounds of the eigenvalues of K and M as stored; accuracy `certified` only",
-        |v| Some(Value::Floats(guarantee(v)?.eigenvalue_lower.clone())),
+        field!(guarantee: eigenvalue_lower),
     )
+    .with(&CERTIFIED)
     .added(1),
     dataset(
         "eigenvalue_upper",
@@ -382,8 +482,9 @@ const MODES: &[Item] = &[
         PER_TIME2,
         "lambda+",
         "guaranteed upper bounds of the eigenvalues of K and M as stored; accuracy `certified` only",
-        |v| Some(Value::Floats(guarantee(v)?.eigenvalue_upper.clone())),
+        field!(guarantee: eigenvalue_upper),
     )
+    .with(&CERTIFIED)
     .added(1),
     dataset(
         "shape_error",
@@ -391,8 +492,9 @@ const MODES: &[Item] = &[
         ONE,
         "e",
         "guaranteed upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the norm of M; accuracy `certified` only",
-        |v| Some(Value::Floats(guarantee(v)?.shape_error.clone())),
+        field!(guarantee: shape_error),
     )
+    .with(&CERTIFIED)
     .added(1),
     dataset(
         "free_eigenvalue",
@@ -400,8 +502,9 @@ const MODES: &[Item] = &[
         PER_TIME2,
         "lambda~",
         "eigenvalues of the free body as estimated, upper bounds of them; Craig-Bampton bodies only, whose own are larger",
-        |v| Some(Value::Floats(fixed_interface(v)?.free_estimate.clone())),
+        field!(fixed_interface: free_estimate),
     )
+    .with(&CRAIG_BAMPTON)
     .added(4),
     dataset(
         "free_eigenvalue_lower",
@@ -409,8 +512,9 @@ const MODES: &[Item] = &[
         PER_TIME2,
         "lambda~-",
         "lower bounds of the eigenvalues of the free body, to rounding; 0: none; Craig-Bampton bodies only",
-        |v| Some(Value::Floats(fixed_interface(v)?.free_lower.clone())),
+        field!(fixed_interface: free_lower),
     )
+    .with(&CRAIG_BAMPTON)
     .added(4),
     dataset(
         "shape",
@@ -418,7 +522,10 @@ const MODES: &[Item] = &[
         PER_ROOT_MASS,
         "Psi",
         "mass-normalised mode shapes: displacement of every node in body axes; the largest component of each mode is positive",
-        |v| Some(shape_rows(&v.body.modes.shape, 0..v.body.nodes.len())),
+        both(
+            |v| Some(shape_rows(&v.body.modes.shape, 0..v.body.nodes.len())),
+            put!(|d, read| d.body.modes.shape = read.shapes(d.nf())),
+        ),
     )
     .large(),
     dataset(
@@ -427,7 +534,10 @@ const MODES: &[Item] = &[
         PER_ROOT_MASS_LENGTH,
         "theta",
         "rotation of every node in body axes, zero where the model has none; absent: a model of displacements",
-        |v| Some(shape_rows(v.body.modes.rotation.as_ref()?, 0..v.body.nodes.len())),
+        both(
+            |v| Some(shape_rows(v.body.modes.rotation.as_ref()?, 0..v.body.nodes.len())),
+            put!(|d, read| d.body.modes.rotation = Some(read.shapes(d.nf()))),
+        ),
     )
     .added(2)
     .large(),
@@ -437,8 +547,9 @@ const MODES: &[Item] = &[
         ONE,
         "",
         "number and direction (1 to 6) that label each row of the FE model without coordinates",
-        |v| Some(Value::Ints(v.body.modes.internal.as_ref()?.dofs.as_flattened().to_vec())),
+        field!(internal: dofs),
     )
+    .with(&INTERNAL_ROWS)
     .added(2),
     dataset(
         "internal",
@@ -446,90 +557,20 @@ const MODES: &[Item] = &[
         ONE,
         "",
         "the modes at these rows, as the FE model scales them; vectors (three rows) in body axes",
-        |v| matrix(v.body.modes.internal.as_ref()?.shape.as_ref()),
+        field!(internal: shape),
     )
+    .with(&INTERNAL_ROWS)
     .added(2)
     .large(),
 ];
 
-const INVARIANTS: &[Item] = &[
-    dataset("mass", Floats(&[Fixed(1)]), MASS, "m", "mass, 1' Ms 1", |v| Some(Value::Floats(vec![v.invariants().mass()]))),
-    dataset("first_moment", Floats(&[Fixed(3)]), MASS_LENGTH, "c", "first moment about the frame origin, c_k = 1' Ms x_k", |v| {
-        small(v.invariants().first_moment())
-    }),
-    dataset("second_moment", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "J", "second moment about the frame origin, J_kl = x_k' Ms x_l", |v| {
-        small(v.invariants().second_moment())
-    }),
-    dataset("C1", Floats(&[Fixed(3), Modes]), ROOT_MASS, "C1", "linear momentum of the modes, 1' Ms Psi_k", |v| {
-        matrix(v.invariants().c1().as_ref())
-    }),
-    dataset("Ibar", Floats(&[Fixed(3), Fixed(3), Modes]), ROOT_MASS_LENGTH, "Ibar", "Ibar_kl = x_k' Ms Psi_l", |v| {
-        v.invariants().ibar().map(|ibar| Value::Floats(ibar.as_flattened().iter().flatten().copied().collect()))
+/// The value with this name among `all`.
+fn named<T: Copy>(found: String, all: &[T], name: fn(T) -> &'static str) -> Result<T, String> {
+    all.iter().copied().find(|one| name(*one) == found).ok_or_else(|| {
+        let known: Vec<String> = all.iter().map(|one| format!("`{}`", name(*one))).collect();
+        format!("expected one of {}, found {found:?}", known.join(", "))
     })
-    .of(TermGroup::W1)
-    .large(),
-    dataset("S", Floats(&[Fixed(3), Fixed(3), Modes, Modes]), ONE, "S", "S_kl = Psi_k' Ms Psi_l", |v| {
-        v.invariants().s().map(|s| Value::Floats(s.as_flattened().iter().flat_map(|m| rows(m.as_ref())).collect()))
-    })
-    .of(TermGroup::W2)
-    .large(),
-    dataset("modal_stiffness", Floats(&[Modes, Modes]), PER_TIME2, "K_ff", "Psi' K Psi", |v| {
-        matrix(v.invariants().modal_stiffness().as_ref())
-    }),
-    dataset("I0", Floats(&[Fixed(3), Fixed(3)]), MASS_LENGTH2, "I0", "inertia about the frame origin, tr(J) I - J", |v| {
-        small(v.invariants().inertia())
-    })
-    .derived("second_moment"),
-    dataset("W0", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS, "W0", "mass structure `general` only: Phi_t' M B_j, column b nf + j; else block b is (-C1~) e_b", |v| {
-        matrix(v.invariants().general()?.w0.as_ref())
-    })
-    .added(2)
-    .large(),
-    dataset("W1", Floats(&[Fixed(3), ThreeModes]), ROOT_MASS_LENGTH, "W1", "diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k,l) = -(Ibar_kl + Ibar_lk); column b nf + j for component b, mode j", |v| {
-        matrix(v.invariants().w1()?.as_ref())
-    })
-    .derived("Ibar")
-    .of(TermGroup::W1)
-    .large(),
-    dataset("W2", Floats(&[ThreeModes, ThreeModes]), ONE, "W2", "diagonal blocks S_ll + S_mm, block (k,l) = -S_lk; row and column b nf + j", |v| {
-        matrix(v.invariants().w2()?.as_ref())
-    })
-    .derived("S")
-    .of(TermGroup::W2)
-    .large(),
-    dataset("W3", Floats(&[ThreeModes, Modes]), ONE, "W3", "[S23 - S32; S31 - S13; S12 - S21]; row b nf + j; mass structure `general` (B_j' M Psi) and without W2: information of its own", |v| {
-        matrix(v.invariants().w3()?.as_ref())
-    })
-    .derived("S")
-    .of(TermGroup::W3)
-    .large(),
-    dataset("C2", Floats(&[Fixed(3), Modes]), ROOT_MASS_LENGTH, "C2", "angular momentum of the modes, [Ibar23 - Ibar32; Ibar31 - Ibar13; Ibar12 - Ibar21]; without W1: information of its own", |v| {
-        matrix(v.invariants().c2().as_ref())
-    })
-    .derived("Ibar"),
-    dataset("modal_mass", Floats(&[Modes, Modes]), ONE, "m_ff", "S11 + S22 + S33 = Psi' M Psi; mass structure `general` and without W2: information of its own", |v| matrix(v.invariants().modal_mass().as_ref()))
-        .derived("S"),
-];
-
-/// Damping has nothing to do with the mass: lumped masses have none of their own.
-const DAMPING: &[Item] = &[dataset(
-    "modal_damping",
-    Floats(&[Modes, Modes]),
-    PER_TIME,
-    "D_ff",
-    "Psi' D Psi, where damping was given; `/modes/damping_ratio` is its diagonal over 2 sqrt(lambda)",
-    |v| matrix(v.body.modes.modal_damping.as_ref()?.as_ref()),
-)
-.added(2)];
-
-const LUMPED: &[Item] = &[attribute("negative_masses", Int, ONE, "number of negative nodal masses", |v| {
-    count(v.lumped?.negative_masses)
-})];
-
-const COMPARISON: &[Item] =
-    &[attribute("<norm>", Named, ONE, "one attribute per error norm, in creation order", |v| {
-        Some(Value::Named(v.lumped?.comparison.clone()))
-    })];
+}
 
 /// The groups, in the order in which they are written.
 pub(super) const TABLE: &[SchemaGroup] = &[

@@ -2,8 +2,13 @@
 
 use faer::{Mat, MatRef};
 use flexbody_base::units::{Unit, UnitSystem};
-use flexbody_body::flex_body::{GeometricStiffness, Interface, InterfaceRows, LumpedBody, Parts};
+use flexbody_body::flex_body::{
+    FixedInterface, GeometricStiffness, Guarantee, Interface, InterfaceCoordinates, InterfaceRows,
+    InternalRows, LumpedBody, Parts,
+};
 use flexbody_body::invariants::Invariants;
+use flexbody_model::BodyNumber;
+use nalgebra::{Matrix3, Vector3};
 
 /// Content of one entry; arrays are row-major in the shape that the table states.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +46,38 @@ impl<'a> View<'a> {
         self.interface?.rows(nodes, modes.shape.as_ref(), rotation, *dimension)
     }
 
+    pub(crate) fn number(&self) -> Option<BodyNumber> {
+        self.body.source.number
+    }
+
+    pub(crate) fn internal(&self) -> Option<&'a InternalRows> {
+        self.body.modes.internal.as_ref()
+    }
+
+    pub(crate) fn guarantee(&self) -> Option<&'a Guarantee> {
+        self.body.certificate.guarantee.as_ref()
+    }
+
+    pub(crate) fn fixed_interface(&self) -> Option<&'a FixedInterface> {
+        self.body.certificate.fixed_interface.as_ref()
+    }
+
+    pub(crate) fn coordinates(&self) -> Option<&'a InterfaceCoordinates> {
+        self.body.coordinates.as_ref()
+    }
+
+    pub(crate) fn interface(&self) -> Option<&'a Interface> {
+        self.interface
+    }
+
+    pub(crate) fn lumped(&self) -> Option<&'a LumpedBody> {
+        self.lumped
+    }
+
+    pub(crate) fn load(&self) -> Option<&'a GeometricStiffness<Mat<f64>>> {
+        self.geometric_stiffness
+    }
+
     /// Node indices of the group's interface.
     pub(crate) fn interface_nodes(&self) -> &'a [usize] {
         self.interface.map_or(&[], |i| &i.nodes)
@@ -65,24 +102,120 @@ pub(super) fn matrix(m: MatRef<'_, f64>) -> Option<Value> {
     Some(Value::Floats(rows(m).collect()))
 }
 
-/// A 3-vector or 3x3 matrix of nalgebra, row by row.
-pub(super) fn small<const C: usize>(m: nalgebra::SMatrix<f64, 3, C>) -> Option<Value> {
-    Some(Value::Floats(m.transpose().iter().copied().collect()))
-}
-
 /// Indices of nodes, of which no body has more than 2^31.
 pub(super) fn indices(values: &[u32]) -> Value {
     Value::Indices(values.iter().map(|&i| i32::try_from(i).unwrap_or(i32::MAX)).collect())
 }
 
-/// A count as the file's integer. Counts of things in memory are far below 2^63.
-pub(super) fn count(value: usize) -> Option<Value> {
-    Some(Value::Int(i64::try_from(value).unwrap_or(i64::MAX)))
+/// A list as a text in JSON; no entry where it is empty.
+pub(super) fn json_list<T: serde::Serialize>(list: &[T]) -> Option<Value> {
+    text(
+        (!list.is_empty())
+            .then(|| serde_json::to_string(list).expect("strings and finite numbers are valid JSON"))?,
+    )
 }
 
 pub(super) fn text(value: impl Into<String>) -> Option<Value> {
     Some(Value::Text(value.into()))
 }
+
+/// The value that a file has for an entry.
+pub(super) struct ReadValue {
+    pub value: Value,
+    /// Last extent of a dataset.
+    pub columns: usize,
+}
+
+/// The contents of a value, which is of the kind that its row has.
+macro_rules! contents {
+    ($($name:ident $kind:ident $type:ty,)*) => {
+        impl ReadValue {
+            $(pub(crate) fn $name(self) -> $type {
+                match self.value {
+                    Value::$kind(contents) => contents,
+                    other => unreachable!("a row of the table reads {}, the scan gave {other:?}", stringify!($kind)),
+                }
+            })*
+        }
+    };
+}
+contents! {
+    floats Floats Vec<f64>,
+    ints Ints Vec<i64>,
+    indices Indices Vec<i32>,
+    text Text String,
+    int Int i64,
+    float Float f64,
+    named Named Vec<(String, f64)>,
+}
+
+impl ReadValue {
+    /// Contents of a text in JSON, `expected` in words.
+    pub(crate) fn json<T: serde::de::DeserializeOwned>(self, expected: &str) -> Result<T, String> {
+        serde_json::from_str(&self.text())
+            .map_err(|e| format!("expected {expected}, found text that is not ({e})"))
+    }
+
+    /// Components of shapes (nf x nodes x 3) as a matrix (3n x nf), the inverse of [`shape_rows`].
+    pub(crate) fn shapes(self, nf: usize) -> Mat<f64> {
+        let values = self.floats();
+        let rows = values.len() / nf;
+        Mat::from_fn(rows, nf, |row, j| values[j * rows + row])
+    }
+}
+
+/// A type that the file stores as one entry.
+pub(super) trait Stored: Sized {
+    /// The value for the file; `None`: no entry.
+    fn value(&self) -> Option<Value>;
+
+    /// Takes the value of the file. The error says what was expected and what was found.
+    fn take(read: ReadValue) -> Result<Self, String>;
+}
+
+impl<T: Stored> Stored for Option<T> {
+    fn value(&self) -> Option<Value> {
+        self.as_ref()?.value()
+    }
+
+    fn take(read: ReadValue) -> Result<Self, String> {
+        T::take(read).map(Some)
+    }
+}
+
+macro_rules! stored {
+    ($type:ty, $own:ident => $value:expr, $read:ident => $take:expr) => {
+        impl Stored for $type {
+            fn value(&self) -> Option<Value> {
+                let $own = self;
+                Some($value)
+            }
+
+            fn take($read: ReadValue) -> Result<Self, String> {
+                Ok($take)
+            }
+        }
+    };
+}
+stored!(f64, own => Value::Float(*own), read => read.float());
+stored!(String, own => Value::Text(own.clone()), read => read.text());
+stored!(Vec<f64>, own => Value::Floats(own.clone()), read => read.floats());
+stored!(Vec<i64>, own => Value::Ints(own.clone()), read => read.ints());
+stored!(Vec<[i64; 2]>, own => Value::Ints(own.as_flattened().to_vec()), read => read.ints().as_chunks().0.to_vec());
+stored!(Vec<[f64; 3]>, own => Value::Floats(own.as_flattened().to_vec()), read => read.floats().as_chunks().0.to_vec());
+stored!([f64; 3], own => Value::Floats(own.to_vec()), read => Vector3::take(read)?.into());
+stored!(Vector3<f64>, own => Value::Floats(own.as_slice().to_vec()), read => Self::from_column_slice(&read.floats()));
+stored!(Matrix3<f64>, own => Value::Floats(own.transpose().as_slice().to_vec()), read => Self::from_row_slice(&read.floats()));
+stored!(Mat<f64>, own => Value::Floats(rows(own.as_ref()).collect()), read => {
+    let columns = read.columns;
+    let values = read.floats();
+    Self::from_fn(values.len() / columns, columns, |i, j| values[i * columns + j])
+});
+// Counts of things in memory are far below 2^63.
+stored!(usize, own => Value::Int(i64::try_from(*own).unwrap_or(i64::MAX)), read => {
+    let value = read.int();
+    Self::try_from(value).map_err(|_| format!("expected a count, found {value}"))?
+});
 
 /// Units of an entry in terms of the body's units of mass, length and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,9 +1,10 @@
 //! The nine inertia invariants with the numbering and the signs of Adams/Flex, for comparison with what an
 //! MNF translator prints.
 
+use super::export::Holding::{Held, NotApplicable};
 use super::export::arrays::Nested;
 use super::export::frames::{ExportFrame, frames};
-use super::export::{ExportFormat, ExportOptions, Exported, losses};
+use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -32,17 +33,28 @@ impl ExportFormat for AdamsInvariants {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
-        [
-            losses::plane(body),
-            losses::general_w0(body),
-            losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, options, |_| false),
-            losses::internal_rows(body),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            rigid_coupling: Held,
+            plane: losses::plane(body),
+            deformed_inertia: Held,
+            general_w0: losses::general_w0(body),
+            coriolis_force: Held,
+            general_w3: Held,
+            separate_w2: Held,
+            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
+            damping: Held,
+            shapes: Held,
+            rotations: Held,
+            internal_rows: losses::internal_rows(body),
+            gravity: Held,
+            interfaces: Held,
+            surface: NotApplicable,
+            origins_of_modes: NotApplicable,
+            units: Held,
+            storage: NotApplicable,
+        }
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {

@@ -1,7 +1,7 @@
 //! JSON: the entries of the flex-body file as one document.
 
-use super::export::arrays::Document;
-use super::export::{ExportFormat, ExportOptions, Exported};
+use super::export::arrays::{ALL_ENTRIES, Document};
+use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::contents;
@@ -22,8 +22,8 @@ impl ExportFormat for Json {
         "any language: the entries of the flex-body file as JSON"
     }
 
-    fn losses(&self, _: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        Vec::new()
+    fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
+        ALL_ENTRIES
     }
 
     fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {

@@ -3,8 +3,8 @@
 //! Layout of the members: <https://numpy.org/doc/stable/reference/generated/numpy.lib.format.html>, version
 //! 1.0.
 
-use super::export::arrays::Document;
-use super::export::{ExportFormat, ExportOptions, Exported};
+use super::export::arrays::{ALL_ENTRIES, Document};
+use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::{Numbers, contents};
@@ -24,8 +24,8 @@ impl ExportFormat for Npz {
         "NumPy: the entries of the flex-body file"
     }
 
-    fn losses(&self, _: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        Vec::new()
+    fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
+        ALL_ENTRIES
     }
 
     fn write(&self, body: &FlexBody, _: &ExportOptions) -> Result<Exported> {

@@ -12,8 +12,9 @@
 //! stand for its I0, C2 and W1. The rows of the three rotations are zero: their inertia is in the other
 //! twelve, which the program ties to them.
 
+use super::export::Holding::{self, Held, NotApplicable};
 use super::export::frames::{ExportFrame, frames};
-use super::export::{ExportFormat, ExportOptions, Exported, losses};
+use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -36,26 +37,36 @@ impl ExportFormat for OpenRadioss {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         let other = losses::is_damped(body) && rayleigh(body).is_none();
         let damping = other.then(|| "damping of the modes other than alpha M + beta K".to_owned());
-        [
-            losses::plane(body),
+        ExportChecklist {
+            rigid_coupling: Held,
+            plane: losses::plane(body),
             // Its velocities lack what the rotation makes of the deformation (`fxbodvp.F`).
-            losses::changing_inertia(
+            deformed_inertia: losses::changing_inertia(
                 body,
                 "W1 but for its centrifugal load",
                 "OpenRadioss takes the inertia of the undeformed body",
             ),
-            losses::general_w0(body),
-            losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, options, |_| false),
-            damping,
-            losses::internal_rows(body),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+            general_w0: losses::general_w0(body),
+            // Those of W2 and W3 are lost with the inertia of the deformed body.
+            coriolis_force: NotApplicable,
+            general_w3: NotApplicable,
+            separate_w2: NotApplicable,
+            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
+            damping: Holding::held_but_for(damping),
+            shapes: Held,
+            rotations: Held,
+            internal_rows: losses::internal_rows(body),
+            gravity: Held,
+            interfaces: Held,
+            surface: NotApplicable,
+            origins_of_modes: NotApplicable,
+            units: NotApplicable,
+            storage: NotApplicable,
+        }
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {

@@ -66,7 +66,8 @@ pub fn export(
     let body = body.as_ref();
     let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
     let losses: Vec<Diagnostic> = format
-        .losses(body, options)
+        .checklist(body, options)
+        .losses()
         .into_iter()
         .map(|loss| Diagnostic::new(code, format!("{} cannot hold {loss}", format.name())))
         .collect();

@@ -3,9 +3,9 @@
 //! `arm.P0`, `arm.K`, `arm.M`, `arm.C`.
 
 use super::export::hdf5_contents::{Hdf5Contents, hdf5_bytes};
-use super::export::interface_matrices::{InterfaceMatrices, matrix_losses};
+use super::export::interface_matrices::{InterfaceMatrices, matrix_checklist};
 use super::export::mat5::{Mat5Value, mat5};
-use super::export::{ExportFormat, ExportOptions, Exported};
+use super::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -29,8 +29,8 @@ impl ExportFormat for Simscape {
         &["mat5", HDF5]
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
-        matrix_losses(body, options)
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
+        matrix_checklist(body, options)
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {

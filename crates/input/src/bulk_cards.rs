@@ -6,6 +6,7 @@ mod matrix_lines;
 mod replication;
 
 use super::coordinates::{excerpt, real};
+use super::scanner::{self, Lines};
 use apart::Apart;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
@@ -183,7 +184,7 @@ pub(super) fn read_deck(
     take: &mut dyn FnMut(Item<'_>) -> Taken,
 ) -> Result<Vec<SeenFile>, Diagnostic> {
     let file = InputFile::open(path)?;
-    let has_control = Lines::of(file.bytes(), 0).any(|(_, range)| is_control(&file.bytes()[range]));
+    let has_control = Lines::of(file.bytes()).any(|line| is_control(line.text));
     let mut reading = BulkReader::new(!has_control, take);
     reading.file(path, &file, 0)?;
     reading.flush()?;
@@ -206,36 +207,10 @@ pub(super) fn read_cards(
         _ => Ok(()),
     };
     let mut reading = BulkReader::new(true, &mut each);
-    for (number, range) in Lines::of(text, 0) {
-        reading.line(&text[range], &Place { path, line: above + number })?;
+    for line in Lines::below(text, above) {
+        reading.line(line.text, &Place { path, line: line.number })?;
     }
     reading.flush()
-}
-
-/// The lines of a text: their numbers, from 1, and their bytes without the line end.
-struct Lines<'a> {
-    text: &'a [u8],
-    at: usize,
-    number: usize,
-}
-
-impl<'a> Lines<'a> {
-    fn of(text: &'a [u8], at: usize) -> Self {
-        Self { text, at, number: 0 }
-    }
-}
-
-impl Iterator for Lines<'_> {
-    type Item = (usize, std::ops::Range<usize>);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let rest = self.text.get(self.at..).filter(|rest| !rest.is_empty())?;
-        let length = memchr::memchr(b'\n', rest).unwrap_or(rest.len());
-        let range = self.at..self.at + length;
-        self.at = range.end + 1;
-        self.number += 1;
-        Some((self.number, range))
-    }
 }
 
 /// A deck while it is read.
@@ -285,19 +260,20 @@ impl<'t> BulkReader<'t> {
     }
 
     fn lines_of(&mut self, path: &Path, file: &InputFile, depth: usize) -> Taken {
-        let mut lines = Lines::of(file.bytes(), 0);
-        while let Some((number, range)) = lines.next() {
+        let mut lines = Lines::of(file.bytes());
+        loop {
+            let start = lines.at;
+            let Some(scanner::Line { number, text: line }) = lines.next() else { break };
             if self.ended {
                 return Ok(());
             }
             let at = Place { path, line: number };
-            let line = &file.bytes()[range.clone()];
             let bare = line.trim_ascii();
             if bare.is_empty() || bare.starts_with(b"$") {
                 continue;
             }
             if self.in_bulk
-                && let Some(matrices) = MatrixLines::at(file, range.start, number - 1)
+                && let Some(matrices) = MatrixLines::at(file, start, number - 1)
             {
                 self.flush()?;
                 (lines.at, lines.number) = matrices.end();
@@ -309,8 +285,8 @@ impl<'t> BulkReader<'t> {
                 let mut name = String::from_utf8_lossy(&bare[7..]).trim().to_owned();
                 // A name between quotes may go on in the next lines.
                 while unclosed(&name) {
-                    let Some((_, more)) = lines.next() else { break };
-                    name += String::from_utf8_lossy(&file.bytes()[more]).trim();
+                    let Some(more) = lines.next() else { break };
+                    name += String::from_utf8_lossy(more.text).trim();
                 }
                 self.include(&name, &at, depth)?;
             } else {

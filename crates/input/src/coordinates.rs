@@ -13,9 +13,8 @@ use std::path::Path;
 mod line;
 mod text;
 
-use line::BadLine;
 pub(crate) use line::{Limits, real};
-pub(crate) use text::{Blocks, line_aligned, lines, most_entries};
+pub(crate) use text::{Blocks, line_aligned, most_entries};
 
 /// Number of bad lines that are reported one by one.
 const SHOWN: usize = 5;
@@ -33,7 +32,8 @@ pub(super) struct Coordinates {
     pub stopped: bool,
     /// Lines of the file so far.
     lines: usize,
-    bad: Vec<BadLine>,
+    /// The first bad lines with their numbers, from 1.
+    bad: Vec<(usize, Diagnostic)>,
     bad_count: usize,
     /// First line with an entry below the diagonal.
     pub lower: Option<usize>,
@@ -112,7 +112,7 @@ impl Coordinates {
             self.count += (piece.entries.len() + piece.bad_count) as u64;
             self.bad_count += piece.bad_count;
             let room = SHOWN.saturating_sub(self.bad.len());
-            self.bad.extend(piece.bad.into_iter().take(room).map(|b| BadLine { line: b.line + before, ..b }));
+            self.bad.extend(piece.bad.into_iter().take(room).map(|(line, bad)| (line + before, bad)));
             self.lower = self.lower.or(piece.lower.map(|line| line + before));
             self.upper = self.upper.or(piece.upper.map(|line| line + before));
             self.written = self.written.max(piece.written);
@@ -141,19 +141,15 @@ impl Coordinates {
     /// The bad lines, the first few one by one.
     pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
         let more = self.bad_count - self.bad.len();
-        let told = |(k, bad): (usize, &BadLine)| {
-            let mut message = bad.message.clone();
-            if bad.line == self.lines && !ends_with_newline {
+        let told = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
+            let mut message = bad.message().to_owned();
+            if *line == self.lines && !ends_with_newline {
                 message += "; it is the last line and has no line end: the file may be cut off";
             }
             if k + 1 == SHOWN && more > 0 {
                 message += &format!(" ({more} more lines are bad)");
             }
-            let diagnostic = Diagnostic::new(bad.code, message).at_line(bad.line);
-            match bad.help {
-                Some(help) => diagnostic.with_help(help),
-                None => diagnostic,
-            }
+            Diagnostic::new(bad.code(), message).at_line(*line).with_help(bad.help())
         };
         self.bad.iter().enumerate().map(told).collect()
     }

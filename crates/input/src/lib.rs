@@ -46,6 +46,7 @@ mod recent;
 mod recipes;
 mod region;
 mod row_axes;
+mod scanner;
 mod scipy_npz;
 mod shapes;
 mod tables;

@@ -1,6 +1,7 @@
 //! Which degree of freedom each matrix row is: our table, or what Ansys writes beside its matrices.
 
 use super::matrix_market::read_array;
+use super::scanner::{Lines, words};
 use super::tables::read_dofs;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
@@ -78,8 +79,8 @@ fn node_array(file: &InputFile) -> Found<Vec<i64>> {
 fn named_directions(bytes: &[u8]) -> Option<Vec<DofLabel>> {
     const NAMES: [&str; 6] = ["UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"];
     let mut rows: Vec<(i64, DofLabel)> = Vec::new();
-    for line in bytes.split(|&b| b == b'\n') {
-        let words: Vec<&[u8]> = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()).collect();
+    for line in Lines::of(bytes) {
+        let words: Vec<&[u8]> = words(line.text).collect();
         let &[row, node, name] = words.as_slice() else {
             // Heads and blank lines stand above the first row.
             if rows.is_empty() || words.is_empty() {

@@ -7,6 +7,7 @@ mod op2;
 mod punch;
 mod table;
 
+use super::scanner::expected;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::provenance::SourceFile;
 use flexbody_base::text::InputFile;
@@ -60,7 +61,26 @@ fn unreadable(file: &InputFile, message: impl Into<String>, help: &str) -> Vec<D
     vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).with_help(help)]
 }
 
-/// Lines of a text with their numbers, without what ends them.
-fn lines(file: &InputFile) -> impl Iterator<Item = (usize, &[u8])> {
-    file.bytes().split(|&b| b == b'\n').enumerate().map(|(at, line)| (at + 1, line.trim_ascii_end()))
+/// FB128 for a line that is not what was expected.
+fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
+    vec![expected(Code::ModeFileSyntax, what, found).in_file(file.path()).at_line(line)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FORMATS, HEAD};
+    use std::path::Path;
+
+    /// The fuzz test of modes reads these files.
+    #[test]
+    fn every_format_has_a_fixture() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/small/modes");
+        let read = |entry: std::io::Result<std::fs::DirEntry>| std::fs::read(entry.expect("an entry").path());
+        let files: Vec<Vec<u8>> =
+            std::fs::read_dir(folder).expect("fixtures").map(|entry| read(entry).expect("a file")).collect();
+        for (at, format) in FORMATS.iter().enumerate() {
+            let known = |bytes: &Vec<u8>| (format.recognises)(&bytes[..bytes.len().min(HEAD)]);
+            assert!(files.iter().any(known), "format {at} of modes has no fixture");
+        }
+    }
 }

@@ -15,6 +15,7 @@ mod xml_elements;
 use super::bulk_cards::is_bulk_data;
 use super::jobs::{nodes_of_bulk, nodes_of_deck};
 pub(super) use super::node_file::NodeFile;
+use super::scanner::expected;
 use super::tables::read_nodes;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
@@ -99,7 +100,35 @@ fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
 }
 
+/// FB115 for a line that is not what was expected.
+fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
+    vec![expected(Code::NodeFileSyntax, what, found).in_file(file.path()).at_line(line)]
+}
+
 /// FB115 of a file without lines.
 fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FORMATS, HEAD};
+    use std::path::Path;
+
+    /// The fuzz test of meshes and the tests of jobs read these files.
+    #[test]
+    fn every_format_has_a_fixture_that_it_alone_reads() {
+        let small = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/small");
+        let mut found = vec![0; FORMATS.len()];
+        for folder in ["meshes", "abaqus", "nastran"] {
+            for entry in std::fs::read_dir(small.join(folder)).expect("fixtures") {
+                let bytes = std::fs::read(entry.expect("an entry").path()).expect("a file");
+                let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
+                if let Some(at) = FORMATS.iter().position(|format| (format.recognises)(&head)) {
+                    found[at] += 1;
+                }
+            }
+        }
+        assert!(found.iter().all(|count| *count > 0), "fixtures of each format: {found:?}");
+    }
 }

@@ -28,19 +28,8 @@ pub(super) struct Blocks {
 pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
     let (Header { descr, fortran, shape }, data) = described(bytes)?;
     let (size, decode) = number_type(descr)?;
-    let &[count, rows, columns] = shape.as_slice() else {
-        let message = format!("array has {} extents, expected 3", shape.len());
-        return Err(Diagnostic::new(Code::MatrixKind, message));
-    };
-    let length = count.checked_mul(rows).and_then(|some| some.checked_mul(columns));
-    let length = length.filter(|all| all.checked_mul(size) == Some(data.len()));
-    let Some(length) = length else {
-        let message = format!(
-            "header announces {count} x {rows} x {columns} values of {size} bytes, {} bytes follow",
-            data.len()
-        );
-        return Err(Diagnostic::new(Code::MatrixCount, message));
-    };
+    let &[count, rows, columns] = shape.as_slice() else { return Err(other_extents(&shape, 3)) };
+    let length = announced(&shape, size, data)?;
     let own = rows * columns;
     // In Fortran's order the first index runs fastest.
     let at = |k: usize| match fortran {
@@ -49,6 +38,25 @@ pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
     };
     let values = (0..length).map(|k| decode(&data[at(k) * size..(at(k) + 1) * size])).collect();
     Ok(Blocks { count, rows, columns, values, digits: if size == 4 { 7 } else { 17 } })
+}
+
+fn other_extents(shape: &[usize], expected: usize) -> Diagnostic {
+    let message = format!("array has {} extents, expected {expected}", shape.len());
+    Diagnostic::new(Code::MatrixKind, message)
+}
+
+/// Number of values of `size` bytes in an array with these extents, which `data` has.
+fn announced(shape: &[usize], size: usize, data: &[u8]) -> Result<usize, Diagnostic> {
+    let count = shape.iter().try_fold(1usize, |count, &extent| count.checked_mul(extent));
+    count.filter(|count| count.checked_mul(size) == Some(data.len())).ok_or_else(|| {
+        let extents: Vec<String> = shape.iter().map(usize::to_string).collect();
+        let message = format!(
+            "header announces {} values of {size} bytes, {} bytes follow",
+            extents.join(" x "),
+            data.len()
+        );
+        Diagnostic::new(Code::MatrixCount, message)
+    })
 }
 
 /// Header and numbers of an array.
@@ -68,17 +76,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
         [rows] => (rows, 1),
         [rows, cols] => (rows, cols),
         _ => {
-            let message = format!("array has {} extents, expected 2", shape.len());
-            return Err(Diagnostic::new(Code::MatrixKind, message)
-                .with_help("reshape it: one row for every matrix row, one column for every shape"));
+            let help = "reshape it: one row for every matrix row, one column for every shape";
+            return Err(other_extents(&shape, 2).with_help(help));
         }
     };
-    let count = rows.checked_mul(cols).filter(|count| count.checked_mul(size) == Some(data.len()));
-    if count.is_none() {
-        let message =
-            format!("header announces {rows} x {cols} values of {size} bytes, {} bytes follow", data.len());
-        return Err(Diagnostic::new(Code::MatrixCount, message));
-    }
+    announced(&[rows, cols], size, data)?;
     let values = data.chunks_exact(size).map(decode).collect();
     Ok(Array { rows, cols, row_major: !fortran, values, digits: if size == 4 { 7 } else { 17 } })
 }
@@ -88,27 +90,17 @@ pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     let (header, data) = split(bytes)?;
     let Header { descr, shape, .. } =
         parse(header).ok_or_else(|| syntax("header is not understood".into()))?;
-    let (size, big) = match (descr.get(1..).and_then(|size| size.strip_prefix(['i', 'u'])), descr.as_bytes())
-    {
-        (Some("1"), _) => (1, false),
-        (Some("2"), [order, ..]) => (2, *order == b'>'),
-        (Some("4"), [order, ..]) => (4, *order == b'>'),
-        (Some("8"), [order, ..]) => (8, *order == b'>'),
-        _ => {
-            let message = format!("array has the type `{}`, expected whole numbers", descr.escape_default());
-            return Err(Diagnostic::new(Code::MatrixKind, message));
-        }
+    let digits = descr.get(1..).and_then(|size| size.strip_prefix(['i', 'u']));
+    let Some(size) = digits.and_then(|digits| digits.parse().ok()).filter(|size| [1, 2, 4, 8].contains(size))
+    else {
+        let message = format!("array has the type `{}`, expected whole numbers", descr.escape_default());
+        return Err(Diagnostic::new(Code::MatrixKind, message));
     };
-    let &[count] = shape.as_slice() else {
-        return Err(Diagnostic::new(
-            Code::MatrixKind,
-            format!("array has {} extents, expected 1", shape.len()),
-        ));
-    };
-    if count.checked_mul(size) != Some(data.len()) {
-        let message = format!("header announces {count} values of {size} bytes, {} bytes follow", data.len());
-        return Err(Diagnostic::new(Code::MatrixCount, message));
+    if shape.len() != 1 {
+        return Err(other_extents(&shape, 1));
     }
+    announced(&shape, size, data)?;
+    let big = descr.starts_with('>');
     let signed = descr.as_bytes()[1] == b'i';
     let decode = |bytes: &[u8]| {
         let digits = |number: u64, byte: &u8| number << 8 | u64::from(*byte);

@@ -134,5 +134,5 @@ pub fn file(body: &FlexBody, format: &str, dialect: Option<&str>) -> Vec<u8> {
 
 /// What a format cannot hold of a body.
 pub fn losses(body: &FlexBody, format: &str) -> Vec<String> {
-    find_format(format).expect("a format").losses(body, &ExportOptions::default())
+    find_format(format).expect("a format").checklist(body, &ExportOptions::default()).losses()
 }

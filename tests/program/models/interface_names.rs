@@ -44,13 +44,19 @@ fn any_name_comes_back_from_the_file_and_from_exports() {
     let names: Vec<&str> = body.interfaces().iter().map(|interface| interface.name.as_str()).collect();
     assert_eq!(names, NAMES);
     assert_eq!(flexbody_file::validate(folder.path().join("b.flex.h5")), vec![]);
-    let formats = ["exudyn", "sid", "npz", "json"];
-    for format in formats {
-        let file = format!("b.{format}");
+    for format in flexbody_formats::FORMATS.iter().map(|format| format.name()) {
+        let file = match format {
+            "vtk" => "b.vtu".to_owned(),
+            "gltf" => "b.glb".to_owned(),
+            _ => format!("b.{format}"),
+        };
         let output =
             run(folder.path(), &["export", "b.flex.h5", "--to", format, "-o", &file, "--allow-loss"]);
         let said = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{format}: {said}");
+        // Formats in the motions of interfaces refuse a body of free modes.
+        let refused =
+            output.status.code() == Some(2) && said.contains("needs K and M in the motions of frames");
+        assert!(output.status.success() || refused, "{format}: {said}");
     }
     let scene = "[run]\nduration = 1e-3\noutputs = 5\n[[watch]]\ninterface = \"left/right\"\n";
     std::fs::write(folder.path().join("scene.toml"), scene).expect("a scene");

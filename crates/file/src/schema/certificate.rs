@@ -2,9 +2,37 @@
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
-use super::super::value::{Value, View, count, text};
+use super::super::item::{Together, both, field, written};
+use super::super::value::{Stored, Value};
 use super::{ONE, PER_TIME2, attribute};
-use flexbody_body::flex_body::{FixedInterface, Guarantee};
+
+/// Entries that accuracy `certified` adds.
+pub(super) static CERTIFIED: Together =
+    Together { problem: |entries| missing(entries, "accuracy `certified`") };
+
+/// Entries of a Craig-Bampton body.
+pub(super) static CRAIG_BAMPTON: Together =
+    Together { problem: |entries| missing(entries, "a Craig-Bampton body") };
+
+fn missing(entries: &[(String, bool)], of: &str) -> String {
+    let first = entries.iter().find(|(_, there)| !there).map_or("", |(name, _)| name);
+    format!("{first}: expected with the other entries of {of}, found nothing")
+}
+
+/// Both directions of an optional entry of a Craig-Bampton body, ignored in files of other bodies.
+macro_rules! beside_fixed_interface {
+    ($field:ident) => {
+        both(
+            |v| v.fixed_interface()?.$field.value(),
+            |d, read| {
+                if let Some(own) = &mut d.body.certificate.fixed_interface {
+                    own.$field = Stored::take(read)?;
+                }
+                Ok(())
+            },
+        )
+    };
+}
 
 pub(super) const CERTIFICATE: &[Item] = &[
     attribute(
@@ -12,7 +40,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         Int,
         ONE,
         "1: the inertia count proves that no mode is missing; 0: not proved",
-        |v| Some(Value::Int(v.body.certificate.proved_modes.is_some().into())),
+        written(|v| Some(Value::Int(v.body.certificate.proved_modes.is_some().into()))),
     )
     .derived(""),
     attribute(
@@ -20,48 +48,46 @@ pub(super) const CERTIFICATE: &[Item] = &[
         Int,
         ONE,
         "flexible modes below `shift` that the count proves; absent: not proved",
-        |v| v.body.certificate.proved_modes.and_then(count),
+        field!(certificate.proved_modes),
     )
     .optional(),
-    attribute("shift", Float, PER_TIME2, "shift sigma of the count", |v| {
-        Some(Value::Float(v.body.certificate.shift))
-    }),
+    attribute("shift", Float, PER_TIME2, "shift sigma of the count", field!(certificate.shift)),
     attribute(
         "negative_pivots",
         Int,
         ONE,
         "negative pivots of K - sigma M: rigid and flexible modes below sigma; absent: not counted",
-        |v| v.body.certificate.negative_pivots.and_then(count),
+        field!(certificate.negative_pivots),
     )
     .optional(),
-    attribute("rigid_modes", Int, ONE, "number of rigid modes", |v| count(v.body.certificate.rigid_modes)),
+    attribute("rigid_modes", Int, ONE, "number of rigid modes", field!(certificate.rigid_modes)),
     attribute(
         "remark",
         Text,
         ONE,
         "why the proof is missing or what limits it; empty when nothing does",
-        |v| text(v.body.certificate.remark.as_str()),
+        field!(certificate.remark),
     ),
     attribute(
         "rigid_noise",
         Float,
         ONE,
         "largest |lambda| of the exact rigid modes over the first flexible lambda: the input's noise floor",
-        |v| Some(Value::Float(v.body.certificate.rigid_noise)),
+        field!(certificate.rigid_noise),
     ),
     attribute(
         "rigid_residual",
         Float,
         ONE,
         "max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix",
-        |v| Some(Value::Float(v.body.certificate.rigid_residual)),
+        field!(certificate.rigid_residual),
     ),
     attribute(
         "eigenvalue_rounding",
         Float,
         ONE,
         "what rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p lambda_q); 0: not known",
-        |v| Some(Value::Float(v.body.certificate.eigenvalue_rounding)),
+        field!(certificate.eigenvalue_rounding),
     )
     .added(4),
     attribute(
@@ -69,7 +95,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
         Float,
         ONE,
         "to what part of their Cauchy-Schwarz bounds the inertia data were known before this file: the digits of a file of another program; 0: to the rounding of 64-bit floats",
-        |v| Some(Value::Float(v.body.certificate.inertia_rounding)),
+        field!(certificate.inertia_rounding),
     )
     .added(4),
     attribute(
@@ -77,39 +103,43 @@ pub(super) const CERTIFICATE: &[Item] = &[
         Float,
         PER_TIME2,
         "shift sigma of a second count, between the rigid modes and the first flexible one; accuracy `certified` only",
-        |v| Some(Value::Float(guarantee(v)?.shift_below)),
+        field!(guarantee: shift_below),
     )
+    .with(&CERTIFIED)
     .added(1),
     attribute(
         "negative_pivots_below",
         Int,
         ONE,
         "negative pivots of K - shift_below M: the number of rigid modes; accuracy `certified` only",
-        |v| count(guarantee(v)?.pivots_below),
+        field!(guarantee: pivots_below),
     )
+    .with(&CERTIFIED)
     .added(1),
     attribute(
         "fixed_interface_modes",
         Int,
         ONE,
         "fixed-interface modes of a Craig-Bampton body; 0: static condensation",
-        |v| count(fixed_interface(v)?.modes),
+        field!(fixed_interface: modes),
     )
+    .with(&CRAIG_BAMPTON)
     .added(4),
     attribute(
         "interface_motions",
         Int,
         ONE,
         "motions of the interfaces (constraint modes) of a Craig-Bampton body",
-        |v| count(fixed_interface(v)?.interface_motions),
+        field!(fixed_interface: interface_motions),
     )
+    .with(&CRAIG_BAMPTON)
     .added(4),
     attribute(
         "fixed_interface_counted",
         Int,
         ONE,
         "fixed-interface modes below `fixed_interface_shift`: negative pivots of K - sigma M with the interfaces held; absent: not counted",
-        |v| fixed_interface(v)?.counted.and_then(count),
+        beside_fixed_interface!(counted),
     )
     .added(4),
     attribute(
@@ -117,15 +147,16 @@ pub(super) const CERTIFICATE: &[Item] = &[
         Float,
         PER_TIME2,
         "shift sigma of the count with the interfaces held",
-        |v| Some(Value::Float(fixed_interface(v)?.shift)),
+        field!(fixed_interface: shift),
     )
+    .with(&CRAIG_BAMPTON)
     .added(4),
     attribute(
         "fixed_interface_next",
         Float,
         PER_TIME2,
         "eigenvalue of the first fixed-interface mode that is left out; absent: not computed",
-        |v| Some(Value::Float(fixed_interface(v)?.next?)),
+        beside_fixed_interface!(next),
     )
     .added(4),
     attribute(
@@ -133,18 +164,11 @@ pub(super) const CERTIFICATE: &[Item] = &[
         Float,
         ONE,
         "largest residual of a fixed-interface mode, as those of `/modes/residual`; 0 without any",
-        |v| Some(Value::Float(fixed_interface(v)?.residual)),
+        field!(fixed_interface: residual),
     )
+    .with(&CRAIG_BAMPTON)
     .added(4),
 ];
-
-pub(super) fn fixed_interface<'a>(view: &View<'a>) -> Option<&'a FixedInterface> {
-    view.body.certificate.fixed_interface.as_ref()
-}
-
-pub(super) fn guarantee<'a>(view: &View<'a>) -> Option<&'a Guarantee> {
-    view.body.certificate.guarantee.as_ref()
-}
 
 /// One attribute per invariant, in the order of [`flexbody_body::invariants::DIGITS`].
 macro_rules! digits {
@@ -157,8 +181,9 @@ macro_rules! digits {
                 "guaranteed digits of `/invariants/", $name,
                 "`: -log10 of the rounding of its worst entry, relative to the Cauchy-Schwarz bound; accuracy `certified` only"
             ),
-            |v| Some(Value::Float(guarantee(v)?.digits[$index])),
+            field!(guarantee: digits[$index]),
         )
+        .with(&CERTIFIED)
         .added(1),)*]
     };
 }

@@ -3,8 +3,9 @@
 
 use super::super::item::ItemKind::{Floats, Text};
 use super::super::item::{Extent::Modes, Item};
-use super::super::value::{Units, Value, View, matrix, text};
-use super::{ONE, PER_TIME2, attribute, dataset};
+use super::super::item::{field, written};
+use super::super::value::{Units, Value, View, text};
+use super::{INERTIA, ONE, PER_TIME2, attribute, dataset};
 use flexbody_body::flex_body::{LoadKind, UnitLoad};
 
 const ACCELERATION: Units = Units::Of { mass_halves: 0, length: 1, time: -2 };
@@ -18,7 +19,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
         PER_TIME2,
         "K_geo",
         "Psi' K_geo Psi for one unit of the load: times the load, it is added to K_ff",
-        |v| matrix(v.geometric_stiffness?.matrix.as_ref()),
+        field!(load: matrix),
     )
     .within(2),
     attribute(
@@ -26,7 +27,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
         Text,
         ONE,
         "`acceleration` of the frame's origin, `angular_acceleration`, `spin` (K_geo = sum of w_k w_l times the six), `force` or `moment` at an interface, `load` with a name only",
-        |v| text(load(v)?.kind.name()),
+        written(|v| text(load(v)?.kind.name())),
     )
     .derived("")
     .within(2),
@@ -35,16 +36,20 @@ pub(super) const GEOMETRIC_STIFFNESS: &[Item] = &[
         Text,
         ONE,
         "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`; empty for `load`",
-        |v| text(load(v)?.axis()),
+        written(|v| text(load(v)?.axis())),
     )
     .derived("")
     .within(2),
-    attribute("load_units", Text, ONE, "unit of the load; 1 for `load`, whose unit is the user's", load_units)
+    attribute("load_units", Text, ONE, "unit of the load; 1 for `load`, whose unit is the user's", written(load_units))
     .derived("")
     .within(2),
-    attribute("interface", Text, ONE, "name of the interface, for `force` and `moment`", |v| {
-        load(v)?.kind.interface().and_then(text)
-    })
+    attribute(
+        "interface",
+        Text,
+        ONE,
+        "name of the interface, for `force` and `moment`",
+        written(|v| load(v)?.kind.interface().and_then(text)),
+    )
     .derived("")
     .added(2),
 ];
@@ -56,24 +61,23 @@ pub(super) const INERTIA_STIFFNESS: &[Item] = &[
         PER_TIME2,
         "K",
         "stiffness of inertia for one unit of the load: times the load, it is added to K_ff and belongs to the kinetic energy (theory section 6)",
-        |v| matrix(v.geometric_stiffness?.matrix.as_ref()),
+        field!(load: matrix),
     )
+    .with(&INERTIA)
     .within(6),
     attribute(
         "kind",
         Text,
         ONE,
         "`acceleration` of the frame's origin less gravity, `angular_acceleration`, or `spin` (K = sum of w_k w_l times the six)",
-        |v| text(load(v)?.kind.name()),
+        written(|v| text(load(v)?.kind.name())),
     )
     .derived("")
     .within(6),
-    attribute("axis", Text, ONE, "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`", |v| {
-        text(load(v)?.axis())
-    })
+    attribute("axis", Text, ONE, "body axis `x`, `y`, `z`; for `spin` `xx`, `yy`, `zz`, `xy`, `yz`, `xz`", written(|v| text(load(v)?.axis())))
     .derived("")
     .within(6),
-    attribute("load_units", Text, ONE, "unit of the load", load_units).derived("").within(6),
+    attribute("load_units", Text, ONE, "unit of the load", written(load_units)).derived("").within(6),
 ];
 
 fn load_units(view: &View<'_>) -> Option<Value> {

@@ -2,7 +2,8 @@
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
-use super::super::value::{Value, View, text};
+use super::super::item::{Together, both, put, written};
+use super::super::value::{Stored, Value, View, text};
 use super::{ONE, attribute};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 
@@ -23,9 +24,17 @@ fn number(value: f64) -> Option<Value> {
     value.is_finite().then_some(Value::Float(value))
 }
 
+/// Entries of the decision about each group: its reason and its tier, beside them bounds and limits.
+static DECISIONS: [Together; 3] = [const { Together { problem: reason_and_tier } }; 3];
+
+fn reason_and_tier(entries: &[(String, bool)]) -> String {
+    let first = entries.iter().find(|(_, there)| *there).map_or("", |(name, _)| name);
+    format!("{first}: expected with {} and {}, one of which is missing", entries[0].0, entries[1].0)
+}
+
 /// The rows of every group.
 macro_rules! of_groups {
-    ($($group:ident $name:literal,)*) => {
+    ($($index:literal $group:ident $name:literal,)*) => {
         &[
             $(attribute(
                 $name,
@@ -35,42 +44,62 @@ macro_rules! of_groups {
                     "`kept`, or `dropped`: the body has no group ", $name,
                     " of the kinetic energy, and the file none of its datasets (files up to 1.2: always `kept`)"
                 ),
-                |v| held(v, TermGroup::$group),
+                written(|v| held(v, TermGroup::$group)),
             ),)*
-            attribute("reason", Text, ONE, "why", |v| {
+            attribute("reason", Text, ONE, "why", written(|v| {
                 text(match v.body.terms.is_empty() {
                     true => "no scene was given: every term is kept",
                     false => "every group that was decided about has its own",
                 })
-            }),
+            })),
             $(
-                attribute(concat!($name, "_reason"), Text, ONE, "why, where it was decided", |v| {
-                    text(decision(v, TermGroup::$group)?.reason.as_str())
-                })
+                attribute(concat!($name, "_reason"), Text, ONE, "why, where it was decided", both(
+                    |v| decision(v, TermGroup::$group)?.reason.value(),
+                    put!(|d, read| d.decision(TermGroup::$group).reason = Stored::take(read)?),
+                ))
+                .with(&DECISIONS[$index])
                 .added(3),
                 attribute(
                     concat!($name, "_tier"),
                     Int,
                     ONE,
                     "what decided: 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a motion that was integrated",
-                    |v| Some(Value::Int(decision(v, TermGroup::$group)?.tier.into())),
+                    both(
+                        |v| Some(Value::Int(decision(v, TermGroup::$group)?.tier.into())),
+                        |d, read| {
+                            let number = usize::take(read)?;
+                            let tier = u8::try_from(number);
+                            d.decision(TermGroup::$group).tier =
+                                tier.map_err(|_| format!("expected 0, 1 or 2, found {number}"))?;
+                            Ok(())
+                        },
+                    ),
                 )
+                .with(&DECISIONS[$index])
                 .added(3),
                 attribute(
                     concat!($name, "_bound"),
                     Float,
                     ONE,
                     "largest error that dropping makes, of what the reason names; absent: none is known",
-                    |v| number(decision(v, TermGroup::$group)?.bound),
+                    both(
+                        |v| number(decision(v, TermGroup::$group)?.bound),
+                        put!(|d, read| d.decision(TermGroup::$group).bound = Stored::take(read)?),
+                    ),
                 )
+                .beside(&DECISIONS[$index])
                 .added(3),
                 attribute(
                     concat!($name, "_limit"),
                     Float,
                     ONE,
                     "largest error that is allowed; absent: no limit",
-                    |v| number(decision(v, TermGroup::$group)?.limit),
+                    both(
+                        |v| number(decision(v, TermGroup::$group)?.limit),
+                        put!(|d, read| d.decision(TermGroup::$group).limit = Stored::take(read)?),
+                    ),
                 )
+                .beside(&DECISIONS[$index])
                 .added(3),
             )*
         ]
@@ -78,7 +107,7 @@ macro_rules! of_groups {
 }
 
 pub(super) const TERMS: &[Item] = of_groups![
-    W1 "W1",
-    W2 "W2",
-    W3 "W3",
+    0 W1 "W1",
+    1 W2 "W2",
+    2 W3 "W3",
 ];

@@ -1,8 +1,9 @@
 //! The format `chrono`: a table of the nodes and matrices as Matrix Market files.
 
 use super::assembly::Assembly;
-use crate::export::interface_matrices::{InterfaceMatrices, matrix_losses};
-use crate::export::{ExportFormat, ExportOptions, Exported};
+use crate::export::Holding::{Lost, NotApplicable};
+use crate::export::interface_matrices::{InterfaceMatrices, matrix_checklist};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -20,14 +21,16 @@ impl ExportFormat for Chrono {
         "Project Chrono, ChModalAssembly: matrices for DoModalReduction"
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
-        let mut losses = matrix_losses(body, options);
-        losses.push(
-            "the point of action of gravity on the deformed body: Chrono divides the weight between its nodes \
-             as on the undeformed one"
-                .to_owned(),
-        );
-        losses
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            gravity: Lost(
+                "the point of action of gravity on the deformed body: Chrono divides the weight between its nodes \
+                 as on the undeformed one"
+                    .to_owned(),
+            ),
+            units: NotApplicable,
+            ..matrix_checklist(body, options)
+        }
     }
 
     fn needs(&self, body: &FlexBody, _: &ExportOptions) -> Vec<String> {

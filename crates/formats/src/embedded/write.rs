@@ -6,8 +6,9 @@ use super::layout::{
     ALIGNMENT, ARRAYS, ArrayPosition, BYTE_ORDER, CHECKED_FROM, MAGIC, VERSION, fixed_header, header_bytes,
     header_offset,
 };
+use crate::export::Holding::{Held, NotApplicable};
 use crate::export::losses::geometric_stiffness;
-use crate::export::{ExportFormat, ExportOptions, Exported, Points, frames};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, Points, frames};
 use flate2::Crc;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -35,7 +36,7 @@ impl ExportFormat for Embedded {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         let frames = frames(body, &options.points);
         let held: Vec<_> = frames.iter().flat_map(|frame| loads(body, &frames, frame)).collect();
         // Interfaces may be left out.
@@ -44,7 +45,27 @@ impl ExportFormat for Embedded {
             Some(_) => !asked || held.iter().any(|(_, one)| one.load == *load),
             None => !matches!(load.kind, LoadKind::Named(_)),
         };
-        geometric_stiffness(body, holds).into_iter().collect()
+        ExportChecklist {
+            rigid_coupling: Held,
+            plane: Held,
+            deformed_inertia: Held,
+            general_w0: Held,
+            coriolis_force: Held,
+            general_w3: Held,
+            separate_w2: Held,
+            geometric_stiffness: geometric_stiffness(body, holds),
+            inertia_stiffness: Held,
+            damping: Held,
+            shapes: Held,
+            rotations: Held,
+            internal_rows: NotApplicable,
+            gravity: Held,
+            interfaces: Held,
+            surface: NotApplicable,
+            origins_of_modes: NotApplicable,
+            units: Held,
+            storage: NotApplicable,
+        }
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {

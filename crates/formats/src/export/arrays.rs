@@ -1,7 +1,32 @@
 //! Named arrays with what they are: the entries of the flex-body file, as `json` and `npz` have them.
 
+use super::ExportChecklist;
+use super::Holding::Held;
 use flexbody_file::{NamedArray, NamedAttributes, Numbers};
 use serde::{Serialize, Serializer};
+
+/// Holdings of a format with every entry of the flex-body file.
+pub(crate) const ALL_ENTRIES: ExportChecklist = ExportChecklist {
+    rigid_coupling: Held,
+    plane: Held,
+    deformed_inertia: Held,
+    general_w0: Held,
+    coriolis_force: Held,
+    general_w3: Held,
+    separate_w2: Held,
+    geometric_stiffness: Held,
+    inertia_stiffness: Held,
+    damping: Held,
+    shapes: Held,
+    rotations: Held,
+    internal_rows: Held,
+    gravity: Held,
+    interfaces: Held,
+    surface: Held,
+    origins_of_modes: Held,
+    units: Held,
+    storage: Held,
+};
 
 /// Groups with their attributes, and arrays, by their paths in the flex-body file.
 #[derive(Serialize)]

@@ -1,5 +1,6 @@
 //! What a format is that other programs read.
 
+use super::ExportChecklist;
 use flexbody_base::error::Result;
 use flexbody_base::output::OutputSlot;
 use flexbody_body::flex_body::FlexBody;
@@ -31,10 +32,8 @@ pub trait ExportFormat: Sync {
         false
     }
 
-    /// What this format cannot hold of `body` with these options: fragments of sentences with the facts, in
-    /// the order of importance. What concerns the origin of the numbers only (certificate, lumped
-    /// comparators, provenance) is in no format and is not told.
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String>;
+    /// Returns the holding of every property of `body` with these options.
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist;
 
     /// What its program must be told to use all of the file: settings without which a part of it is ignored.
     /// Sentences without a full stop.

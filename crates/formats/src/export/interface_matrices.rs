@@ -1,7 +1,8 @@
 //! K, M and D in the motions of interface frames, as reduced-order blocks take them: six coordinates for each
 //! frame, then the fixed-interface modes.
 
-use super::{ExportOptions, losses};
+use super::Holding::{Held, NotApplicable};
+use super::{ExportChecklist, ExportOptions, losses};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -84,16 +85,31 @@ impl<'a> InterfaceMatrices<'a> {
 
 const AXES: [&str; 6] = ["ux", "uy", "uz", "rx", "ry", "rz"];
 
-/// What such matrices cannot hold of a body.
-pub(crate) fn matrix_losses(body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+/// Holdings of a format with such matrices. The matrices are about the motions of the frames: nodes and their modes
+/// are not in the file.
+pub(crate) fn matrix_checklist(body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
     let small = "K and M are those of small motions";
-    [
-        losses::changing_inertia(body, "W1", small),
-        losses::general_w0(body),
-        losses::geometric_stiffness(body, |_| false),
-        losses::inertia_stiffness(body, options, |_| false),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
+    ExportChecklist {
+        rigid_coupling: Held,
+        // Plane bodies are refused.
+        plane: NotApplicable,
+        deformed_inertia: losses::changing_inertia(body, "W1", small),
+        general_w0: losses::general_w0(body),
+        // Lost with the inertia of the deformed body.
+        coriolis_force: NotApplicable,
+        general_w3: NotApplicable,
+        separate_w2: NotApplicable,
+        geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+        inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
+        damping: Held,
+        shapes: NotApplicable,
+        rotations: NotApplicable,
+        internal_rows: NotApplicable,
+        gravity: Held,
+        interfaces: Held,
+        surface: NotApplicable,
+        origins_of_modes: NotApplicable,
+        units: Held,
+        storage: NotApplicable,
+    }
 }

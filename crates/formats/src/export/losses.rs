@@ -1,5 +1,6 @@
 //! What formats cannot hold: the sentences that several of them need, with the size of what is lost.
 
+use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::{ExportOptions, InertiaInScene};
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
@@ -13,32 +14,33 @@ const ROUNDING: f64 = 1e-12;
 /// Part of the stiffness of a motion at which the stiffness of inertia counts.
 const PART: f64 = 0.01;
 
-/// A format in space knows nothing of the plane.
-pub(crate) fn plane(body: &FlexBody) -> Option<String> {
-    (body.dimension() == 2).then(|| {
-        "that the body moves in its plane z = 0 only: inertia and stiffness out of the plane are missing, hold it there by a joint".to_owned()
-    })
+/// The plane of a body, for a format in space.
+pub(crate) fn plane(body: &FlexBody) -> Holding {
+    if body.dimension() != 2 {
+        return NotApplicable;
+    }
+    Lost("that the body moves in its plane z = 0 only: inertia and stiffness out of the plane are missing, hold it there by a joint".to_owned())
 }
 
 /// W0 of a mass that does not commute with rotations, for a format whose first moment is c + C1 q.
-pub(crate) fn general_w0(body: &FlexBody) -> Option<String> {
+pub(crate) fn general_w0(body: &FlexBody) -> Holding {
     let invariants = body.invariants();
     let bound = CauchySchwarz::of(invariants);
     let nf = body.n_modes();
     // Without what M alone knows of it, W0 is that of C1.
     let (own, told) = (invariants.w0(), invariants.as_solid().w0());
     let lost = largest(&own, &told, |_, column| bound.c1(column % nf));
-    told_if(lost, "W0 other than -C1~ (how modes move the coupling of translation and rotation)")
+    lost_beyond_rounding(lost, "W0 other than -C1~ (how modes move the coupling of translation and rotation)")
 }
 
 /// The symmetric part of the blocks of W3, for a format that takes them as skew.
-pub(crate) fn general_w3(body: &FlexBody) -> Option<String> {
+pub(crate) fn general_w3(body: &FlexBody) -> Holding {
     let bound = CauchySchwarz::of(body.invariants());
     let nf = body.n_modes();
-    let w3 = body.invariants().w3()?;
+    let Some(w3) = body.invariants().w3() else { return NotApplicable };
     let mirrored = Mat::from_fn(3 * nf, nf, |row, j| -w3[(row / nf * nf + j, row % nf)]);
     let lost = 0.5 * largest(&w3, &mirrored, |row, j| bound.s(row % nf, j));
-    told_if(lost, "the symmetric part of W3")
+    lost_beyond_rounding(lost, "the symmetric part of W3")
 }
 
 fn largest(a: &Mat<f64>, b: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f64 {
@@ -49,13 +51,13 @@ fn largest(a: &Mat<f64>, b: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f
         .fold(0.0, f64::max)
 }
 
-/// The sentence about what is lost, unless it is rounding.
-pub(crate) fn told_if(lost: f64, what: &str) -> Option<String> {
-    (lost > ROUNDING).then(|| {
+/// The loss of a difference that is larger than rounding; with a smaller one the format holds all of it.
+pub(crate) fn lost_beyond_rounding(lost: f64, what: &str) -> Holding {
+    Holding::held_but_for((lost > ROUNDING).then(|| {
         format!(
             "{what}: up to {lost:.1e} of its Cauchy-Schwarz bound, from nodes with rotations or constraints"
         )
-    })
+    }))
 }
 
 /// Whether the body has damping: a matrix, or ratios.
@@ -65,19 +67,21 @@ pub(crate) fn is_damped(body: &FlexBody) -> bool {
 
 /// Damping, for a format without.
 #[cfg(feature = "hdf5")]
-pub(crate) fn damping(body: &FlexBody) -> Option<String> {
-    is_damped(body).then(|| "the damping of the modes".to_owned())
+pub(crate) fn damping(body: &FlexBody) -> Holding {
+    if is_damped(body) { Lost("the damping of the modes".to_owned()) } else { NotApplicable }
 }
 
 /// Geometric stiffness of loads that `holds` does not take.
-pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bool) -> Option<String> {
+pub(crate) fn geometric_stiffness(body: &FlexBody, holds: impl Fn(&UnitLoad) -> bool) -> Holding {
     let lost: Vec<String> = body
         .geometric_stiffness()
         .iter()
         .filter(|one| !holds(&one.load))
         .map(|one| one.load.to_string())
         .collect();
-    (!lost.is_empty()).then(|| format!("the geometric stiffness for {}", lost.join(", ")))
+    Holding::held_but_for(
+        (!lost.is_empty()).then(|| format!("the geometric stiffness for {}", lost.join(", "))),
+    )
 }
 
 /// Stiffness of inertia for loads that `holds` does not take, with its size in a scene or else the motion at which it
@@ -86,43 +90,48 @@ pub(crate) fn inertia_stiffness(
     body: &FlexBody,
     options: &ExportOptions,
     holds: impl Fn(&UnitLoad) -> bool,
-) -> Option<String> {
+) -> Holding {
     const WHAT: &str = "the stiffness of inertia of nodes that turn";
-    let own = body.inertia_stiffness()?;
+    let Some(own) = body.inertia_stiffness() else { return NotApplicable };
     let all = own.stiffness.iter().filter(|one| one.matrix.norm_max() > 0.0);
     let lost: Vec<&UnitLoad> = all.map(|one| &one.load).filter(|load| !holds(load)).collect();
     if lost.is_empty() {
-        return None;
+        return Held;
     }
     if let Some(InertiaInScene { scene, share }) = &options.in_scene {
         let percent = 100.0 * share;
-        return Some(format!(
+        return Lost(format!(
             "{WHAT}: at most {percent:.2} % of the stiffness of a motion in the scene `{scene}`"
         ));
     }
-    let rates = body.inertia_rates(PART)?;
+    let Some(rates) = body.inertia_rates(PART) else { return NotApplicable };
     let rates = rates.in_words(body.units(), |kind| lost.iter().any(|load| load.kind == *kind));
-    Some(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
+    Lost(format!("{WHAT}, which reaches 1 % of the stiffness of a motion at {rates}"))
 }
 
 /// Rotations of nodes, for a format without.
 #[cfg(feature = "hdf5")]
-pub(crate) fn rotations(body: &FlexBody) -> Option<String> {
-    body.modes().rotation.is_some().then(|| "the rotations of the nodes in the modes".to_owned())
+pub(crate) fn rotations(body: &FlexBody) -> Holding {
+    if body.modes().rotation.is_none() {
+        return NotApplicable;
+    }
+    Lost("the rotations of the nodes in the modes".to_owned())
 }
 
 /// Rows of the modes that belong to no node.
-pub(crate) fn internal_rows(body: &FlexBody) -> Option<String> {
-    let internal = body.modes().internal.as_ref()?;
-    Some(format!("{} rows of the modes that belong to no node", internal.shape.nrows()))
+pub(crate) fn internal_rows(body: &FlexBody) -> Holding {
+    let Some(internal) = &body.modes().internal else { return NotApplicable };
+    Lost(format!("{} rows of the modes that belong to no node", internal.shape.nrows()))
 }
 
 /// The groups of the kinetic energy, for a format with the inertia of the undeformed body; `w1` says what of
 /// W1 it lacks.
-pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Option<String> {
+pub(crate) fn changing_inertia(body: &FlexBody, w1: &str, why: &str) -> Holding {
     let groups = body.groups();
     let held = [(groups.w1, w1), (groups.w2, "W2"), (groups.w3, "W3")];
     let lost: Vec<&str> = held.into_iter().filter(|(held, _)| *held).map(|(_, name)| name).collect();
-    (!lost.is_empty())
-        .then(|| format!("how the deformation changes the inertia ({}): {why}", lost.join(", ")))
+    if lost.is_empty() {
+        return NotApplicable;
+    }
+    Lost(format!("how the deformation changes the inertia ({}): {why}", lost.join(", ")))
 }

@@ -1,6 +1,7 @@
 //! What the formats that are written share: the trait, frames, losses, containers.
 
 pub(crate) mod arrays;
+mod checklist;
 mod format;
 pub(crate) mod frames;
 #[cfg(feature = "hdf5")]
@@ -11,5 +12,6 @@ pub(crate) mod losses;
 #[cfg(feature = "hdf5")]
 pub(crate) mod mat5;
 
+pub use checklist::{ExportChecklist, Holding};
 pub use format::{ExportFormat, ExportOptions, Exported, InertiaInScene, Points};
 pub use frames::{ExportFrame, frames};

@@ -8,9 +8,10 @@
 
 use super::interfaces;
 use super::mesh::Mesh;
+use crate::export::Holding::{Held, NotApplicable};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::inertia::inertia;
-use crate::export::{ExportFormat, ExportOptions, Exported, losses};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported, losses};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::Numbered;
@@ -32,21 +33,29 @@ impl ExportFormat for Exudyn {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
-        [
-            losses::plane(body),
-            losses::general_w0(body),
-            losses::general_w3(body),
-            losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, options, |_| false),
-            losses::damping(body),
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            rigid_coupling: Held,
+            plane: losses::plane(body),
+            deformed_inertia: Held,
+            general_w0: losses::general_w0(body),
+            coriolis_force: Held,
+            general_w3: losses::general_w3(body),
+            separate_w2: Held,
+            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
+            damping: losses::damping(body),
+            shapes: Held,
             // An interface as a cross of nodes turns as it does in the body.
-            losses::rotations(body).filter(|_| !options.points.of_interfaces()),
-            losses::internal_rows(body),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+            rotations: if options.points.of_interfaces() { Held } else { losses::rotations(body) },
+            internal_rows: losses::internal_rows(body),
+            gravity: Held,
+            interfaces: Held,
+            surface: Held,
+            origins_of_modes: NotApplicable,
+            units: NotApplicable,
+            storage: NotApplicable,
+        }
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {

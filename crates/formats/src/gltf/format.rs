@@ -8,7 +8,8 @@
 use super::animations::{MOTION, of_modes, of_motion, place};
 use super::binary::Binary;
 use super::vertices::Vertices;
-use crate::export::{ExportFormat, ExportOptions, Exported};
+use crate::export::Holding::{Held, NotApplicable};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use crate::picture::{Drawn, Played, mode_names, named, rounded};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -49,8 +50,29 @@ impl ExportFormat for Gltf {
         true
     }
 
-    fn losses(&self, _: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        Vec::new()
+    /// Mechanical properties are not applicable to a picture; [`leaves_out`](Self::leaves_out) names them.
+    fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            rigid_coupling: NotApplicable,
+            plane: NotApplicable,
+            deformed_inertia: NotApplicable,
+            general_w0: NotApplicable,
+            coriolis_force: NotApplicable,
+            general_w3: NotApplicable,
+            separate_w2: NotApplicable,
+            geometric_stiffness: NotApplicable,
+            inertia_stiffness: NotApplicable,
+            damping: NotApplicable,
+            shapes: Held,
+            rotations: NotApplicable,
+            internal_rows: NotApplicable,
+            gravity: NotApplicable,
+            interfaces: Held,
+            surface: Held,
+            origins_of_modes: Held,
+            units: Held,
+            storage: NotApplicable,
+        }
     }
 
     fn needs(&self, _: &FlexBody, options: &ExportOptions) -> Vec<String> {

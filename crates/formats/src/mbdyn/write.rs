@@ -7,8 +7,9 @@
 //! 16. Group 11, lumped masses, would be added to groups 14 to 18 and is never written. I9_jk(a,b) of group
 //!     18 stands at the a-th of three rows, in column 3 (j nf + k) + b.
 
+use crate::export::Holding::{self, Held, NotApplicable};
 use crate::export::inertia::inertia;
-use crate::export::{ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
+use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -41,24 +42,36 @@ impl ExportFormat for Mbdyn {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         let places = frames(body, &options.points);
         let exact = is_exact(options);
         let no_coupling = (!exact).then(|| {
             "the coupling of rigid motion and modes (record groups 14 to 18), which programs of level 13 refuse: modes vibrate as if the body did not move".to_owned()
         });
-        // Without coupling W0 and W3 are lost with the rest.
-        let general = if exact { [losses::general_w0(body), losses::general_w3(body)] } else { [None, None] };
-        [no_coupling, losses::plane(body)]
-            .into_iter()
-            .chain(general)
-            .chain([
-                losses::geometric_stiffness(body, |load| exact && tag(load, &places).is_some()),
-                losses::inertia_stiffness(body, options, |_| exact),
-                losses::internal_rows(body),
-            ])
-            .flatten()
-            .collect()
+        ExportChecklist {
+            rigid_coupling: Holding::held_but_for(no_coupling),
+            plane: losses::plane(body),
+            // Without coupling the rest is lost with it.
+            deformed_inertia: if exact { Held } else { NotApplicable },
+            general_w0: if exact { losses::general_w0(body) } else { NotApplicable },
+            coriolis_force: if exact { Held } else { NotApplicable },
+            general_w3: if exact { losses::general_w3(body) } else { NotApplicable },
+            separate_w2: if exact { Held } else { NotApplicable },
+            geometric_stiffness: losses::geometric_stiffness(body, |load| {
+                exact && tag(load, &places).is_some()
+            }),
+            inertia_stiffness: losses::inertia_stiffness(body, options, |_| exact),
+            damping: Held,
+            shapes: Held,
+            rotations: Held,
+            internal_rows: losses::internal_rows(body),
+            gravity: Held,
+            interfaces: Held,
+            surface: NotApplicable,
+            origins_of_modes: NotApplicable,
+            units: Held,
+            storage: NotApplicable,
+        }
     }
 
     fn needs(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {

@@ -5,9 +5,10 @@
 //! S_b and S_a S_b. The modal mass has no place of its own, it is the sum of the integrals of S_a S_a; W2 and
 //! W3 follow from the same integrals.
 
+use crate::export::Holding::{self, Held, Lost, NotApplicable};
 use crate::export::hdf5_contents::{Hdf5Contents, Hdf5Entry, hdf5_bytes};
 use crate::export::inertia::inertia;
-use crate::export::{ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
+use crate::export::{ExportChecklist, ExportFormat, ExportFrame, ExportOptions, Exported, frames, losses};
 use faer::Mat;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -32,19 +33,28 @@ impl ExportFormat for Mbsim {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
-        [
-            losses::plane(body),
-            losses::general_w0(body),
-            losses::general_w3(body),
-            other_w2(body),
-            losses::geometric_stiffness(body, |_| false),
-            losses::inertia_stiffness(body, options, |_| false),
-            losses::internal_rows(body),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            rigid_coupling: Held,
+            plane: losses::plane(body),
+            deformed_inertia: Held,
+            general_w0: losses::general_w0(body),
+            coriolis_force: Held,
+            general_w3: losses::general_w3(body),
+            separate_w2: other_w2(body),
+            geometric_stiffness: losses::geometric_stiffness(body, |_| false),
+            inertia_stiffness: losses::inertia_stiffness(body, options, |_| false),
+            damping: Held,
+            shapes: Held,
+            rotations: Held,
+            internal_rows: losses::internal_rows(body),
+            gravity: Held,
+            interfaces: Held,
+            surface: NotApplicable,
+            origins_of_modes: NotApplicable,
+            units: NotApplicable,
+            storage: NotApplicable,
+        }
     }
 
     fn write(&self, body: &FlexBody, options: &ExportOptions) -> Result<Exported> {
@@ -73,7 +83,7 @@ fn diagonal(body: &FlexBody) -> [Mat<f64>; 3] {
 
 /// W2 that is not what gives the modal mass: of a mass that does not commute with rotations, or of a body
 /// that does not hold W2.
-fn other_w2(body: &FlexBody) -> Option<String> {
+fn other_w2(body: &FlexBody) -> Holding {
     let invariants = body.invariants();
     let nf = body.n_modes();
     let bound = CauchySchwarz::of(invariants);
@@ -88,11 +98,11 @@ fn other_w2(body: &FlexBody) -> Option<String> {
         })
         .fold(0.0, f64::max);
     match own {
-        Some(_) => losses::told_if(
+        Some(_) => losses::lost_beyond_rounding(
             lost,
             "W2 other than what the modal mass says, which is the sum of the same integrals",
         ),
-        None => Some(format!(
+        None => Lost(format!(
             "that the body does without W2: it follows from the integrals whose sum is the modal mass, here up to {lost:.1e} of its Cauchy-Schwarz bound"
         )),
     }

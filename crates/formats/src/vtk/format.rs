@@ -1,7 +1,8 @@
 //! VTK: the body with its modes as one mesh, or a motion as one mesh for each instant and a list of them.
 
 use super::grid::{Grid, escaped};
-use crate::export::{ExportFormat, ExportOptions, Exported};
+use crate::export::Holding::{Held, NotApplicable};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use crate::picture::{Drawn, Played, mode_names, named, printable};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -32,8 +33,29 @@ impl ExportFormat for Vtk {
         true
     }
 
-    fn losses(&self, _: &FlexBody, _: &ExportOptions) -> Vec<String> {
-        Vec::new()
+    /// Mechanical properties are not applicable to a picture; [`leaves_out`](Self::leaves_out) names them.
+    fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
+        ExportChecklist {
+            rigid_coupling: NotApplicable,
+            plane: NotApplicable,
+            deformed_inertia: NotApplicable,
+            general_w0: NotApplicable,
+            coriolis_force: NotApplicable,
+            general_w3: NotApplicable,
+            separate_w2: NotApplicable,
+            geometric_stiffness: NotApplicable,
+            inertia_stiffness: NotApplicable,
+            damping: NotApplicable,
+            shapes: Held,
+            rotations: Held,
+            internal_rows: NotApplicable,
+            gravity: NotApplicable,
+            interfaces: Held,
+            surface: Held,
+            origins_of_modes: Held,
+            units: Held,
+            storage: NotApplicable,
+        }
     }
 
     fn needs(&self, _: &FlexBody, options: &ExportOptions) -> Vec<String> {

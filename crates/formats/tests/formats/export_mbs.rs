@@ -8,8 +8,8 @@ use flexbody_body::flex_body::{FlexBody, LoadKind};
 use flexbody_body::invariants::{BodyFrame, CauchySchwarz, Invariants, primary_differences};
 use flexbody_formats::export::{ExportOptions, Points, frames};
 use flexbody_formats::import::{ImportedFile, audit};
+use flexbody_formats::{IMPORT_FORMATS, find_import_format, recognise};
 use flexbody_formats::{export, find_format};
-use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::FeModel;
 use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Vector3};
@@ -19,8 +19,15 @@ use oracle::mesh::{Mesh, grid};
 use oracle::partial::{combinations, with_groups};
 use oracle::random::Random;
 
-const FORMATS: [(&str, &str); 4] =
-    [("exudyn", ""), ("mbdyn", "level19"), ("mbdyn", "level13"), ("mbsim", "")];
+/// Formats that are read back, with their dialects; SID has tests of its own.
+fn formats() -> Vec<(&'static str, &'static str)> {
+    let names = IMPORT_FORMATS.iter().map(|format| format.name()).filter(|name| *name != "sid");
+    let of_name = |name| match find_format(name).expect("a format").dialects() {
+        [] => vec![(name, "")],
+        dialects => dialects.iter().map(|dialect| (name, *dialect)).collect(),
+    };
+    names.flat_map(of_name).collect()
+}
 
 fn options(dialect: &str, points: Points) -> ExportOptions {
     ExportOptions {
@@ -84,7 +91,7 @@ fn every_fixture_is_read_back_with_every_number() {
     for name in models() {
         for frame in [BodyFrame::Principal, BodyFrame::Model] {
             let body = fixture(&name, 6, frame);
-            for (format, dialect) in FORMATS {
+            for (format, dialect) in formats() {
                 let options = options(dialect, Points::Usual);
                 let (bytes, losses) = written(&body, format, &options);
                 assert_eq!(written(&body, format, &options).0, bytes, "{name} {format}: equal bytes");

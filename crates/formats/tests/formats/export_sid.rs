@@ -428,7 +428,7 @@ fn frames_are_interfaces_or_the_nodes_that_are_asked_for() {
         [(Points::Usual, 2), (Points::Nodes, body.n_nodes()), (Points::Some(vec![some]), 1)]
     {
         let options = ExportOptions { points: points.clone(), ..ExportOptions::default() };
-        let losses = sid().losses(&body, &options);
+        let losses = sid().checklist(&body, &options).losses();
         // Forces at the tip need its reference point.
         assert_eq!(losses.is_empty(), points == Points::Usual, "{losses:?}");
         let imported = read(&text(&body, &options)).body;
@@ -473,8 +473,9 @@ fn the_part_has_a_name_in_the_dialects_that_have_one() {
 
 #[test]
 fn what_cannot_be_held_is_told() {
-    let said =
-        |model: &str| sid().losses(&fixture(model, MODES, BodyFrame::Model), &ExportOptions::default());
+    let said = |model: &str| {
+        sid().checklist(&fixture(model, MODES, BodyFrame::Model), &ExportOptions::default()).losses()
+    };
     assert!(said("bracket_hex20").is_empty() && said("turbine_blade").is_empty());
     assert!(said("plane_frame").iter().any(|loss| loss.contains("plane")));
     // Stiffness of inertia is written as geometric stiffness is.
@@ -573,13 +574,14 @@ fn embs_counts_its_frames_and_says_beside_which_is_which() {
 fn what_embslib_leaves_out_is_told() {
     let body = fixture("turbine_blade", MODES, BodyFrame::Model);
     let body = stressed(body, &[LoadKind::Force("tip".to_owned())], 1e-3, &mut Random(1));
-    assert!(sid().losses(&body, &ExportOptions::default()).is_empty());
-    let told = sid().losses(&body, &dialect("embs"));
+    assert!(sid().checklist(&body, &ExportOptions::default()).losses().is_empty());
+    let told = sid().checklist(&body, &dialect("embs")).losses();
     assert!(matches!(&told[..], [loss] if loss.starts_with("the geometric stiffness for ")), "{told:?}");
     // Modes that move the centre of mass.
     let body = oracle::file_bodies::body(2, 4, 3, 1, 0);
-    let coriolis =
-        |name: &str| sid().losses(&body, &dialect(name)).iter().any(|loss| loss.contains("Coriolis"));
+    let coriolis = |name: &str| {
+        sid().checklist(&body, &dialect(name)).losses().iter().any(|loss| loss.contains("Coriolis"))
+    };
     assert!(coriolis("embs") && !coriolis("fembeam"));
 }
 

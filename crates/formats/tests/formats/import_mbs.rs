@@ -10,8 +10,8 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::{BodyFrame, Invariants, LumpedMasses, condense_lumped, primary_differences};
 use flexbody_formats::export::ExportOptions;
 use flexbody_formats::import::{ImportedFile, audit, import_body};
+use flexbody_formats::{IMPORT_FORMATS, find_import_format, recognise};
 use flexbody_formats::{export, find_format};
-use flexbody_formats::{find_import_format, recognise};
 use flexbody_model::FeModel;
 use hdf5_metno as hdf5;
 use oracle::elements::{ElementKind, MassRule, Material};
@@ -112,7 +112,7 @@ fn row_sums() -> LumpedMasses {
 
 #[test]
 fn a_sound_file_has_no_findings() {
-    for format in ["mbdyn", "mbsim", "exudyn"] {
+    for format in IMPORT_FORMATS.iter().map(|format| format.name()) {
         let found = read(&exported(format, None), format).expect("readable");
         assert_eq!(findings(&found), []);
         assert!(audit(&found, 1e-9).passed(), "{format}");
@@ -474,8 +474,9 @@ fn damaged(bytes: &[u8], damages: &[Damage]) -> Vec<u8> {
     bytes
 }
 
-static EXPORTS: LazyLock<Vec<(&str, Vec<u8>)>> =
-    LazyLock::new(|| ["mbdyn", "mbsim", "exudyn"].map(|format| (format, exported(format, None))).to_vec());
+static EXPORTS: LazyLock<Vec<(&str, Vec<u8>)>> = LazyLock::new(|| {
+    IMPORT_FORMATS.iter().map(|format| (format.name(), exported(format.name(), None))).collect()
+});
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
@@ -483,7 +484,7 @@ proptest! {
     /// Whatever is changed, reading ends in a body or in a report, and so do audit and import of what is
     /// read.
     #[test]
-    fn damaged_files_never_panic(which in 0..3usize, damages in proptest::collection::vec(damage(), 1..4)) {
+    fn damaged_files_never_panic(which in 0..IMPORT_FORMATS.len(), damages in proptest::collection::vec(damage(), 1..4)) {
         let (format, bytes) = &EXPORTS[which];
         let bytes = damaged(bytes, &damages);
         let folder = tempfile::tempdir().expect("a folder");

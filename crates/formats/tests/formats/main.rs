@@ -2,6 +2,7 @@
 
 #![allow(unreachable_pub)] // nothing outside reads a test
 
+mod checklists;
 mod export_arrays;
 mod export_embedded;
 mod export_mbs;

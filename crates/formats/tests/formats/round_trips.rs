@@ -115,7 +115,7 @@ fn what_is_written_comes_back() {
             let coupled = *dialect != Some("level13");
             let found = audit(&imported, 1e-11);
             // What MBSim keeps of a mass that does not commute with rotations is a body of no mass.
-            let lossless = format.losses(&body, &ExportOptions::default()).is_empty();
+            let lossless = format.checklist(&body, &ExportOptions::default()).losses().is_empty();
             let whole =
                 coupled && (body.invariants().general().is_none() || lossless || format.name() != "mbsim");
             for finding in found.findings().iter().filter(|_| whole) {

@@ -1,7 +1,8 @@
 //! Continuations that do not stand below their card: their names tell which card they go on with.
 
-use super::{Card, Line, Lines, bare, card_fields, without_comment};
+use super::{Card, Line, bare, card_fields, without_comment};
 use crate::coordinates::excerpt;
+use crate::scanner::Lines;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 use std::collections::{HashMap, HashSet};
@@ -107,8 +108,8 @@ impl Apart {
 
 /// Gives the lines that are not empty, without comments.
 fn each_line<'f>(file: &'f InputFile, mut take: impl FnMut(&'f [u8])) {
-    for (_, range) in Lines::of(file.bytes(), 0) {
-        let line = without_comment(file.bytes()[range].trim_ascii_end());
+    for line in Lines::of(file.bytes()) {
+        let line = without_comment(line.text);
         if !line.is_empty() {
             take(line);
         }

@@ -2,7 +2,8 @@
 //! and says what is wrong.
 
 use super::{COUNTED, Entry, excerpt, most_entries, written_digits};
-use flexbody_base::diagnostic::Code;
+use crate::scanner::{expected, words};
+use flexbody_base::diagnostic::{Code, Diagnostic};
 
 /// What the header says about every line.
 #[derive(Debug, Clone, Copy)]
@@ -11,23 +12,13 @@ pub(crate) struct Limits {
     pub integer: bool,
 }
 
-/// A line that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct BadLine {
-    /// From 1, counted from the first line of the piece (later: of the file).
-    pub line: usize,
-    pub code: Code,
-    pub message: String,
-    pub help: Option<&'static str>,
-}
-
 /// A parsed piece of the file.
 #[derive(Debug, Default)]
 pub(super) struct EntryLines {
     pub entries: Vec<Entry>,
     pub lines: usize,
-    /// The first few bad lines, and how many there are.
-    pub bad: Vec<BadLine>,
+    /// The first few bad lines, each with its number from 1, and how many there are.
+    pub bad: Vec<(usize, Diagnostic)>,
     pub bad_count: usize,
     /// First line (from 1) with a nonzero entry below, above the diagonal.
     pub lower: Option<usize>,
@@ -53,10 +44,10 @@ pub(super) fn parse(text: &[u8], limits: Limits) -> EntryLines {
         if !line.is_empty() && line[0] != b'%' {
             match slow(line, limits) {
                 Ok((entry, number)) => piece.push(entry, number),
-                Err((code, message, help)) => {
+                Err(bad) => {
                     piece.bad_count += 1;
                     if piece.bad.len() < super::SHOWN {
-                        piece.bad.push(BadLine { line: piece.lines, code, message, help });
+                        piece.bad.push((piece.lines, bad));
                     }
                 }
             }
@@ -116,46 +107,42 @@ fn skip_blanks(text: &[u8], mut at: usize) -> usize {
     at
 }
 
-type Bad = (Code, String, Option<&'static str>);
-
 /// A line with content, trimmed.
-fn slow(line: &[u8], limits: Limits) -> Result<(Entry, &[u8]), Bad> {
+fn slow(line: &[u8], limits: Limits) -> Result<(Entry, &[u8]), Diagnostic> {
     let content = line.split(|&b| b == b'%').next().unwrap_or(line); // a comment may follow the value
-    let fields: Vec<&[u8]> =
-        content.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty()).take(5).collect();
+    let fields: Vec<&[u8]> = words(content).take(5).collect();
     let &[row, col, number] = fields.as_slice() else {
-        let message = format!("expected row, column and value, found `{}`", excerpt(line));
-        return Err((Code::MatrixSyntax, message, None));
+        return Err(expected(Code::MatrixSyntax, "row, column and value", line));
     };
     let (row, col) = (index(row, "row", limits.n)?, index(col, "column", limits.n)?);
     let value = real(number).ok_or_else(|| {
-        let help = number.contains(&b',').then_some("write numbers with a decimal point");
-        (Code::MatrixSyntax, format!("value `{}` is not a number", excerpt(number)), help)
+        let message = format!("value `{}` is not a number", excerpt(number));
+        let bad = Diagnostic::new(Code::MatrixSyntax, message);
+        if number.contains(&b',') { bad.with_help("write numbers with a decimal point") } else { bad }
     })?;
     let place = format!("entry ({}, {})", row + 1, col + 1);
     if !value.is_finite() {
-        return Err((Code::MatrixNotFinite, format!("{place} is `{}`", excerpt(number)), None));
+        return Err(Diagnostic::new(Code::MatrixNotFinite, format!("{place} is `{}`", excerpt(number))));
     }
     if limits.integer && value.fract() != 0.0 {
         let message = format!("{place} is `{}` in a matrix declared integer", excerpt(number));
-        return Err((
-            Code::MatrixSyntax,
-            message,
-            Some("write `real` instead of `integer` in the first line"),
-        ));
+        let help = "write `real` instead of `integer` in the first line";
+        return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(help));
     }
     Ok((Entry { row, col, value }, number))
 }
 
-fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Bad> {
+fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Diagnostic> {
     let text = std::str::from_utf8(field).ok();
     match text.and_then(|t| t.parse::<i128>().ok()) {
         Some(index) if index >= 1 && index <= i128::from(n) => Ok((index - 1) as u32),
         Some(index) => {
-            Err((Code::MatrixIndex, format!("{which} {index} is out of range, expected 1 to {n}"), None))
+            let message = format!("{which} {index} is out of range, expected 1 to {n}");
+            Err(Diagnostic::new(Code::MatrixIndex, message))
         }
         None => {
-            Err((Code::MatrixSyntax, format!("{which} `{}` is not a whole number", excerpt(field)), None))
+            let message = format!("{which} `{}` is not a whole number", excerpt(field));
+            Err(Diagnostic::new(Code::MatrixSyntax, message))
         }
     }
 }
@@ -242,8 +229,8 @@ mod tests {
             parse(b"% c\n1 1 1\n\n1 2\nx 1 1\n2 2 nan\n1 0 1 % c\n3 3 1 %c\n1 1 1 1\n4 4 z\n", LIMITS);
         assert_eq!(piece.entries.len(), 2);
         assert_eq!((piece.lines, piece.bad_count, piece.bad.len()), (10, 6, 5));
-        assert_eq!(piece.bad.iter().map(|b| b.line).collect::<Vec<_>>(), [4, 5, 6, 7, 9]);
-        assert_eq!(piece.bad[2].code, Code::MatrixNotFinite);
-        assert_eq!(piece.bad[3].code, Code::MatrixIndex);
+        assert_eq!(piece.bad.iter().map(|(line, _)| *line).collect::<Vec<_>>(), [4, 5, 6, 7, 9]);
+        assert_eq!(piece.bad[2].1.code(), Code::MatrixNotFinite);
+        assert_eq!(piece.bad[3].1.code(), Code::MatrixIndex);
     }
 }

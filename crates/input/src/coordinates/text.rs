@@ -79,17 +79,6 @@ fn whole_lines(block: &[u8], ends_file: bool) -> usize {
     }
 }
 
-/// The lines of a text, trimmed.
-pub(crate) fn lines(text: &[u8]) -> impl Iterator<Item = &[u8]> {
-    let mut rest = text;
-    std::iter::from_fn(move || {
-        let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |at| at + 1);
-        let (line, after) = rest.split_at(end);
-        rest = after;
-        (!line.is_empty()).then(|| line.trim_ascii())
-    })
-}
-
 /// The most entries that a text has: one in each line, of which `1 1 1` is the shortest. Entries are held until
 /// all are there, so that they have no more room than they need.
 pub(crate) fn most_entries(text: &[u8]) -> usize {

@@ -5,8 +5,9 @@
 use super::deck::{Card, Deck, fields};
 use super::{Found, both, missing};
 use crate::assemble::{Entry, StoredEntries, assemble, check_size};
-use crate::coordinates::{excerpt, line_aligned, lines, real};
+use crate::coordinates::{excerpt, line_aligned, real};
 use crate::digits::{COUNTED, written_digits};
+use crate::scanner::{Line, Lines};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::SeenFile;
 use flexbody_base::text::table::integer;
@@ -92,7 +93,7 @@ impl SubstructureFile<'_> {
     fn nodes(&self) -> Result<Vec<i64>, Diagnostic> {
         let count = self.element.parameter("NODES").and_then(|count| count.parse::<usize>().ok());
         let (_, text) = self.deck.text(self.element);
-        let lines = text.split(|&b| b == b'\n').map(<[u8]>::trim_ascii);
+        let lines = Lines::of(text).map(|line| line.text.trim_ascii_start());
         let listed = lines.skip_while(|line| !line.ends_with(b"ELEMENT NODES")).skip(1);
         let listed = listed.map_while(|line| line.strip_prefix(b"**")).map(<[u8]>::trim_ascii);
         let nodes: Option<Vec<i64>> = listed.flat_map(fields).map(integer).collect();
@@ -214,20 +215,21 @@ struct NumberLines {
 impl NumberLines {
     fn parse(text: &[u8]) -> Self {
         let mut piece = Self { values: Vec::with_capacity(text.len() / 20), ..Self::default() };
-        for line in lines(text) {
+        for Line { number, text } in Lines::of(text) {
+            let line = text.trim_ascii_start();
             if !(line.is_empty() || line.starts_with(b"**")) {
                 let before = piece.values.len();
                 for field in fields(line) {
                     match real(field).filter(|value| value.is_finite()) {
                         Some(value) => piece.values.push(value),
-                        None => _ = piece.bad.get_or_insert_with(|| (piece.lines, excerpt(line))),
+                        None => _ = piece.bad.get_or_insert_with(|| (number - 1, excerpt(line))),
                     }
                 }
                 if before < COUNTED {
                     piece.written = fields(line).map(written_digits).fold(piece.written, u8::max);
                 }
             }
-            piece.lines += 1;
+            piece.lines = number;
         }
         piece
     }

@@ -8,7 +8,7 @@ use super::distributing_couplings::{placed_note, reference_places};
 use super::expanded::{Once, label_once};
 use super::rotation_nodes::rotation_nodes;
 use super::{Found, JobFile, JobModel, JobReader, both, is_deck, missing};
-use crate::coordinates::excerpt;
+use crate::scanner::{Line, Lines, expected};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use flexbody_base::text::table::integer;
@@ -90,8 +90,8 @@ impl JobReader for Calculix {
 fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
     let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut labels = Vec::with_capacity(file.bytes().len() / 6);
-    for (k, line) in file.bytes().split(|&b| b == b'\n').enumerate() {
-        let line = line.trim_ascii();
+    for Line { number, text } in Lines::of(file.bytes()) {
+        let line = text.trim_ascii_start();
         if line.is_empty() {
             continue;
         }
@@ -100,11 +100,9 @@ fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
             (1..=3).contains(&direction).then_some(DofLabel { node, direction: direction as u8 })
         });
         let Some(label) = label else {
-            let message = format!("expected a node and a direction as in `17.3`, found `{}`", excerpt(line));
-            let diagnostic = Diagnostic::new(Code::TableRow, message).in_file(path).at_line(k + 1);
-            return Err(vec![
-                diagnostic.with_help("structures have the directions 1 to 3: write the file again"),
-            ]);
+            let diagnostic = expected(Code::TableRow, "a node and a direction as in `17.3`", line);
+            let help = "structures have the directions 1 to 3: write the file again";
+            return Err(vec![diagnostic.in_file(path).at_line(number).with_help(help)]);
         };
         labels.push(label);
     }

@@ -2,6 +2,7 @@
 
 use super::Found;
 use crate::coordinates::excerpt;
+use crate::scanner::Lines;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::input_file::{InputFile, SeenFile};
 use std::ops::Range;
@@ -88,9 +89,9 @@ impl Deck {
     /// Lines of data of a card with their numbers, without comments and blank lines.
     pub(super) fn data<'d>(&'d self, card: &Card) -> impl Iterator<Item = (usize, &'d [u8])> + use<'d> {
         let (first, bytes) = self.text(card);
-        let lines = bytes.split(|&b| b == b'\n').enumerate();
+        let lines = Lines::below(bytes, first.saturating_sub(1));
         lines
-            .map(move |(k, line)| (first + k, line.trim_ascii()))
+            .map(|line| (line.number, line.text.trim_ascii_start()))
             .filter(|(_, line)| !line.is_empty() && !line.starts_with(b"**"))
     }
 

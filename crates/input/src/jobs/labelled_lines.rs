@@ -4,9 +4,10 @@
 use super::deck::fields;
 use super::{Found, FromFile, both};
 use crate::assemble::{Entry, Sides, StoredEntries, assemble, check_size};
-use crate::coordinates::{Blocks, excerpt, line_aligned, lines, most_entries, real};
+use crate::coordinates::{Blocks, line_aligned, most_entries, real};
 use crate::digits::{COUNTED, written_digits};
 use crate::recent::Recent;
+use crate::scanner::{Line, Lines, expected};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::Compression;
 use flexbody_base::text::input_file::{InputFile, SeenFile};
@@ -37,8 +38,8 @@ pub(super) fn has_labels(path: &Path) -> Found<bool> {
     let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut blocks = Blocks::of(&file, Compression::None);
     while let Some(block) = blocks.next().map_err(|e| vec![file.failed(&e)])? {
-        if let Some(line) = lines(&block).find(|line| is_data(line)) {
-            return Ok(line.contains(&b','));
+        if let Some(line) = Lines::of(&block).find(|line| is_data(line.text.trim_ascii_start())) {
+            return Ok(line.text.contains(&b','));
         }
     }
     Ok(false)
@@ -92,10 +93,7 @@ fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
     let mut before = 0;
     let mut told = Vec::new();
     for piece in pieces {
-        told.extend(piece.bad.iter().map(|(line, text)| {
-            let message = format!("expected node, direction, node, direction, value, found `{text}`");
-            Diagnostic::new(Code::MatrixSyntax, message).in_file(path).at_line(before + line)
-        }));
+        told.extend(piece.bad.iter().map(|(line, bad)| bad.clone().in_file(path).at_line(before + line)));
         before += piece.lines;
     }
     told.truncate(SHOWN);
@@ -109,16 +107,17 @@ struct LabelledEntries {
     labels: Vec<DofLabel>,
     written: u8,
     lines: usize,
-    /// The first bad lines: number within the piece, from 1, and text.
-    bad: Vec<(usize, String)>,
+    /// The first bad lines: number within the piece, from 1, and what is wrong.
+    bad: Vec<(usize, Diagnostic)>,
 }
 
 impl LabelledEntries {
     fn parse(text: &[u8]) -> Self {
         let mut piece = Self { entries: Vec::with_capacity(most_entries(text)), ..Self::default() };
         let mut recent = Recent::new();
-        for line in lines(text) {
-            piece.lines += 1;
+        for Line { number, text } in Lines::of(text) {
+            piece.lines = number;
+            let line = text.trim_ascii_start();
             if !is_data(line) {
                 continue;
             }
@@ -133,7 +132,10 @@ impl LabelledEntries {
                     let (row, col) = (place(row), place(col));
                     piece.entries.push(Entry { row, col, value });
                 }
-                None if piece.bad.len() < SHOWN => piece.bad.push((piece.lines, excerpt(line))),
+                None if piece.bad.len() < SHOWN => {
+                    const LINE: &str = "node, direction, node, direction, value";
+                    piece.bad.push((number, expected(Code::MatrixSyntax, LINE, line)));
+                }
                 None => {}
             }
         }

@@ -4,6 +4,7 @@ use super::header::{has_banner, size};
 use crate::array::Array;
 use crate::coordinates::{Blocks, excerpt, real};
 use crate::digits::written_digits;
+use crate::scanner::words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
@@ -39,8 +40,8 @@ pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Ar
 
 fn banner(line: &[u8]) -> Found<()> {
     let text = String::from_utf8_lossy(line).to_lowercase();
-    let words: Vec<&str> = text.split_whitespace().collect();
-    if !has_banner(line) || words.len() != 5 {
+    let kinds: Vec<&str> = text.split_whitespace().collect();
+    if !has_banner(line) || kinds.len() != 5 {
         let message =
             format!("first line is `{}`, expected `%%MatrixMarket matrix array real general`", excerpt(line));
         return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(1)]);
@@ -51,7 +52,7 @@ fn banner(line: &[u8]) -> Found<()> {
         ("field", &["real", "integer"], "write real numbers"),
         ("symmetry", &["general"], "write all values"),
     ];
-    let wrong = expected.iter().zip(&words[1..]).filter(|((_, allowed, _), word)| !allowed.contains(word));
+    let wrong = expected.iter().zip(&kinds[1..]).filter(|((_, allowed, _), word)| !allowed.contains(word));
     let found: Vec<Diagnostic> = wrong
         .map(|((what, allowed, help), word)| {
             let message =
@@ -75,7 +76,7 @@ struct ArrayReader {
 impl ArrayReader {
     fn content(&mut self, line: &[u8]) -> Result<(), Diagnostic> {
         let content = line.split(|&b| b == b'%').next().unwrap_or(line);
-        let mut fields = content.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
+        let mut fields = words(content);
         let Some((_, _, count)) = self.size else {
             let numbers: Vec<Option<u64>> = fields.take(3).map(size).collect();
             let extents = match *numbers.as_slice() {

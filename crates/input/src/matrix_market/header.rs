@@ -1,6 +1,7 @@
 //! Banner, comments and size line.
 
 use crate::coordinates::excerpt;
+use crate::scanner::words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
 /// Which entries of the matrix are written.
@@ -46,8 +47,7 @@ pub(super) fn parse(text: &[u8]) -> Result<(Header, usize, usize), Vec<Diagnosti
         if line.is_empty() || line.starts_with(b"%") {
             continue;
         }
-        let numbers: Vec<Option<u64>> =
-            line.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty()).map(size).collect();
+        let numbers: Vec<Option<u64>> = words(line).map(size).collect();
         let &[Some(rows), Some(cols), Some(entries)] = numbers.as_slice() else {
             let message = format!("size line is `{}`, expected rows, columns and entries", excerpt(line));
             return Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(count)]);

@@ -1,9 +1,10 @@
 //! Lists of Ansys: `PRNSOL,U` or `PRNSOL,DOF` after `SET` for every mode, in one file.
 
 use super::table::ModeTable;
-use super::{Found, lines, syntax, unreadable};
+use super::{Found, syntax, unexpected, unreadable};
 use crate::coordinates::{excerpt, real};
 use crate::digits::written_digits;
+use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
@@ -28,7 +29,7 @@ struct AnsysListReader {
 /// Reads all lists; pages and lists of one substep are one mode.
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut reading = AnsysListReader::default();
-    for (at, line) in lines(file) {
+    for Line { number: at, text: line } in Lines::of(file.bytes()) {
         let words = numbers_apart(line);
         let first = words.first().map(Vec::as_slice).unwrap_or_default();
         if first == b"LOAD" || first.starts_with(b"FREQ=") || first.starts_with(b"TIME=") {
@@ -78,7 +79,7 @@ impl AnsysListReader {
             ));
         } else if let Some(text) = behind(line, b"FREQ=") {
             let Some(hertz) = real(text) else {
-                return Err(syntax(file, at, format!("expected a frequency, found `{}`", excerpt(line))));
+                return Err(unexpected(file, at, "a frequency", line));
             };
             self.table.eigenvalue_digits = self.table.eigenvalue_digits.max(written_digits(text));
             self.table.state((TAU * hertz).powi(2));
@@ -116,22 +117,22 @@ fn columns(names: &[Vec<u8>]) -> Option<Vec<Option<u8>>> {
 fn behind<'l>(line: &'l [u8], name: &[u8]) -> Option<&'l [u8]> {
     let is_name = |at: &usize| line[*at..].starts_with(name) && (*at == 0 || line[*at - 1] == b' ');
     let at = (0..line.len()).find(is_name)? + name.len();
-    line[at..].split(u8::is_ascii_whitespace).find(|word| !word.is_empty())
+    words(&line[at..]).next()
 }
 
 /// The words of a line; numbers of full width touch each other, and a sign that follows a digit begins the
 /// next.
 fn numbers_apart(line: &[u8]) -> Vec<Vec<u8>> {
-    let mut words: Vec<Vec<u8>> = Vec::new();
-    for word in line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty()) {
+    let mut apart: Vec<Vec<u8>> = Vec::new();
+    for word in words(line) {
         let mut own = Vec::new();
         for (at, &byte) in word.iter().enumerate() {
             if byte == b'-' && at > 0 && (word[at - 1].is_ascii_digit() || word[at - 1] == b'.') {
-                words.push(std::mem::take(&mut own));
+                apart.push(std::mem::take(&mut own));
             }
             own.push(byte);
         }
-        words.push(own);
+        apart.push(own);
     }
-    words
+    apart
 }

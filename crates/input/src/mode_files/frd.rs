@@ -2,8 +2,9 @@
 //! decimals behind the first digit, in fields of fixed width that touch each other.
 
 use super::table::ModeTable;
-use super::{Found, lines, syntax, unreadable};
-use crate::coordinates::{excerpt, real};
+use super::{Found, syntax, unexpected, unreadable};
+use crate::coordinates::real;
+use crate::scanner::{Line, Lines, field, words};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
@@ -45,7 +46,7 @@ struct Block {
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut table = ModeTable::new(DIGITS.0, DIGITS.1);
     let (mut head, mut pending, mut block): (Head, Option<Block>, Option<Block>) = Default::default();
-    for (at, line) in lines(file) {
+    for Line { number: at, text: line } in Lines::of(file.bytes()) {
         if let Some(open) = &mut block {
             if line.starts_with(b" -1") {
                 open.node(&mut table, file, at, line)?;
@@ -67,7 +68,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
         } else if line.starts_with(b"  100C") {
             pending = head.block(file, at, line)?;
         } else if line.starts_with(b" -4") {
-            let name = line.get(5..13).unwrap_or_default().trim_ascii();
+            let name = field(line, 5..13);
             if name.starts_with(b"DISPI") && pending.is_some() {
                 let help = "imported modes are real: a model without cyclic symmetry and damping has such";
                 return Err(unreadable(file, "modes have imaginary parts", help));
@@ -97,7 +98,7 @@ impl Head {
     /// A line that says something of the step: `1PMODE`, `1PGM` and `1PGK` (modal mass and stiffness),
     /// `1PHID` (nodal diameter of a cyclic structure, -1 without).
     fn parameter(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
-        let mut words = line[6..].split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        let mut words = words(&line[6..]);
         let (Some(name), Some(value)) = (words.next(), words.next()) else { return Ok(()) };
         match name {
             b"STEP" => *self = Self::default(),
@@ -115,18 +116,14 @@ impl Head {
 
     /// The block of a mode below the head of a block.
     fn block(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<Option<Block>> {
-        let field =
-            |from: usize, to: usize| line.get(from..to.min(line.len())).unwrap_or_default().trim_ascii();
-        if !self.mode || field(56, 58) != FREQUENCY {
+        if !self.mode || field(line, 56..58) != FREQUENCY {
             return Ok(None);
         }
-        let expected = integer(field(24, 36)).filter(|count| *count > 0);
-        let (Some(hertz), Some(expected)) = (real(field(12, 24)), expected) else {
-            let message =
-                format!("expected frequency and number of nodes of a mode, found `{}`", excerpt(line));
-            return Err(syntax(file, at, message));
+        let expected = integer(field(line, 24..36)).filter(|count| *count > 0);
+        let (Some(hertz), Some(expected)) = (real(field(line, 12..24)), expected) else {
+            return Err(unexpected(file, at, "frequency and number of nodes of a mode", line));
         };
-        let start = match field(73, 75) {
+        let start = match field(line, 73..75) {
             b"0" => 8,
             b"1" => 13,
             _ => {
@@ -149,8 +146,7 @@ impl Block {
         let value =
             |k: usize| real(line.get(self.start + WIDTH * k..self.start + WIDTH * (k + 1))?.trim_ascii());
         let (Some(node), Some(x), Some(y), Some(z)) = (node, value(0), value(1), value(2)) else {
-            let message = format!("expected a node and three displacements, found `{}`", excerpt(line));
-            return Err(syntax(file, at, message));
+            return Err(unexpected(file, at, "a node and three displacements", line));
         };
         for (direction, value) in (1..).zip([x, y, z]) {
             table.set(file, Some(at), DofLabel { node, direction }, value)?;

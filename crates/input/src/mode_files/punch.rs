@@ -2,16 +2,16 @@
 //! point of every mode, with seven digits.
 
 use super::table::ModeTable;
-use super::{Found, lines, syntax, unreadable};
-use crate::coordinates::{excerpt, real};
+use super::{Found, syntax, unexpected, unreadable};
+use crate::coordinates::real;
+use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 
 /// Whether a file begins as a punch file with results does.
 pub(super) fn recognises(head: &[u8]) -> bool {
-    let mut lines = head.split(|&b| b == b'\n').map(|line| line.trim_ascii_start());
-    let first = lines.find(|line| !line.is_empty()).unwrap_or_default();
+    let first = head.trim_ascii_start();
     [&b"$TITLE"[..], b"$SUBTITLE", b"$LABEL", b"$EIGENVECTOR", b"$DISPLACEMENTS", b"$SUBCASE"]
         .iter()
         .any(|word| first.starts_with(word))
@@ -39,7 +39,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut is_mode = false;
     // The node whose rotations are on the next line.
     let mut node: Option<i64> = None;
-    for (at, line) in lines(file) {
+    for Line { number: at, text: line } in Lines::of(file.bytes()) {
         let line = &line[..line.len().min(COLUMNS)];
         if line.starts_with(b"$") {
             if let Some(node) = node {
@@ -111,14 +111,14 @@ fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
 /// `$EIGENVALUE =  3.947842E+05  MODE =     1`.
 fn eigenvalue(file: &InputFile, at: usize, line: &[u8]) -> Found<Option<f64>> {
     let Some(rest) = line.strip_prefix(b"$EIGENVALUE") else { return Ok(None) };
-    let mut words = rest.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+    let mut words = words(rest);
     let value = match words.next() {
         Some(b"=") => words.next().and_then(real),
         _ => None,
     };
     match value {
         Some(value) => Ok(Some(value)),
-        None => Err(syntax(file, at, format!("expected an eigenvalue, found `{}`", excerpt(line)))),
+        None => Err(unexpected(file, at, "an eigenvalue", line)),
     }
 }
 
@@ -131,14 +131,8 @@ fn grid_line(
     line: &[u8],
     before: Option<i64>,
 ) -> Found<Option<i64>> {
-    let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    let bad = || {
-        let message = format!(
-            "expected a grid point with three values, or -CONT- and three more, found `{}`",
-            excerpt(line)
-        );
-        Err(syntax(file, at, message))
-    };
+    let mut words = words(line);
+    let bad = || Err(unexpected(file, at, "a grid point with three values, or -CONT- and three more", line));
     let (first, node) = match (words.next(), before) {
         (Some(b"-CONT-"), Some(node)) => (4, node),
         (Some(number), None) => match (integer(number), words.next()) {

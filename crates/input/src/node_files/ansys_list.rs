@@ -2,8 +2,9 @@
 //! listing of NLIST. Decimal commas are read.
 
 use super::ansys_axes::axes;
-use super::{Found, NodeFile, syntax};
-use crate::coordinates::{excerpt, real};
+use super::{Found, NodeFile, unexpected};
+use crate::coordinates::real;
+use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 
@@ -31,24 +32,19 @@ fn is_listing_head(line: &str) -> bool {
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let mut read = NodeFile::default();
     let mut with_angles = false;
-    for (k, line) in file.bytes().split(|&b| b == b'\n').enumerate() {
-        let line = line.trim_ascii();
-        let mut fields = line.split(u8::is_ascii_whitespace).filter(|field| !field.is_empty());
+    for Line { number, text: line } in Lines::of(file.bytes()) {
+        let line = line.trim_ascii_start();
+        let mut fields = words(line);
         let Some(id) = fields.next().and_then(integer) else {
             let upper = line.to_ascii_uppercase();
-            let mut words = upper.split(u8::is_ascii_whitespace);
-            with_angles |= words.any(|word| word == b"THXY");
+            with_angles |= words(&upper).any(|word| word == b"THXY");
             continue;
         };
         let values: Option<Vec<f64>> = fields.take(if with_angles { 6 } else { 3 }).map(decimal).collect();
         let (Some(&[x, y, z, ref angles @ ..]), false) =
             (values.as_deref(), with_angles && values.as_ref().is_some_and(|own| own.len() < 6))
         else {
-            return Err(syntax(
-                file,
-                k + 1,
-                format!("expected a node and three coordinates, found `{}`", excerpt(line)),
-            ));
+            return Err(unexpected(file, number, "a node and three coordinates", line));
         };
         read.nodes.ids.push(id);
         read.nodes.positions.push([x, y, z]);

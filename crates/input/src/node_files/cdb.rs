@@ -6,6 +6,7 @@ mod eblock;
 use super::ansys_axes::axes;
 use super::{Found, NodeFile, syntax};
 use crate::coordinates::{excerpt, real};
+use crate::scanner::{Lines, field};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 
@@ -19,7 +20,7 @@ pub(super) fn recognises(head: &str) -> bool {
 
 /// Reads all blocks of nodes and all components of nodes.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
-    let text: Vec<&[u8]> = file.bytes().split(|&b| b == b'\n').collect();
+    let text: Vec<&[u8]> = Lines::of(file.bytes()).map(|line| line.text).collect();
     let mut read = NodeFile::default();
     let mut types = eblock::Types::default();
     let mut at = 0;
@@ -59,10 +60,9 @@ fn widths(format: &[u8]) -> Option<[(usize, usize); 2]> {
     (fits(whole) && fits(reals)).then_some([whole, reals])
 }
 
-/// The k-th field of a width, behind so many bytes; trailing fields may be missing.
-fn field(line: &[u8], before: usize, k: usize, width: usize) -> &[u8] {
-    let start = (before + k * width).min(line.len());
-    line[start..(start + width).min(line.len())].trim_ascii()
+/// The k-th field of a width; trailing fields may be missing.
+fn nth_field(line: &[u8], k: usize, width: usize) -> &[u8] {
+    field(line, k * width..(k + 1) * width)
 }
 
 fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> Found<usize> {
@@ -80,12 +80,13 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
         if end.is_empty() {
             continue;
         }
-        let id = integer(field(line, 0, 0, width));
+        let id = integer(nth_field(line, 0, width));
         // Three coordinates, and three angles of nodes that are rotated.
         let mut values = [0.0; 6];
         let mut good = id.is_some();
         for (axis, value) in values.iter_mut().enumerate().take(reals) {
-            let own = field(line, count * width, axis, length);
+            let start = count * width + axis * length;
+            let own = field(line, start..start + length);
             // Values that are zero at the end of a line are left out.
             match if own.is_empty() { Some(0.0) } else { real(own) } {
                 Some(own) => *value = own,
@@ -132,7 +133,7 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
     let mut members: Vec<i64> = Vec::new();
     for k in 0..count {
         let line = text.get(head + 2 + k / per_line.max(1)).copied().unwrap_or_default();
-        let Some(member) = integer(field(line, 0, k % per_line.max(1), width)) else {
+        let Some(member) = integer(nth_field(line, k % per_line.max(1), width)) else {
             return Err(syntax(
                 file,
                 head + 3 + k / per_line.max(1),

@@ -2,8 +2,10 @@
 //! elements.
 
 use super::{Found, NodeFile, syntax};
+use crate::scanner::Words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
+use flexbody_base::text::table::integer;
 use flexbody_model::{ElementShape, Elements};
 use std::collections::{BTreeSet, HashMap};
 
@@ -27,7 +29,7 @@ struct Mesh {
 
 /// Reads nodes and groups.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
-    let mut words = Words { file, rest: file.bytes(), line: 1 };
+    let mut words = MeshWords { file, text: Words::of(file.bytes()) };
     let mut mesh = Mesh::default();
     let mut version = 0;
     while let Some(section) = words.section() {
@@ -46,7 +48,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     Ok(mesh.finish())
 }
 
-fn format(words: &mut Words<'_>) -> Found<i64> {
+fn format(words: &mut MeshWords<'_>) -> Found<i64> {
     let (version, binary) = (words.real("a version")?, words.whole("0 for text")?);
     let message = match (version, binary) {
         (v, 0) if (2.0..3.0).contains(&v) => return Ok(2),
@@ -58,22 +60,22 @@ fn format(words: &mut Words<'_>) -> Found<i64> {
     Err(vec![
         Diagnostic::new(Code::NodeFileSyntax, message)
             .in_file(words.file.path())
-            .at_line(words.line)
+            .at_line(words.text.line_number())
             .with_help(help),
     ])
 }
 
 impl Mesh {
-    fn physical_names(&mut self, words: &mut Words<'_>) -> Found<()> {
+    fn physical_names(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         for _ in 0..words.whole("a count")? {
             let (dimension, tag) = (words.whole("a dimension")?, words.whole("a tag")?);
-            let name = words.rest_of_line();
+            let name = String::from_utf8_lossy(words.text.line()).into_owned();
             self.names.insert((dimension, tag), name.trim().trim_matches('"').to_owned());
         }
         Ok(())
     }
 
-    fn entities(&mut self, words: &mut Words<'_>) -> Found<()> {
+    fn entities(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         let counts: Vec<i64> = (0..4).map(|_| words.whole("a count")).collect::<Found<_>>()?;
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
@@ -94,7 +96,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn nodes_2(&mut self, words: &mut Words<'_>) -> Found<()> {
+    fn nodes_2(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         for _ in 0..words.whole("a count")? {
             self.read.nodes.ids.push(words.whole("a node")?);
             self.read.nodes.positions.push(words.place()?);
@@ -102,7 +104,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn nodes_4(&mut self, words: &mut Words<'_>) -> Found<()> {
+    fn nodes_4(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         let blocks = words.whole("a count")?;
         for _ in 0..3 {
             words.whole("a count")?;
@@ -125,7 +127,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn elements_2(&mut self, words: &mut Words<'_>) -> Found<()> {
+    fn elements_2(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         for _ in 0..words.whole("a count")? {
             words.whole("an element")?;
             let kind = words.whole("a type")?;
@@ -140,7 +142,7 @@ impl Mesh {
         Ok(())
     }
 
-    fn elements_4(&mut self, words: &mut Words<'_>) -> Found<()> {
+    fn elements_4(&mut self, words: &mut MeshWords<'_>) -> Found<()> {
         let blocks = words.whole("a count")?;
         for _ in 0..3 {
             words.whole("a count")?;
@@ -239,46 +241,29 @@ const WEDGE: [[usize; 2]; 9] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], 
 /// See [`TETRAHEDRON`].
 const PYRAMID: [[usize; 2]; 8] = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]];
 
-/// The words of a mesh, with the line that they stand in.
-struct Words<'a> {
+/// The words of a mesh.
+struct MeshWords<'a> {
     file: &'a InputFile,
-    rest: &'a [u8],
-    line: usize,
+    text: Words<'a>,
 }
 
-impl<'a> Words<'a> {
-    fn next(&mut self) -> Option<&'a [u8]> {
-        let start = self.rest.iter().position(|b| !b.is_ascii_whitespace())?;
-        self.line += self.rest[..start].iter().filter(|&&b| b == b'\n').count();
-        let rest = &self.rest[start..];
-        let end = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
-        self.rest = &rest[end..];
-        Some(&rest[..end])
-    }
-
-    fn rest_of_line(&mut self) -> String {
-        let end = self.rest.iter().position(|&b| b == b'\n').unwrap_or(self.rest.len());
-        let text = String::from_utf8_lossy(&self.rest[..end]).into_owned();
-        self.rest = &self.rest[end..];
-        text
-    }
-
+impl MeshWords<'_> {
     fn wrong<T>(&self, expected: &str, found: Option<&[u8]>) -> Found<T> {
         let found =
             found.map_or("the end of the file".to_owned(), |word| format!("`{}`", word.escape_ascii()));
-        Err(syntax(self.file, self.line, format!("expected {expected}, found {found}")))
+        Err(syntax(self.file, self.text.line_number(), format!("expected {expected}, found {found}")))
     }
 
     fn whole(&mut self, expected: &str) -> Found<i64> {
-        let word = self.next();
-        match word.and_then(flexbody_base::text::table::integer) {
+        let word = self.text.next();
+        match word.and_then(integer) {
             Some(number) => Ok(number),
             None => self.wrong(expected, word),
         }
     }
 
     fn real(&mut self, expected: &str) -> Found<f64> {
-        let word = self.next();
+        let word = self.text.next();
         match word.and_then(|word| fast_float2::parse(word).ok()) {
             Some(number) => Ok(number),
             None => self.wrong(expected, word),
@@ -299,7 +284,7 @@ impl<'a> Words<'a> {
     /// The name of the next section.
     fn section(&mut self) -> Option<String> {
         loop {
-            let word = self.next()?;
+            let word = self.text.next()?;
             if word.starts_with(b"$") && !word.starts_with(b"$End") {
                 return Some(String::from_utf8_lossy(word).into_owned());
             }
@@ -309,7 +294,7 @@ impl<'a> Words<'a> {
     /// Goes behind the end of a section.
     fn skip_to_end(&mut self, section: &str) {
         let end = format!("$End{}", &section[1..]);
-        while let Some(word) = self.next() {
+        for word in self.text.by_ref() {
             if word == end.as_bytes() {
                 return;
             }

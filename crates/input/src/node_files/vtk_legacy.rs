@@ -3,6 +3,7 @@
 
 use super::vtk_numbers::NumberType;
 use super::{Found, NodeFile, syntax};
+use crate::scanner::Words;
 use flexbody_base::text::InputFile;
 
 const BANNER: &str = "# vtk DataFile Version";
@@ -14,11 +15,8 @@ pub(super) fn recognises(head: &str) -> bool {
 
 /// Reads the points, numbered from 0 as ParaView shows them.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
-    let mut cursor = Cursor { bytes: file.bytes(), at: 0, binary: false };
-    let places = cursor.points().map_err(|message| {
-        let line = file.bytes()[..cursor.at].iter().filter(|&&b| b == b'\n').count() + 1;
-        syntax(file, line, message)
-    })?;
+    let mut cursor = Cursor { text: Words::of(file.bytes()), binary: false };
+    let places = cursor.points().map_err(|message| syntax(file, cursor.text.line_number(), message))?;
     let mut read = NodeFile::default();
     read.nodes.positions = places.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect();
     read.nodes.ids = (0..read.nodes.positions.len() as i64).collect();
@@ -26,27 +24,26 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
 }
 
 struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
+    text: Words<'a>,
     binary: bool,
 }
 
-impl<'a> Cursor<'a> {
+impl Cursor<'_> {
     /// The coordinates of all points.
     fn points(&mut self) -> Result<Vec<f64>, String> {
         // Banner and title.
-        self.line();
-        self.line();
+        self.text.line();
+        self.text.line();
         self.binary = match self.words().first().map(|word| word.to_ascii_uppercase()).as_deref() {
             Some("ASCII") => false,
             Some("BINARY") => true,
             _ => return Err("expected ASCII or BINARY".to_owned()),
         };
         loop {
-            if self.at >= self.bytes.len() {
+            if self.text.rest().is_empty() {
                 return Err("file has no POINTS".to_owned());
             }
-            let begin = self.at;
+            let begin = self.text.at;
             // Keywords are read in any case.
             let words: Vec<String> = self.words().iter().map(|word| word.to_ascii_uppercase()).collect();
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -60,7 +57,7 @@ impl<'a> Cursor<'a> {
                     return self.numbers(count, kind);
                 }
                 [word, ..] => {
-                    self.at = begin;
+                    self.text.at = begin;
                     return Err(format!("expected POINTS, found `{}`", word.escape_default()));
                 }
             }
@@ -71,14 +68,14 @@ impl<'a> Cursor<'a> {
     fn skip_fields(&mut self, count: &str) -> Result<(), String> {
         let count: u64 = count.parse().map_err(|_| "expected the number of fields".to_owned())?;
         for _ in 0..count {
-            let begin = self.at;
+            let begin = self.text.at;
             let mut words = self.words();
-            if words.is_empty() && self.at < self.bytes.len() {
+            if words.is_empty() {
                 words = self.words();
             }
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
             let [_, components, tuples, kind] = words.as_slice() else {
-                self.at = begin;
+                self.text.at = begin;
                 return Err("expected name, components, tuples and type of a field".to_owned());
             };
             let (count, kind) = self.announced(tuples, components, kind, begin)?;
@@ -100,23 +97,22 @@ impl<'a> Cursor<'a> {
         match count.zip(NumberType::named(kind)) {
             Some(announced) => Ok(announced),
             None => {
-                self.at = begin;
+                self.text.at = begin;
                 Err(format!("expected a count and a type of numbers, found `{tuples} {kind}`"))
             }
         }
     }
 
     fn numbers(&mut self, count: usize, kind: NumberType) -> Result<Vec<f64>, String> {
-        let rest = &self.bytes[self.at.min(self.bytes.len())..];
         if self.binary {
-            let own = count.checked_mul(kind.bytes()).and_then(|length| rest.get(..length));
+            let own = count.checked_mul(kind.bytes()).and_then(|length| self.text.rest().get(..length));
             let own = own.ok_or_else(|| format!("file ends before its {count} numbers do"))?;
-            self.at += own.len();
+            self.text.at += own.len();
             return Ok(kind.decode(own, true));
         }
         let mut numbers = Vec::new();
         while numbers.len() < count {
-            let Some(word) = self.word() else {
+            let Some(word) = self.text.next() else {
                 return Err(format!("file ends after {} of {count} numbers", numbers.len()));
             };
             let number = fast_float2::parse(word);
@@ -125,25 +121,8 @@ impl<'a> Cursor<'a> {
         Ok(numbers)
     }
 
-    /// The next word, on this line or below.
-    fn word(&mut self) -> Option<&'a [u8]> {
-        let rest = &self.bytes[self.at..];
-        let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
-        let length = rest[start..].iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len() - start);
-        self.at += start + length;
-        Some(&rest[start..start + length])
-    }
-
-    /// The rest of the line.
-    fn line(&mut self) -> &'a [u8] {
-        let rest = &self.bytes[self.at.min(self.bytes.len())..];
-        let end = rest.iter().position(|&b| b == b'\n').map_or(rest.len(), |end| end + 1);
-        self.at += end;
-        &rest[..end]
-    }
-
     /// The words of the rest of the line.
     fn words(&mut self) -> Vec<String> {
-        String::from_utf8_lossy(self.line()).split_whitespace().map(str::to_owned).collect()
+        String::from_utf8_lossy(self.text.line()).split_whitespace().map(str::to_owned).collect()
     }
 }

@@ -6,6 +6,7 @@ use super::vtk_cells::elements_of;
 use super::vtk_numbers::{Base64, NumberType, Packing, Unpacked};
 use super::xml_elements::{Element, elements};
 use super::{Found, NodeFile, refused};
+use crate::scanner::words;
 use flexbody_base::text::InputFile;
 use flexbody_model::{Elements, Nodes};
 
@@ -197,8 +198,7 @@ fn extent(piece: &Element<'_>) -> Option<u64> {
 }
 
 fn ascii(text: &[u8]) -> Unpacked<Vec<f64>> {
-    let words = text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
-    words
+    words(text)
         .map(|word| {
             fast_float2::parse(word).map_err(|_| format!("has `{}` for a number", word.escape_ascii()))
         })

@@ -3,15 +3,15 @@
 
 use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
 use crate::bulk_cards::whole;
-use crate::coordinates::{excerpt, real};
+use crate::coordinates::real;
 use crate::digits::written_digits;
+use crate::scanner::{Lines, expected};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 
 /// Whether a file begins with the header of a matrix.
 pub(super) fn begins(head: &[u8]) -> bool {
-    let line = head.split(|&b| b == b'\n').next().unwrap_or_default();
-    Heading::of(line.trim_ascii_end()).is_some()
+    Lines::of(head).next().is_some_and(|line| Heading::of(line.text).is_some())
 }
 
 /// Numbers in a line, and columns that each takes.
@@ -72,7 +72,7 @@ fn format(text: &[u8]) -> Option<Format> {
 /// # Errors
 /// FB301, FB303, FB304 for lines that are none of a matrix.
 pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagnostic> {
-    let mut text = Text { rest: file.bytes(), line: 0 };
+    let mut text = Text { lines: Lines::of(file.bytes()) };
     let mut all = Vec::new();
     while let Some(line) = text.next_line() {
         if line.is_empty() {
@@ -81,15 +81,15 @@ pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagno
         let heading = Heading::of(line).ok_or_else(|| text.expected("the header of a matrix", line))?;
         let [columns, rows, form, kind] = heading.numbers;
         let header =
-            Header::new(columns, rows, form, kind, heading.name).map_err(|d| d.at_line(text.line))?;
+            Header::new(columns, rows, form, kind, heading.name).map_err(|d| d.at_line(text.lines.number))?;
         let mut stored = Stored::new(header);
         loop {
-            let (start, above) = (file.bytes().len() - text.rest.len(), text.line);
+            let (start, above) = (text.lines.at, text.lines.number);
             let (column, values) = match text.column(&stored.header, heading.format, None)? {
                 Some(found) => found,
                 None => break,
             };
-            let end = file.bytes().len() - text.rest.len();
+            let end = text.lines.at;
             stored.add(column, values, start..end, above);
         }
         all.push((stored, heading.format));
@@ -107,17 +107,16 @@ pub(super) fn columns(
     header: &Header,
     format: Format,
 ) -> Result<Columns, Diagnostic> {
-    let mut text = Text { rest: bytes, line };
+    let mut text = Text { lines: Lines::below(bytes, line) };
     let mut columns = Columns::with_room(bytes.len() / format.width);
     columns.written = if header.is_single() { SINGLE_DIGITS } else { 0 };
-    while !text.rest.is_empty() && text.column(header, format, Some(&mut columns))?.is_some() {}
+    while !text.lines.is_at_end() && text.column(header, format, Some(&mut columns))?.is_some() {}
     Ok(columns)
 }
 
 /// A text file while it is read.
 struct Text<'a> {
-    rest: &'a [u8],
-    line: usize,
+    lines: Lines<'a>,
 }
 
 impl<'a> Text<'a> {
@@ -132,7 +131,7 @@ impl<'a> Text<'a> {
         let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;
         let [column, start, words] =
             integers(line).ok_or_else(|| self.expected("column, row and number of words", line))?;
-        let values = match header.column(column).map_err(|d| d.at_line(self.line))? {
+        let values = match header.column(column).map_err(|d| d.at_line(self.lines.number))? {
             ColumnRecord::End => {
                 // The number that stands there has a format of its own.
                 let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
@@ -191,10 +190,10 @@ impl<'a> Text<'a> {
     ) -> Result<usize, Diagnostic> {
         let count = usize::try_from(count).ok().filter(|count| *count > 0);
         let count = count.ok_or_else(|| {
-            Diagnostic::new(Code::MatrixSyntax, "a column has no values").at_line(self.line)
+            Diagnostic::new(Code::MatrixSyntax, "a column has no values").at_line(self.lines.number)
         })?;
         let mut row = match place {
-            Some(_) => header.first_row(start, count).map_err(|d| d.at_line(self.line))?,
+            Some(_) => header.first_row(start, count).map_err(|d| d.at_line(self.lines.number))?,
             None => 0,
         };
         let mut left = count;
@@ -226,34 +225,22 @@ impl<'a> Text<'a> {
         const COUNTED: usize = 512;
         let number = field.trim_ascii();
         let value = real(number).ok_or_else(|| {
-            let message =
-                format!("expected a number of {} characters, found `{}`", field.len(), excerpt(field));
-            let diagnostic = Diagnostic::new(Code::MatrixSyntax, message).at_line(self.line);
+            let what = format!("a number of {} characters", field.len());
+            let diagnostic = expected(Code::MatrixSyntax, &what, field).at_line(self.lines.number);
             diagnostic.with_help("write the file again")
         })?;
         if columns.count() < COUNTED {
             columns.written = columns.written.max(written_digits(number));
         }
-        columns.push(row, column, value).map_err(|d| d.at_line(self.line))
+        columns.push(row, column, value).map_err(|d| d.at_line(self.lines.number))
     }
 
     fn next_line(&mut self) -> Option<&'a [u8]> {
-        if self.rest.is_empty() {
-            return None;
-        }
-        let end = memchr::memchr(b'\n', self.rest);
-        let (line, rest) = match end {
-            Some(end) => (&self.rest[..end], &self.rest[end + 1..]),
-            None => (self.rest, &self.rest[self.rest.len()..]),
-        };
-        self.rest = rest;
-        self.line += 1;
-        Some(line.trim_ascii_end())
+        self.lines.next().map(|line| line.text)
     }
 
     fn expected(&self, what: &str, line: &[u8]) -> Diagnostic {
-        let message = format!("expected {what}, found `{}`", excerpt(line));
-        let diagnostic = Diagnostic::new(Code::MatrixSyntax, message).at_line(self.line);
+        let diagnostic = expected(Code::MatrixSyntax, what, line).at_line(self.lines.number);
         diagnostic.with_help("write the file again with OUTPUT4")
     }
 }

@@ -43,40 +43,21 @@ fn written(name: &str, text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 #[test]
 fn nodes_of_ansys_are_those_of_the_table() {
     let own = nodes();
-    let mut cdb = "/COM,ANSYS RELEASE 2021 R1\n/PREP7\nNBLOCK,6,SOLID,4,4\n(3i9,6e21.13e3)\n".to_owned();
     let mut table = "Knotennummer\tX-Position (m)\tY-Position (m)\tZ-Position (m)\t\n".to_owned();
-    let mut list =
-        " LIST ALL SELECTED NODES.   DSYS=      0\n\n   NODE        X             Y             Z\n"
-            .to_owned();
     for (id, [x, y, z]) in &own {
-        let real = |value: f64| {
-            let text = format!("{value:.13e}");
-            let (mantissa, exponent) = text.split_once('e').expect("an exponent");
-            let exponent: i32 = exponent.parse().expect("a number");
-            let sign = if exponent < 0 { '-' } else { '+' };
-            format!("{:>21}", format!("{mantissa}E{sign}{:03}", exponent.abs()))
-        };
-        cdb += &format!("{id:>9}{:>9}{:>9}{}{}", 0, 0, real(*x), real(*y));
-        // Trailing zeros are left out.
-        cdb += &if *z == 0.0 { String::new() } else { real(*z) };
-        cdb += "\n";
         table += &format!("{id}\t{x:e}\t{y:e}\t{z:e}\t\n").replace('.', ",");
-        list += &format!(" {id:>8} {x:.12e} {y:.12e} {z:.12e}\n");
     }
-    let ends: Vec<i64> = [own[0].0, own[2].0].to_vec();
-    cdb += "N,R5.3,LOC,       -1,\n";
-    cdb += &format!("CMBLOCK,PIN     ,NODE,       2\n(8i10)\n{:>10}{:>10}\n", ends[0], ends[1]);
-    cdb += &format!("CMBLOCK,RUN     ,NODE,       2 ! a range\n(8i10)\n{:>10}{:>10}\nFINISH\n", 10, -20);
-    for (name, text) in [("part.cdb", &cdb), ("nodes.txt", &table), ("nlist.lis", &list)] {
-        let (_folder, path) = written(name, text);
-        let raw = tetrahedron(&path, None, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
+    let (_folder, table) = written("nodes.txt", &table);
+    let mesh = |name: &str| fixtures().join("small/meshes").join(name);
+    for path in [&mesh("tet4.cdb"), &table, &mesh("tet4_nlist.lis")] {
+        let shown = path.display();
+        let raw = tetrahedron(path, None, &[]).unwrap_or_else(|error| panic!("{shown}: {error}"));
         let read: Vec<_> = raw.nodes.ids.iter().copied().zip(raw.nodes.positions.iter().copied()).collect();
-        assert_eq!(read, own, "{name}");
-        FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(read, own, "{shown}");
+        FeModel::from_raw(raw).unwrap_or_else(|error| panic!("{shown}: {error}"));
     }
-    let (_folder, path) = written("part.cdb", &cdb);
-    let raw = tetrahedron(&path, None, &["pin", "RUN"]).expect("readable");
-    assert_eq!(raw.interfaces[0].nodes, ends);
+    let raw = tetrahedron(&mesh("tet4.cdb"), None, &["pin", "RUN"]).expect("readable");
+    assert_eq!(raw.interfaces[0].nodes, [10, 30]);
     assert_eq!(raw.interfaces[1].nodes, [10, 20], "those of the range that there are");
 }
 

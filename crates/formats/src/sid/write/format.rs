@@ -3,8 +3,9 @@
 use super::arrays::{StiffenedFrame, modal, places};
 use super::dialect::{DIALECTS, Dialect, EMBS, Limits, ModalName, NAMES};
 use super::text::Text;
+use crate::export::Holding::{self, Held, NotApplicable};
 use crate::export::losses::{general_w0, geometric_stiffness, internal_rows, plane};
-use crate::export::{ExportFormat, ExportOptions, Exported};
+use crate::export::{ExportChecklist, ExportFormat, ExportOptions, Exported};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
@@ -32,7 +33,7 @@ impl ExportFormat for Sid {
         true
     }
 
-    fn losses(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
+    fn checklist(&self, body: &FlexBody, options: &ExportOptions) -> ExportChecklist {
         let places = places(body, &options.points);
         let embs = *chosen(options) == EMBS;
         let holds = |load: &UnitLoad| match &load.kind {
@@ -40,11 +41,28 @@ impl ExportFormat for Sid {
             LoadKind::Named(_) => false,
             kind => !embs && places.iter().any(|place| place.holds(kind)),
         };
-        let coriolis = if embs { coriolis_of_frame(body) } else { None };
-        [plane(body), general_w0(body), coriolis, geometric_stiffness(body, holds), internal_rows(body)]
-            .into_iter()
-            .flatten()
-            .collect()
+        ExportChecklist {
+            rigid_coupling: Held,
+            plane: plane(body),
+            deformed_inertia: Held,
+            general_w0: general_w0(body),
+            coriolis_force: if embs { coriolis_of_frame(body) } else { Held },
+            general_w3: Held,
+            separate_w2: Held,
+            geometric_stiffness: geometric_stiffness(body, holds),
+            // Written as geometric stiffness is.
+            inertia_stiffness: Held,
+            damping: Held,
+            shapes: Held,
+            rotations: Held,
+            internal_rows: internal_rows(body),
+            gravity: Held,
+            interfaces: Held,
+            surface: NotApplicable,
+            origins_of_modes: NotApplicable,
+            units: Held,
+            storage: NotApplicable,
+        }
     }
 
     fn needs(&self, body: &FlexBody, options: &ExportOptions) -> Vec<String> {
@@ -96,19 +114,19 @@ fn chosen(options: &ExportOptions) -> &'static Dialect {
 }
 
 /// The Coriolis force on the frame of modes that move the centre of mass, which EMBSlib leaves out.
-fn coriolis_of_frame(body: &FlexBody) -> Option<String> {
+fn coriolis_of_frame(body: &FlexBody) -> Holding {
     /// Share of a bound that is rounding.
     const ROUNDING: f64 = 1e-9;
     let bound = CauchySchwarz::of(body.invariants());
     let c1 = body.invariants().c1();
     let of_mode = |k: usize| (0..3).map(|a| c1[(a, k)].abs()).fold(0.0, f64::max) / bound.c1(k);
     let share = (0..body.n_modes()).map(of_mode).fold(0.0, f64::max);
-    (share > ROUNDING).then(|| {
+    Holding::held_but_for((share > ROUNDING).then(|| {
         format!(
             "the Coriolis force 2 omega x C1 qd on the frame: C1 is up to {share:.1e} of its Cauchy-Schwarz \
              bound, EMBSlib leaves the force out"
         )
-    })
+    }))
 }
 
 /// True if frames have the numbers 1, 2, ... in place of those of nodes and reference points.

@@ -1,6 +1,6 @@
 //! Elements of an archive of Ansys, to draw the part by: what cannot be read is left out and told.
 
-use super::{field, widths};
+use super::{nth_field, widths};
 use flexbody_base::text::table::integer;
 use flexbody_model::{ElementShape, Elements};
 use std::collections::HashMap;
@@ -8,6 +8,23 @@ use std::collections::HashMap;
 /// Element types by their local numbers, as `ET,1,186` gives them.
 #[derive(Debug, Default)]
 pub(super) struct Types(HashMap<i64, i64>);
+
+/// Element types by what they look like.
+const SOLIDS: &[i64] = &[
+    5, 45, 46, 62, 64, 65, 72, 73, 92, 95, 96, 98, 147, 148, 164, 168, 185, 186, 187, 190, 191, 226, 227, 285,
+];
+/// See [`SOLIDS`].
+const SHELLS: &[i64] =
+    &[2, 28, 41, 42, 43, 63, 82, 91, 93, 99, 143, 145, 146, 150, 162, 163, 181, 182, 183, 281];
+/// See [`SOLIDS`].
+const BEAMS: &[i64] = &[1, 3, 4, 8, 10, 16, 23, 24, 44, 54, 59, 161, 180, 188, 288];
+/// See [`SOLIDS`].
+const LONG_BEAMS: &[i64] = &[189, 289];
+/// See [`SOLIDS`].
+const NOT_DRAWN: &[i64] = &[
+    14, 21, 27, 39, 40, 50, 151, 152, 153, 154, 156, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179,
+    184,
+];
 
 /// What elements of a type look like.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,50 +58,15 @@ impl Types {
         let Some(&kind) = self.0.get(&number) else {
             return (format!("type number {number}"), Look::Unknown);
         };
-        let look = match kind {
-            5
-            | 45
-            | 46
-            | 62
-            | 64
-            | 65
-            | 72
-            | 73
-            | 92
-            | 95
-            | 96
-            | 98
-            | 147
-            | 148
-            | 164
-            | 168
-            | 185..=187
-            | 190
-            | 191
-            | 226
-            | 227
-            | 285 => Look::Solid,
-            2
-            | 28
-            | 41..=43
-            | 63
-            | 82
-            | 91
-            | 93
-            | 99
-            | 143
-            | 145
-            | 146
-            | 150
-            | 162
-            | 163
-            | 181..=183
-            | 281 => Look::Shell,
-            1 | 3 | 4 | 8 | 10 | 16 | 23 | 24 | 44 | 54 | 59 | 161 | 180 | 188 | 288 => Look::Beam,
-            189 | 289 => Look::LongBeam,
-            14 | 21 | 27 | 39 | 40 | 50 | 151..=154 | 156 | 169..=179 | 184 => Look::Nothing,
-            _ => Look::Unknown,
-        };
+        let looks = [
+            (SOLIDS, Look::Solid),
+            (SHELLS, Look::Shell),
+            (BEAMS, Look::Beam),
+            (LONG_BEAMS, Look::LongBeam),
+            (NOT_DRAWN, Look::Nothing),
+        ];
+        let look =
+            looks.iter().find(|(kinds, _)| kinds.contains(&kind)).map_or(Look::Unknown, |(_, look)| *look);
         (format!("element type {kind}"), look)
     }
 }
@@ -126,7 +108,7 @@ struct Element {
 
 /// The element that begins with the first of some lines.
 fn element(text: &[&[u8]], width: usize) -> Option<Element> {
-    let number = |line: &[u8], k: usize| integer(field(line, 0, k, width));
+    let number = |line: &[u8], k: usize| integer(nth_field(line, k, width));
     let first = *text.first()?;
     let count = usize::try_from(number(first, 8)?).ok().filter(|count| (1..=100).contains(count))?;
     let type_number = number(first, 1)?;
@@ -141,7 +123,7 @@ fn element(text: &[&[u8]], width: usize) -> Option<Element> {
                 k += 1;
             }
             // The nodes go on in the next line.
-            None if k > 0 && field(line, 0, k, width).is_empty() => {
+            None if k > 0 && nth_field(line, k, width).is_empty() => {
                 lines += 1;
                 k = 0;
             }
