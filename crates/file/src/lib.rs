@@ -1,5 +1,4 @@
-//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; the checkpoint of a
-//! search; the file of a simulation.
+//! The flex-body file: HDF5, one table for writer, reader, validator and documentation; and the file of a motion.
 
 #![deny(
     clippy::exit,
