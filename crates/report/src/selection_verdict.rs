@@ -11,7 +11,7 @@ use serde::Serialize;
 /// The five lines.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SelectionVerdict {
-    /// Whether what was asked for is reached.
+    /// True if the requirements are met.
     pub holds: bool,
     pub asked: String,
     pub take: String,
@@ -32,7 +32,7 @@ impl SelectionVerdict {
         }
     }
 
-    /// With their labels.
+    /// The lines with their labels.
     pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
         let take = if self.holds { "Take" } else { "Best found" };
         let lines = [&self.asked, &self.take, &self.why, &self.error, &self.saves].map(String::as_str);
@@ -41,7 +41,7 @@ impl SelectionVerdict {
     }
 }
 
-/// What a group of terms stands for.
+/// Meaning of a group of terms.
 fn meaning(group: TermGroup) -> &'static str {
     match group {
         TermGroup::W1 => "centrifugal load, and inertia that follows the deflection",

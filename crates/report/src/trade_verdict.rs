@@ -2,7 +2,7 @@
 
 use super::errors_in_words::errors_in_words;
 use super::lacks::LackFacts;
-use super::numbers::{duration, plain, significant};
+use super::numbers::{duration, significant};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
@@ -92,7 +92,7 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
 /// ` in case braking`, of several load cases.
 fn in_case(trade: &Trade, measured: &Measured) -> String {
     let name = trade.cases[measured.case].name.as_ref();
-    name.map_or_else(String::new, |name| format!(" in case {}", plain(name)))
+    name.map_or_else(String::new, |name| format!(" in case {name}"))
 }
 
 fn error(trade: &Trade, measured: &Measured, lacking: Option<&ReferenceError>) -> String {

@@ -167,7 +167,7 @@ fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
     path
 }
 
-/// How bright a triangle is, by its angle to the light.
+/// Brightness of a triangle, by its angle to the light.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 to 1 before
 fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
