@@ -199,7 +199,24 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::document::Inline;
     use super::*;
+
+    #[test]
+    fn columns_are_as_wide_as_their_cells() {
+        let row = |cells: [&str; 3]| cells.map(Inline::from).to_vec();
+        let rows = vec![row(["a", "1", ""]), row(["longer", "10", "remark"])];
+        let table = Table::new("", ["Name", "Value", "Remark"], &[0], rows).in_text(|head| head != "Remark");
+        let text = render(&[Block::Table(Table { below: Some(2), ..table })], Screen::default());
+        assert_eq!(text, "Name    Value\na           1\nlonger     10\n    remark\n");
+    }
+
+    #[test]
+    fn a_label_stands_once_before_the_terms_that_have_it() {
+        let terms = [("a", "1"), ("a", "2"), ("b", "3")].map(|(label, value)| Term::text(label, value));
+        let text = render(&[Block::Terms(terms.into())], Screen::default());
+        assert_eq!(text, "a           1\n            2\nb           3\n");
+    }
 
     #[test]
     fn words_wrap_and_long_words_break() {

@@ -111,6 +111,7 @@ impl Axis {
     }
 
     /// First and last value.
+    #[cfg(feature = "hdf5")]
     pub(crate) fn ends(&self) -> [f64; 2] {
         self.ends
     }

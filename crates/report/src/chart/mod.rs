@@ -62,7 +62,8 @@ impl Series {
     }
 }
 
-/// Drawing of the points of a series.
+/// Drawing of the points of a series; trade studies, which need HDF5, have most of them.
+#[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Mark {
     /// A line through the points.
