@@ -34,8 +34,7 @@ pub(super) fn lumped<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
         blocks.push(heading("Modes from the lumped masses too"));
         blocks.push(Block::Table(lumped_modes(own_modes)));
         let cautions = own_modes.iter().filter(|own| !own.caution.is_empty());
-        blocks
-            .extend(cautions.map(|own| Block::Paragraph(format!("{}: {}", own.scheme, own.caution).into())));
+        blocks.extend(cautions.map(|own| Block::Paragraph(format!("{}: {}", own.scheme, own.caution))));
         let longest = own_modes.iter().map(|own| own.scheme.chars().count()).max();
         let column = longest.unwrap_or(0).min(LONGEST_SCHEME);
         blocks.push(Block::Terms(listed("own modes", own_modes, |own| {

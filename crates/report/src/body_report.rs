@@ -51,7 +51,7 @@ fn verdict<'a>(facts: &Facts<'_>) -> Block<'a> {
         sentence(&completeness.sentence),
         free.unwrap_or_default()
     );
-    Block::Verdict(state, completeness.head.to_owned(), rest)
+    Block::Verdict { state, head: completeness.head.to_owned(), rest }
 }
 
 /// Properties of the undeformed body.
@@ -199,7 +199,7 @@ fn origin<'a>(facts: &Facts<'_>) -> Vec<Block<'a>> {
     let model = &facts.model;
     let files = counted(model.files.len(), "input file");
     let sentence = format!("{} with {files} and these settings gives the same numbers.", facts.generator);
-    let mut blocks = vec![heading("How to reproduce"), Block::Paragraph(sentence.into())];
+    let mut blocks = vec![heading("How to reproduce"), Block::Paragraph(sentence)];
     if !model.files.is_empty() {
         let row = |file: &flexbody_base::provenance::SourceFile| {
             vec![file.role.as_str().into(), file.name.as_str().into(), Span::Code(file.sha256.clone()).into()]

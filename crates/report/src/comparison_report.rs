@@ -87,10 +87,8 @@ impl ComparisonReport<'_> {
         let state = if self.comparison.passed() { State::Good } else { State::Open };
         let row = |row: &ComparisonRow| {
             let [difference, tolerance] = numbers(row);
-            let outcome = match row.passed {
-                true => Span::Plain("agrees".to_owned()),
-                false => Span::Error("DIFFERS".to_owned()),
-            };
+            let outcome =
+                if row.passed { Span::Plain("agrees".to_owned()) } else { Span::Error("DIFFERS".to_owned()) };
             let mut cells = cells([row.quantity.to_owned(), difference, tolerance]);
             cells.extend([outcome.into(), row.meaning.into()]);
             cells
@@ -100,14 +98,13 @@ impl ComparisonReport<'_> {
         let table = Table::new("Largest differences, without units", heads, &[0, 3, 4], rows);
         let compared = vec![Term::page("reference", self.a), Term::page("compared with it", self.b)];
         let mut blocks = vec![
-            Block::Verdict(state, self.verdict(), String::new()),
+            Block::Verdict { state, head: self.verdict(), rest: String::new() },
             Block::Terms(compared),
             heading("Differences"),
             Block::Table(table.in_text(|head| head != "Relative to")),
             heading("Notes"),
         ];
-        let paragraph = |note: String| Block::Paragraph(note.into());
-        blocks.extend(self.comparison.remarks().into_iter().map(paragraph));
+        blocks.extend(self.comparison.remarks().into_iter().map(Block::Paragraph));
         blocks.extend(self.comparison.notes().iter().map(|note| Block::Line(format!("note: {note}"))));
         let left_out = self.comparison.not_compared().iter();
         blocks.extend(left_out.map(|entry| Block::Line(format!("not compared: {entry}"))));

@@ -36,8 +36,12 @@ impl<'a> Document<'a> {
 pub(crate) enum Block<'a> {
     /// Heading of a section of a page.
     Heading(Inline),
-    /// The verdict of a page, its first words emphasised. A text has it among its terms.
-    Verdict(State, String, String),
+    /// The verdict of a page, its first words emphasised. A text has the verdict among its terms.
+    Verdict {
+        state: State,
+        head: String,
+        rest: String,
+    },
     /// Names with their values.
     Terms(Vec<Term>),
     Table(Table),
@@ -48,7 +52,7 @@ pub(crate) enum Block<'a> {
     /// An empty line between two groups of a text.
     Gap,
     /// A paragraph of a page.
-    Paragraph(Inline),
+    Paragraph(String),
     /// A paragraph of a page in the colour of what matters less.
     Quiet(String),
     /// A limit of the use of a body, on a page.

@@ -372,9 +372,10 @@ impl ModelFacts {
 impl ModeFacts {
     /// The residual of a mode; a static shape is no eigenvector and has none.
     pub(crate) fn residual_in_words(&self, j: usize) -> String {
-        match self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
-            true => "static shape".to_owned(),
-            false => significant(self.residual[j], 2),
+        if self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
+            "static shape".to_owned()
+        } else {
+            significant(self.residual[j], 2)
         }
     }
 

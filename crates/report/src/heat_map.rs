@@ -31,7 +31,7 @@ pub(super) fn heat_maps<'a>(body: &FlexBody) -> Vec<Block<'a>> {
         "Each cell is the size of an entry relative to the largest that it could have, on a logarithmic scale: the strongest colour stands for 1, and each of the {STEPS} steps down for a factor of {factor}. Empty cells are smaller than 1e-{DECADES}. Pointing at a cell shows its value.{some}"
     );
     let maps = maps(&body.invariants().with_modes(&modes)).map(Map::drawn).into();
-    vec![heading("How the modes act on the inertia"), Block::Paragraph(reading.into()), Block::Maps(maps)]
+    vec![heading("How the modes act on the inertia"), Block::Paragraph(reading), Block::Maps(maps)]
 }
 
 /// One map: a value for each row and each mode.

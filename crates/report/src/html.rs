@@ -55,9 +55,10 @@ pub(super) fn render(document: &Document<'_>) -> String {
     let mut page = Page::default();
     let content = page.blocks(&document.blocks);
     // A page may run what it brings, and load nothing.
-    let policy = match page.scripts.is_empty() {
-        true => "default-src 'none'; style-src 'unsafe-inline'",
-        false => "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'",
+    let policy = if page.scripts.is_empty() {
+        "default-src 'none'; style-src 'unsafe-inline'"
+    } else {
+        "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     };
     let name = Plain(document.name);
     let page = html! {
@@ -97,11 +98,11 @@ impl Page {
             @match block {
                 Block::Line(_) | Block::Gap => {},
                 Block::Heading(title) => { h2 { (title) } "\n" },
-                Block::Verdict(state, head, rest) => (verdict(*state, head, rest)),
+                Block::Verdict { state, head, rest } => (verdict(*state, head, rest)),
                 Block::Terms(items) => (terms(items)),
                 Block::Table(own) => (table(own)),
                 Block::Diagnostics(found) => { h2 { "Diagnostics" } (diagnostics(found)) },
-                Block::Paragraph(text) => p { (text) },
+                Block::Paragraph(text) => p { (Plain(text)) },
                 Block::Quiet(text) => p class="quiet" { (Plain(text)) },
                 Block::Caution(text) => p class="mind" { (Plain(text)) },
                 Block::List(items) => ul { @for item in items { li { (item) } } },

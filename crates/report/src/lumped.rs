@@ -118,9 +118,10 @@ impl LumpedFacts {
     pub(crate) fn in_words(&self, explained: bool) -> String {
         let norms = &self.errors.worst_by_invariant;
         let norms: Vec<(&str, f64)> = norms.iter().map(|n| (n.invariant.as_str(), n.value)).collect();
-        match norms.is_empty() && self.negative_masses == 0 {
-            true => "not compared".to_owned(),
-            false => in_words(self.negative_masses, &self.effect, &norms, explained),
+        if norms.is_empty() && self.negative_masses == 0 {
+            "not compared".to_owned()
+        } else {
+            in_words(self.negative_masses, &self.effect, &norms, explained)
         }
     }
 }

@@ -231,11 +231,10 @@ impl<'a> ResponseFacts<'a> {
             ("Band", format!("{low} to {high} Hz, {} frequencies", self.frequencies_hz.len())),
             ("Modes", self.modes_in_words()),
         ];
-        let damping = match self.damped {
-            true => "that of the modes, in the model the same: D = M Psi C Psi'M",
-            false => {
-                "none: peaks have no height, and errors near them say little; --damping gives the modes some"
-            }
+        let damping = if self.damped {
+            "that of the modes, in the model the same: D = M Psi C Psi'M"
+        } else {
+            "none: peaks have no height, and errors near them say little; --damping gives the modes some"
         };
         entries.push(("Damping", damping.to_owned()));
         entries.push(("All nodes", self.solved_in_words()));
@@ -276,7 +275,7 @@ impl<'a> ResponseFacts<'a> {
         let head = [Term::text("Response", self.body), Term::text("Verdict", self.verdict.as_str())];
         let entries = self.entries().into_iter().map(|(label, words)| Term::new(label, words));
         let mut blocks = vec![
-            Block::Verdict(state, format!("{}.", self.verdict), String::new()),
+            Block::Verdict { state, head: format!("{}.", self.verdict), rest: String::new() },
             heading("What is compared"),
             Block::Terms(head.into_iter().chain(entries).collect()),
         ];
@@ -288,7 +287,7 @@ impl<'a> ResponseFacts<'a> {
             let all = self.pairs.len();
             let some =
                 format!("The first {PLOTTED_PAIRS} of {all} pairs of places; the table of --csv has all.");
-            blocks.push(Block::Paragraph(some.into()));
+            blocks.push(Block::Paragraph(some));
         }
         blocks.extend(self.pairs.iter().take(PLOTTED_PAIRS).flat_map(|pair| self.plots(pair)));
         blocks.push(Block::Diagnostics(self.diagnostics));
@@ -427,11 +426,10 @@ fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool
             let ends =
                 pairs.iter().filter_map(|pair| pair.errors.as_ref()).map(|e| e.accurate_to_hz.unwrap_or(0.0));
             let accurate_to = ends.fold(f64::INFINITY, f64::min);
-            let until = match accurate_to > 0.0 {
-                true => {
-                    format!("it is accurate to {tolerance} up to {} Hz only", significant(accurate_to, 4))
-                }
-                false => format!("it is nowhere accurate to {tolerance}"),
+            let until = if accurate_to > 0.0 {
+                format!("it is accurate to {tolerance} up to {} Hz only", significant(accurate_to, 4))
+            } else {
+                format!("it is nowhere accurate to {tolerance}")
             };
             format!(
                 "The reduced body does not answer as all nodes do: {until}, and off by {} at {} Hz{}, {}",

@@ -272,7 +272,7 @@ impl<'a> SelectionFacts<'a> {
         let [_, (label, taken), ..] = self.verdict.lines();
         let state = if self.verdict.holds { State::Good } else { State::Open };
         let mut blocks = vec![
-            Block::Verdict(state, format!("{label} {taken}."), String::new()),
+            Block::Verdict { state, head: format!("{label} {taken}."), rest: String::new() },
             Block::Terms(self.head()),
             Block::Gap,
             Block::Line("Details".to_owned()),
@@ -316,9 +316,10 @@ impl<'a> SelectionFacts<'a> {
         let modes = &self.modes;
         terms.push(Term::new("Modes", format!("{} of {}: {}", modes.kept.len(), modes.of, modes.reason)));
         let kept = ranges(&modes.kept);
-        terms.push(match modes.kept.len() < modes.of {
-            true => Term::new("Kept", kept.as_str()).in_text("", format!("kept: {kept}")),
-            false => Term::page("Kept", kept),
+        terms.push(if modes.kept.len() < modes.of {
+            Term::new("Kept", kept.as_str()).in_text("", format!("kept: {kept}"))
+        } else {
+            Term::page("Kept", kept)
         });
         if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
             terms.push(Term::new(

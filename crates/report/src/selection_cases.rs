@@ -57,9 +57,10 @@ impl<'a> CaseFacts<'a> {
 
     /// `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
     pub(crate) fn in_words(&self) -> String {
-        let binds = match self.binds.is_empty() {
-            true => "decides nothing".to_owned(),
-            false => format!("decides {}", self.binds_in_words()),
+        let binds = if self.binds.is_empty() {
+            "decides nothing".to_owned()
+        } else {
+            format!("decides {}", self.binds_in_words())
         };
         match &self.errors {
             Some(errors) => {

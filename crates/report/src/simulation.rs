@@ -269,7 +269,7 @@ impl<'a> SimulationFacts<'a> {
         terms.extend(self.motion());
         terms.push(Term::text("Time", times(self.wall_seconds, self.cpu_seconds)));
         let mut blocks = vec![
-            Block::Verdict(State::Good, head, method + "."),
+            Block::Verdict { state: State::Good, head, rest: method + "." },
             heading("Motion"),
             Block::Terms(terms),
             heading("Plots"),
@@ -317,43 +317,39 @@ impl<'a> SimulationFacts<'a> {
 
     fn plots(&self) -> Vec<Chart> {
         let Recording { time, states, balances, paths, reactions, .. } = self.recording;
-        let along = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
+        let (units, mut charts) = (&self.units, Vec::new());
+        let mut plot = |title: &str, unit: String, lines: Vec<Line>| {
+            charts.extend(line_chart(title, time, &units.time(), lines, &unit));
+        };
+        let along = |name: &str, value: &dyn Fn(&Balance) -> f64| Line {
+            name: name.to_owned(),
+            values: balances.iter().map(value).collect(),
+        };
+        let internal = vec![
+            along("kinetic, no flight", &|b| b.kinetic - b.flight),
+            along("elastic", &|b| b.elastic),
+            along("work", &|b| b.work),
+        ];
+        plot("Energy", units.energy(), internal);
         let first = balances.first().map_or(0.0, |b| b.kinetic + b.elastic);
-        let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
-        let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
-        let (energy, modal) =
-            (self.units.energy(), format!("{}^(1/2) {}", self.units.mass(), self.units.length()));
-        let internal = [
-            ("kinetic, no flight", along(|b| b.kinetic - b.flight)),
-            ("elastic", along(|b| b.elastic)),
-            ("work", along(|b| b.work)),
-        ];
-        let internal = internal.map(|(name, values)| (name.to_owned(), values)).into();
-        let mut all = vec![
-            ("Energy".to_owned(), energy.clone(), internal),
-            ("Drift of the energy".to_owned(), energy, vec![("less work".to_owned(), lost)]),
-            (
-                "Angular velocity, axes of the model".to_owned(),
-                format!("rad/{}", self.units.time()),
-                components(&omega),
-            ),
-            ("Modal coordinates that move most".to_owned(), modal, self.largest_coordinates()),
-        ];
+        let lost = along("less work", &|b| b.kinetic + b.elastic - first - b.work);
+        plot("Drift of the energy", units.energy(), vec![lost]);
+        let omega = components(states.iter().map(|state| state.omega));
+        plot("Angular velocity, axes of the model", format!("rad/{}", units.time()), omega);
+        let modal = format!("{}^(1/2) {}", units.mass(), units.length());
+        plot("Modal coordinates that move most", modal, self.largest_coordinates());
         for path in paths {
+            let (deflection, acceleration) = (path.deflection.iter(), path.acceleration.iter());
             let title = format!("Deflection of {}, axes of the model", path.name);
-            all.push((title, self.units.length(), components(&path.deflection)));
+            plot(&title, units.length(), components(deflection.copied()));
             let title = format!("Acceleration of {}, world axes", path.name);
-            all.push((title, self.units.acceleration(), components(&path.acceleration)));
+            plot(&title, units.acceleration(), components(acceleration.copied()));
         }
         if let Some(reactions) = reactions {
-            let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
-            let title = "Torque of the prescribed motion, axes of the model".to_owned();
-            all.push((title, self.units.torque(), components(&torques)));
+            let torques = components(reactions.iter().map(|(_, torque)| *torque));
+            plot("Torque of the prescribed motion, axes of the model", units.torque(), torques);
         }
-        let drawn = |(title, unit, lines): (String, String, Vec<Line>)| {
-            line_chart(title, time, &self.units.time(), lines, &unit)
-        };
-        all.into_iter().filter_map(drawn).collect()
+        charts
     }
 
     /// The modal coordinates with the largest amplitudes.
@@ -363,32 +359,39 @@ impl<'a> SimulationFacts<'a> {
         let peak = |j: usize| states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
         let mut modes: Vec<(usize, f64)> = (0..nf).map(|j| (j, peak(j))).collect();
         modes.sort_by(|a, b| b.1.total_cmp(&a.1));
-        let line = |&(j, _): &(usize, f64)| {
-            (format!("mode {}", j + 1), states.iter().map(|state| state.q[j]).collect())
+        let line = |&(j, _): &(usize, f64)| Line {
+            name: format!("mode {}", j + 1),
+            values: states.iter().map(|state| state.q[j]).collect(),
         };
         modes.iter().take(STYLES).map(line).collect()
     }
 }
 
-/// Name and values of a line of a chart.
-type Line = (String, Vec<f64>);
+/// Line of a chart over time.
+struct Line {
+    name: String,
+    values: Vec<f64>,
+}
 
-fn components(vectors: &[Vector3<f64>]) -> Vec<Line> {
-    let line = |(k, name): (usize, &str)| (name.to_owned(), vectors.iter().map(|v| v[k]).collect());
+fn components(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> Vec<Line> {
+    let line = |(k, name): (usize, &str)| Line {
+        name: name.to_owned(),
+        values: vectors.clone().map(|vector| vector[k]).collect(),
+    };
     ["x", "y", "z"].into_iter().enumerate().map(line).collect()
 }
 
 /// Lines over time; `None` if there is nothing to draw.
-fn line_chart(title: String, time: &[f64], time_unit: &str, lines: Vec<Line>, unit: &str) -> Option<Chart> {
+fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit: &str) -> Option<Chart> {
     let x = Axis::between(time_unit, Scale::Linear, [*time.first()?, *time.last()?])?;
-    let y = Axis::around(unit, lines.iter().flat_map(|(_, values)| values.iter().copied()))?;
-    let series = |(style, (name, values)): (usize, &Line)| {
-        let points = time.iter().zip(values).map(|(&t, &value)| [t, value]).collect();
-        Series::new(name, Mark::Line, style, points)
+    let y = Axis::around(unit, lines.iter().flat_map(|line| line.values.iter().copied()))?;
+    let series = |(style, line): (usize, &Line)| {
+        let points = time.iter().zip(&line.values).map(|(&t, &value)| [t, value]).collect();
+        Series::new(&line.name, Mark::Line, style, points)
     };
     let series = lines.iter().enumerate().map(series).collect();
     let panel = Panel { caption: String::new(), y, height: 170.0, series };
-    Some(Chart { title, x, panels: vec![panel] })
+    Some(Chart { title: title.to_owned(), x, panels: vec![panel] })
 }
 
 /// A recording as a table of comma-separated values, a row for every instant; numbers round-trip.

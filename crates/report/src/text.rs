@@ -121,9 +121,10 @@ impl Text {
     }
 
     fn painted(&mut self, code: &str, text: &str) {
-        match self.screen.is_coloured && !code.is_empty() && !text.trim().is_empty() {
-            true => self.text.push_str(&format!("\u{1b}[{code}m{text}\u{1b}[0m")),
-            false => self.text.push_str(text),
+        if self.screen.is_coloured && !code.is_empty() && !text.trim().is_empty() {
+            self.text.push_str(&format!("\u{1b}[{code}m{text}\u{1b}[0m"))
+        } else {
+            self.text.push_str(text)
         }
     }
 

@@ -306,7 +306,7 @@ impl<'a> TradeFacts<'a> {
         }));
         let state = if self.recommended.is_some() { State::Good } else { State::Open };
         let taken = self.verdict.get(1).map(|line| format!("{}: {}.", line.label, line.text));
-        let head = taken.map(|taken| Block::Verdict(state, taken, String::new()));
+        let head = taken.map(|head| Block::Verdict { state, head, rest: String::new() });
         head.into_iter().chain([Block::Terms(terms)]).collect()
     }
 

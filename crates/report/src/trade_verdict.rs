@@ -78,9 +78,10 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     let (output, error, allowed) = own.deciding().errors.decisive(&case.tolerance);
     let part = error / allowed;
     let times = significant(part, 2);
-    let reference = match part <= 1.0 && case.reserved > 0.0 {
-        true => format!(", beside the {} that the reference itself lacks", significant(case.reserved, 2)),
-        false => String::new(),
+    let reference = if part <= 1.0 && case.reserved > 0.0 {
+        format!(", beside the {} that the reference itself lacks", significant(case.reserved, 2))
+    } else {
+        String::new()
     };
     format!(
         "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed{}{reference}",

@@ -114,9 +114,10 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
 fn mode(body: &FlexBody, drawing: &Drawing<'_>, j: usize) -> ShownMode {
     let hertz = significant(body.frequencies_hz()[j], 5);
     let origin = body.modes().provenance.get(j).map_or("mode", String::as_str);
-    let (label, kind) = match is_static(origin) {
-        true => (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz")),
-        false => (format!("{}: {hertz} Hz", j + 1), origin.to_owned()),
+    let (label, kind) = if is_static(origin) {
+        (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz"))
+    } else {
+        (format!("{}: {hertz} Hz", j + 1), origin.to_owned())
     };
     ShownMode {
         label: plain(&label),
