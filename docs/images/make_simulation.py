@@ -15,7 +15,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 FOLDER = ROOT / "target/simulation"
 TITLES = ("Angular velocity", "Deflection")
-WIDTH, HEIGHT, CAPTION = 840, 216, 24  # pixels of a plot of the report, and of the line above it
+WIDTH, HEIGHT, CAPTION = 840, 246, 24  # pixels of a plot of the report, and of the line above it
 STYLE = (
     "text { font: 12px system-ui, sans-serif; fill: #1a1d21; } .tick { fill: #5a6370; } .grid { stroke: #d5dae1; } "
     "polyline { fill: none; stroke-width: 1.4; } .l0 { stroke: #1f5fa8; } .l1 { stroke: #b4560d; stroke-dasharray: 7 3; } "

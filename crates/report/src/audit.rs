@@ -1,6 +1,9 @@
 //! An audit as text and as JSON.
 
+use super::document::Block;
+use super::identities::{check_row, check_table};
 use super::numbers::significant;
+use super::text::{self, Screen};
 use flexbody_base::provenance::generator;
 use flexbody_formats::import::{Audit, AuditCheck};
 use serde_json::{Value, json};
@@ -11,36 +14,33 @@ const VERSION: (u32, u32) = (1, 0);
 /// Frequencies that are printed.
 const FREQUENCIES: usize = 6;
 
-/// What was read, every check, and the findings in plain words.
+/// Writes a summary of the file, every check, and the findings in plain words.
 pub fn audit_text(file: &str, audit: &Audit) -> String {
     let Audit { format, dialect, name, mass, n_modes, n_frames, .. } = audit;
     let dialect = if dialect.is_empty() { String::new() } else { format!(", dialect {dialect}") };
     let called = if name.is_empty() { String::new() } else { format!(" `{name}`") };
-    let mut text = format!(
-        "{file}: {format}{dialect}\nbody{called}: mass {}, {n_modes} modes, {n_frames} nodes or frames\n",
-        significant(*mass, 6)
-    );
     let told = audit.frequencies.iter().take(FREQUENCIES).map(|f| significant(*f, 5)).collect::<Vec<_>>();
     let more = if audit.frequencies.len() > FREQUENCIES { ", ..." } else { "" };
-    text.push_str(&format!("frequencies {}{more} cycles per time unit of the file\n", told.join(", ")));
-    for note in &audit.notes {
-        text.push_str(&format!("note: {note}\n"));
-    }
-    text.push_str(&format!("\n{:30} {:>10} {:>10}  what must hold\n", "check", "value", "limit"));
-    for check in &audit.checks {
-        let (value, limit) = (significant(check.value, 2), significant(check.limit, 2));
-        let mark = if check.passed() { "" } else { "  FAILED" };
-        text.push_str(&format!("{:30} {value:>10} {limit:>10}  {}{mark}\n", check.name, check.formula));
-    }
+    let mut lines = vec![
+        format!("{file}: {format}{dialect}"),
+        format!("body{called}: mass {}, {n_modes} modes, {n_frames} nodes or frames", significant(*mass, 6)),
+        format!("frequencies {}{more} cycles per time unit of the file", told.join(", ")),
+    ];
+    lines.extend(audit.notes.iter().map(|note| format!("note: {note}")));
+    let rows = audit.checks.iter().map(|c| check_row(c.name, [c.value, c.limit], c.formula, c.passed()));
     let findings = audit.findings();
-    text.push_str(&match (findings.len(), audit.checks.len()) {
-        (0, all) => format!("\nall {all} checks passed\n"),
-        (failed, all) => format!("\n{failed} of {all} checks FAILED\n"),
-    });
+    let end = match (findings.len(), audit.checks.len()) {
+        (0, all) => format!("all {all} checks passed"),
+        (failed, all) => format!("{failed} of {all} checks FAILED"),
+    };
+    let mut blocks: Vec<Block<'_>> = lines.into_iter().map(Block::Line).collect();
+    blocks.extend([Block::Gap, Block::Table(check_table("check", rows.collect()))]);
+    blocks.extend([Block::Gap, Block::Line(end)]);
     for finding in findings {
-        text.push_str(&format!("\n{finding}\n"));
+        blocks.push(Block::Gap);
+        blocks.extend(finding.to_string().lines().map(|line| Block::Line(line.to_owned())));
     }
-    text
+    text::render(&blocks, Screen::default())
 }
 
 /// The contract `schemas/audit.schema.json`.

@@ -1,12 +1,11 @@
 //! All bodies of a batch in one report: text, JSON and HTML.
 
-use super::markup::{escape, page, section, table};
+use super::document::{Block, Document, Inline, Table, cells, heading};
 use super::numbers::significant;
-use super::render::{Format, json};
+use super::render::Format;
 use flexbody_base::provenance::generator;
 use serde::Serialize;
 use serde_json::Value;
-use std::fmt::Write;
 
 /// One body of a batch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -38,7 +37,7 @@ pub struct BatchRow {
 }
 
 impl BatchRow {
-    /// What the JSON of a conversion says of its body.
+    /// Takes the row from the JSON that a conversion printed.
     pub fn read(&mut self, told: &Value) {
         let results = &told["results"];
         let frequencies: Vec<f64> = results["modes"]["frequency_hz"]
@@ -77,7 +76,7 @@ pub struct BatchFacts {
 }
 
 impl BatchFacts {
-    /// Of the bodies of a list, in its order.
+    /// Facts of the bodies of a list, in its order.
     pub fn new(list: String, memory_bytes: u64, parallel: usize, bodies: Vec<BatchRow>) -> Self {
         let failed = bodies.iter().filter(|row| row.state == "failed").count();
         let (format, generator) = ("flexbody-batch", generator());
@@ -94,65 +93,25 @@ impl BatchFacts {
         }
     }
 
-    /// How many bodies failed.
+    /// Number of bodies that failed.
     pub fn failed(&self) -> usize {
         self.failed
     }
 
-    /// In a format.
+    /// Renders the facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
-        match format {
-            Format::Json => json(self),
-            Format::Text => self.text(),
-            Format::Html => self.html(),
-        }
+        Document::render(self, format, || self.document())
     }
 
-    fn cells(row: &BatchRow) -> [String; 8] {
-        let number = |n: Option<u64>| n.map_or_else(|| "-".to_owned(), |n| n.to_string());
-        let gigabytes =
-            |bytes: Option<u64>| bytes.map_or("-".to_owned(), |b| format!("{:.2}", b as f64 * 1e-9));
-        let hertz = row.frequencies_hz.map_or_else(
-            || "-".to_owned(),
-            |[first, last]| format!("{} to {}", significant(first, 5), significant(last, 5)),
-        );
-        [
-            row.output.clone(),
-            row.state.to_owned(),
-            number(row.n_dofs),
-            number(row.modes),
-            hertz,
-            format!("{:.1}", row.seconds),
-            gigabytes(Some(row.memory_estimate_bytes)),
-            gigabytes(row.peak_memory_bytes),
-        ]
-    }
-
-    fn text(&self) -> String {
-        let mut text = format!(
-            "{:32} {:9} {:>9} {:>5} {:>22} {:>8} {:>7} {:>7}\n",
-            "body", "state", "dofs", "modes", "Hz", "s", "set GB", "peak GB"
-        );
-        for row in &self.bodies {
-            let [output, state, dofs, modes, hertz, seconds, set, peak] = Self::cells(row);
-            let _ = writeln!(
-                text,
-                "{output:32} {state:9} {dofs:>9} {modes:>5} {hertz:>22} {seconds:>8} {set:>7} {peak:>7}"
-            );
-            let told = row.error.as_ref().or(row.complete.as_ref());
-            let _ = told.map(|told| writeln!(text, "    {told}"));
-        }
-        let _ = match self.failed {
-            0 => writeln!(text, "all {} bodies are there", self.bodies.len()),
-            failed => writeln!(text, "{failed} of {} bodies FAILED", self.bodies.len()),
+    fn document(&self) -> Document<'_> {
+        let all = self.bodies.len();
+        let (caption, end) = match self.failed {
+            0 => (format!("All {all} bodies are there"), format!("all {all} bodies are there")),
+            failed => {
+                (format!("{failed} of {all} bodies failed"), format!("{failed} of {all} bodies FAILED"))
+            }
         };
-        text
-    }
-
-    fn html(&self) -> String {
-        let mut html = String::new();
-        section(&mut html, "Bodies");
-        let head = [
+        let heads = [
             "Body",
             "State",
             "DOF",
@@ -163,20 +122,31 @@ impl BatchFacts {
             "GB used",
             "Modes complete, or why not there",
         ];
-        let head = head.map(str::to_owned);
-        let rows: Vec<Vec<String>> = self
-            .bodies
-            .iter()
-            .map(|row| {
-                let told = row.error.clone().or_else(|| row.complete.clone()).unwrap_or_default();
-                Self::cells(row).iter().chain([&told]).map(|cell| escape(cell)).collect()
-            })
-            .collect();
-        let caption = match self.failed {
-            0 => format!("All {} bodies are there", self.bodies.len()),
-            failed => format!("{failed} of {} bodies failed", self.bodies.len()),
-        };
-        table(&mut html, &caption, &head, &[1, 8], &rows);
-        page(&self.list, "Batch report", &self.generator, &html)
+        let rows = self.bodies.iter().map(BatchRow::cells).collect();
+        let last = heads.len() - 1;
+        let table = Table::new(caption, heads, &[0, 1, last], rows).in_text(|head| head != heads[last]);
+        let table = Table { below: Some(last), ..table };
+        let blocks = vec![heading("Bodies"), Block::Table(table), Block::Line(end)];
+        Document { name: &self.list, kind: "Batch report", generator: &self.generator, blocks }
+    }
+}
+
+impl BatchRow {
+    fn cells(&self) -> Vec<Inline> {
+        let none = || "-".to_owned();
+        let number = |n: Option<u64>| n.map_or_else(none, |n| n.to_string());
+        let gigabytes = |bytes: Option<u64>| bytes.map_or_else(none, |b| format!("{:.2}", b as f64 * 1e-9));
+        let range = |hertz: [f64; 2]| hertz.map(|hertz| significant(hertz, 5)).join(" to ");
+        cells([
+            self.output.clone(),
+            self.state.to_owned(),
+            number(self.n_dofs),
+            number(self.modes),
+            self.frequencies_hz.map_or_else(none, range),
+            format!("{:.1}", self.seconds),
+            gigabytes(Some(self.memory_estimate_bytes)),
+            gigabytes(self.peak_memory_bytes),
+            self.error.clone().or_else(|| self.complete.clone()).unwrap_or_default(),
+        ])
     }
 }

@@ -7,7 +7,7 @@ use std::ops::Range;
 /// ones would show rounding as a difference.
 const GAP: f64 = 1e-5;
 
-/// Whether the eigenvalue `i` (from 1) of `values` (ascending) is in one space with the one before it.
+/// Returns true if the eigenvalue `i` (from 1) of `values` (ascending) is in one space with the one before it.
 pub(super) fn close(values: &[f64], i: usize) -> bool {
     values[i] - values[i - 1] <= GAP * values[i]
 }

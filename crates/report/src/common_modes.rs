@@ -1,18 +1,19 @@
 //! The modes that two bodies have in common, where one has fewer than the other.
 
 use super::clusters::close;
+use super::errors_in_words::runs;
 use super::numbers::{counted, significant};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 
-/// Which modes of two bodies are compared with each other (indices from 0, ascending, the same number of
-/// both), and what is left out.
+/// Modes of two bodies that are compared with each other (indices from 0, ascending, the same number of
+/// both), and the modes that are left out.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct CommonModes {
     pub a: Vec<usize>,
     pub b: Vec<usize>,
-    /// What was compared and what was left out, in sentences.
+    /// Sentences about the modes that were compared and those that were left out.
     pub notes: Vec<String>,
 }
 
@@ -82,7 +83,7 @@ fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
     found
 }
 
-/// Whether every mode of the cluster that the mode `of` belongs to is among the `partners`.
+/// Returns true if every mode of the cluster that the mode `of` belongs to is among the `partners`.
 fn is_whole(more: &[f64], partners: &[usize], of: usize) -> bool {
     let below = (1..=of).rev().take_while(|&j| close(more, j)).count();
     let above = (of + 1..more.len()).take_while(|&j| close(more, j)).count();
@@ -94,19 +95,12 @@ fn some_of(modes: &[usize], of: usize) -> String {
     if modes.len() == of {
         return format!("all {of}");
     }
-    let mut ranges: Vec<(usize, usize)> = Vec::new();
-    for &mode in modes {
-        match ranges.last_mut() {
-            Some((_, last)) if *last + 1 == mode => *last = mode,
-            _ => ranges.push((mode, mode)),
-        }
-    }
     let range = |&(first, last): &(usize, usize)| match last - first {
         0 => (first + 1).to_string(),
         1 => format!("{}, {}", first + 1, last + 1),
         _ => format!("{} to {}", first + 1, last + 1),
     };
-    let ranges: Vec<String> = ranges.iter().map(range).collect();
+    let ranges: Vec<String> = runs(modes).iter().map(range).collect();
     format!("{} {}", if modes.len() == 1 { "mode" } else { "modes" }, ranges.join(", "))
 }
 

@@ -3,8 +3,8 @@
 
 use super::clusters::clusters;
 use super::common_modes::CommonModes;
+use super::comparison_report::{ComparisonFormat, ComparisonReport};
 use super::mass_properties::{centre_of_mass, gyration_radius, inertia_about_com};
-use super::numbers::{plain, significant};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -56,7 +56,7 @@ impl Default for Tolerances {
 pub struct ComparisonRow {
     /// Name, stable.
     pub quantity: &'static str,
-    /// What the difference is relative to.
+    /// Quantity that the difference is relative to.
     pub meaning: &'static str,
     /// Largest difference, dimensionless; 0 is equal.
     pub difference: f64,
@@ -145,7 +145,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     Ok(comparison)
 }
 
-/// The same of two bodies one of which may have fewer modes: each of its modes is compared with that of the
+/// Compares two bodies one of which may have fewer modes: each of its modes is compared with that of the
 /// other whose frequency is nearest, in ascending order. The notes say which modes were compared and which
 /// were not.
 ///
@@ -162,7 +162,7 @@ pub fn compare_common(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Re
     Ok(comparison)
 }
 
-/// Whether it is known where in the model the body frame is.
+/// Returns true if the place of the body frame in the model is known.
 fn is_placed(body: &FlexBody) -> bool {
     body.source().n_dofs > 0
 }
@@ -260,14 +260,14 @@ fn relative(difference: f64, scale: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / scale }
 }
 
-/// What shifting J by `distance` costs relative to its smallest entry: about a distant frame J is m d^2, with
+/// Rounding error of a shift of J by `distance`, relative to its smallest entry: about a distant frame J is m d^2, with
 /// the body's own moments in its last digits.
 fn lost_by_shift(mass: f64, distance: f64, smallest: f64) -> f64 {
     8.0 * f64::EPSILON * relative(mass * distance * distance, smallest)
 }
 
 impl BodyComparison {
-    /// Whether every difference is within its tolerance.
+    /// Returns true if every difference is within its tolerance.
     pub fn passed(&self) -> bool {
         self.passed
     }
@@ -277,7 +277,7 @@ impl BodyComparison {
         &self.rows
     }
 
-    /// Whether shapes and invariants were compared mode by mode: both bodies have the same node numbers.
+    /// Returns true if shapes and invariants were compared mode by mode: both bodies have the same node numbers.
     pub fn same_nodes(&self) -> bool {
         self.same_nodes
     }
@@ -299,32 +299,14 @@ impl BodyComparison {
         self.notes.iter().cloned().chain(left_out).collect()
     }
 
-    /// As JSON: `a`, `b`, `passed`, `same_nodes`, `rows`, `notes`, `not_compared`.
+    /// Returns the comparison as JSON: `a`, `b`, `passed`, `same_nodes`, `rows`, `notes`, `not_compared`.
     pub fn json(&self) -> serde_json::Value {
         serde_json::to_value(self).expect("plain data with text keys")
     }
 
-    /// As a table for a terminal.
+    /// Returns the comparison as a table for a terminal.
     pub fn text(&self) -> String {
-        let mut text = format!("{:22} {:>12} {:>12}\n", "quantity", "difference", "tolerance");
-        for row in &self.rows {
-            let mark = if row.passed { "" } else { "  DIFFERS" };
-            let (difference, tolerance) = (significant(row.difference, 3), significant(row.tolerance, 3));
-            text.push_str(&format!("{:22} {difference:>12} {tolerance:>12}{mark}\n", row.quantity));
-        }
-        for note in &self.notes {
-            text.push_str(&format!("note: {}\n", plain(note)));
-        }
-        for entry in &self.not_compared {
-            text.push_str(&format!("not compared: {entry}\n"));
-        }
-        let failed = self.rows.iter().filter(|row| !row.passed).count();
-        text.push_str(&match failed {
-            0 => "the bodies agree\n".to_owned(),
-            1 => "the bodies DIFFER in 1 quantity\n".to_owned(),
-            count => format!("the bodies DIFFER in {count} quantities\n"),
-        });
-        text
+        ComparisonReport { comparison: self, a: &self.a, b: &self.b }.render(ComparisonFormat::Text)
     }
 
     /// True if one of the bodies comes from a file of another program, which may have no place for what `has` finds,

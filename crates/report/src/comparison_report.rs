@@ -1,10 +1,13 @@
 //! The comparison of two bodies as a report: for people, for programs, and for what runs checks unattended.
 
 use super::comparison::{BodyComparison, ComparisonRow};
-use super::markup::{escape, page, section, table, terms, texts};
+use super::document::{Block, Document, Span, State, Table, Term, cells, heading};
+use super::html::{self, Plain};
 use super::numbers::{plain, significant};
 use super::render;
+use super::text::{self, Screen};
 use flexbody_base::provenance::generator;
+use maud::{PreEscaped, html};
 use std::path::Path;
 
 /// Formats of the report of a comparison.
@@ -39,11 +42,11 @@ impl ComparisonFormat {
 /// The comparison of files, which have these names.
 #[derive(Debug, Clone, Copy)]
 pub struct ComparisonReport<'a> {
-    /// What was found.
+    /// The comparison.
     pub comparison: &'a BodyComparison,
     /// File of the reference.
     pub a: &'a str,
-    /// File of what is compared with it.
+    /// File of the body that is compared with the reference.
     pub b: &'a str,
 }
 
@@ -51,9 +54,14 @@ impl ComparisonReport<'_> {
     /// Writes the report, ending with a line break.
     pub fn render(&self, format: ComparisonFormat) -> String {
         match format {
-            ComparisonFormat::Text => self.comparison.text(),
+            ComparisonFormat::Text => text::render(&self.blocks(), Screen::default()),
             ComparisonFormat::Json => render::json(self.comparison),
-            ComparisonFormat::Html => self.html(),
+            ComparisonFormat::Html => html::render(&Document {
+                name: &self.title(),
+                kind: "Comparison of two bodies",
+                generator: &generator(),
+                blocks: self.blocks(),
+            }),
             ComparisonFormat::JUnit => self.junit(),
             ComparisonFormat::Markdown => self.markdown(),
         }
@@ -63,7 +71,7 @@ impl ComparisonReport<'_> {
         format!("{} beside {}", plain(self.b), plain(self.a))
     }
 
-    /// What it comes to, in a sentence.
+    /// Result of the comparison in a sentence.
     fn verdict(&self) -> String {
         match self.failures() {
             0 => "The bodies agree.".to_owned(),
@@ -75,48 +83,66 @@ impl ComparisonReport<'_> {
         self.comparison.rows().iter().filter(|row| !row.passed).count()
     }
 
-    fn html(&self) -> String {
-        let mut content = String::new();
-        section(&mut content, "Verdict");
-        let class = if self.comparison.passed() { "quiet" } else { "error" };
-        content.push_str(&format!("<p class=\"{class}\">{}</p>\n", escape(&self.verdict())));
-        terms(&mut content, [("reference", escape(self.a)), ("compared with it", escape(self.b))]);
-        section(&mut content, "Differences");
-        let cells = |row: &ComparisonRow| {
+    fn blocks<'b>(&self) -> Vec<Block<'b>> {
+        let state = if self.comparison.passed() { State::Good } else { State::Open };
+        let row = |row: &ComparisonRow| {
             let [difference, tolerance] = numbers(row);
-            vec![row.quantity.to_owned(), difference, tolerance, outcome(row).to_owned(), escape(row.meaning)]
+            let outcome =
+                if row.passed { Span::Plain("agrees".to_owned()) } else { Span::Error("DIFFERS".to_owned()) };
+            let mut cells = cells([row.quantity.to_owned(), difference, tolerance]);
+            cells.extend([outcome.into(), row.meaning.into()]);
+            cells
         };
-        let rows: Vec<_> = self.comparison.rows().iter().map(cells).collect();
-        let head = texts(["Quantity", "Difference", "Tolerance", "", "Relative to"]);
-        table(&mut content, "Largest differences, without units", &head, &[0, 3, 4], &rows);
-        section(&mut content, "Notes");
-        for note in self.comparison.remarks() {
-            content.push_str(&format!("<p>{}</p>\n", escape(&note)));
-        }
-        page(&self.title(), "Comparison of two bodies", &generator(), &content)
+        let rows = self.comparison.rows().iter().map(row).collect();
+        let heads = ["Quantity", "Difference", "Tolerance", "", "Relative to"];
+        let table = Table::new("Largest differences, without units", heads, &[0, 3, 4], rows);
+        let compared = vec![Term::page("reference", self.a), Term::page("compared with it", self.b)];
+        let mut blocks = vec![
+            Block::Verdict { state, head: self.verdict(), rest: String::new() },
+            Block::Terms(compared),
+            heading("Differences"),
+            Block::Table(table.in_text(|head| head != "Relative to")),
+            heading("Notes"),
+        ];
+        blocks.extend(self.comparison.remarks().into_iter().map(Block::Paragraph));
+        blocks.extend(self.comparison.notes().iter().map(|note| Block::Line(format!("note: {note}"))));
+        let left_out = self.comparison.not_compared().iter();
+        blocks.extend(left_out.map(|entry| Block::Line(format!("not compared: {entry}"))));
+        blocks.push(Block::Line(match self.failures() {
+            0 => "the bodies agree".to_owned(),
+            1 => "the bodies DIFFER in 1 quantity".to_owned(),
+            count => format!("the bodies DIFFER in {count} quantities"),
+        }));
+        blocks
     }
 
     fn junit(&self) -> String {
-        let (rows, title) = (self.comparison.rows(), escape(&self.title()));
-        let counts = format!("tests=\"{}\" failures=\"{}\" errors=\"0\"", rows.len(), self.failures());
-        let mut xml = format!(
-            "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"flexbody compare\" {counts}>\n<testsuite name=\"{title}\" {counts}>\n"
-        );
-        for row in rows {
-            let name = escape(row.quantity);
-            xml.push_str(&format!("<testcase classname=\"{title}\" name=\"{name}\""));
-            if row.passed {
-                xml.push_str("/>\n");
-                continue;
-            }
+        let (rows, title) = (self.comparison.rows(), self.title());
+        let (tests, failures) = (rows.len(), self.failures());
+        let failure = |row: &ComparisonRow| {
             let [difference, tolerance] = numbers(row);
-            let message = escape(&format!("difference {difference}, tolerance {tolerance}"));
-            let meaning = escape(row.meaning);
-            xml.push_str(&format!("><failure message=\"{message}\">{meaning}</failure></testcase>\n"));
-        }
-        let notes: Vec<String> = self.comparison.remarks().iter().map(|note| escape(note)).collect();
-        xml.push_str(&format!("<system-out>{}</system-out>\n", notes.join("\n")));
-        xml + "</testsuite>\n</testsuites>\n"
+            let message = format!("difference {difference}, tolerance {tolerance}");
+            html! { failure message=(message) { (Plain(row.meaning)) } }
+        };
+        let suites = html! {
+            (PreEscaped("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"))
+            testsuites name="flexbody compare" tests=(tests) failures=(failures) errors="0" {
+                "\n"
+                testsuite name=(Plain(&title)) tests=(tests) failures=(failures) errors="0" {
+                    @for row in rows {
+                        "\n"
+                        testcase classname=(Plain(&title)) name=(row.quantity) {
+                            @if !row.passed { (failure(row)) }
+                        }
+                    }
+                    "\n"
+                    system-out { @for note in self.comparison.remarks() { (Plain(&note)) "\n" } }
+                    "\n"
+                }
+                "\n"
+            }
+        };
+        suites.into_string() + "\n"
     }
 
     fn markdown(&self) -> String {

@@ -1,4 +1,4 @@
-//! Whether the modes are all there, in one sentence that claims no more than the certificate proves.
+//! Completeness of the modes in one sentence that claims no more than the certificate proves.
 
 use super::craig_bampton;
 use super::numbers::{counted, plain, significant};
@@ -54,7 +54,7 @@ impl Completeness {
     }
 }
 
-/// How many modes of the body are static shapes.
+/// Number of modes of the body that are static shapes.
 fn static_shapes(body: &FlexBody) -> usize {
     body.modes().provenance.iter().filter(|origin| is_static(origin)).count()
 }
@@ -62,7 +62,7 @@ fn static_shapes(body: &FlexBody) -> usize {
 /// Verdict about shapes of which nothing is to be proved.
 const GIVEN: &str = "given";
 
-/// Whether another engine has counted as many modes as the body has.
+/// Returns true if another engine has counted as many modes as the body has.
 fn counted_elsewhere(body: &FlexBody) -> bool {
     let c = body.certificate();
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();

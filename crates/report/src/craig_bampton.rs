@@ -33,11 +33,11 @@ pub(super) struct CraigBamptonFacts {
     pub free_lower_hz: Vec<Option<f64>>,
     /// Parts by which the frequencies of the reduced body are too high, as estimated.
     pub too_high: Vec<f64>,
-    /// The same at most; `None`: without a bound.
+    /// Upper bounds of these parts; `None`: no bound is known.
     pub too_high_at_most: Vec<Option<f64>>,
-    /// How many of the lowest frequencies are at most 1 % too high.
+    /// Number of the lowest frequencies that are at most 1 % too high.
     pub within_one_percent: usize,
-    /// Whether that free body keeps some interfaces rigid, as the basis does.
+    /// True if that free body keeps some interfaces rigid, like the basis.
     pub rigid_interfaces: bool,
 }
 
@@ -120,7 +120,7 @@ fn fixed_interface_eigenvalues(body: &FlexBody) -> Option<Vec<f64>> {
     Some((first..coordinates.names.len()).map(|i| coordinates.stiffness[(i, i)]).collect())
 }
 
-/// What is proved of the fixed-interface modes of a body.
+/// Proof of the fixed-interface modes of a body.
 pub(super) fn judge(fixed: &FixedInterface, body: &FlexBody) -> (bool, String) {
     let hertz = |lambda: f64| significant(body.units().frequency_of(lambda.max(0.0)), 5);
     let modes = counted(fixed.modes, "fixed-interface mode");

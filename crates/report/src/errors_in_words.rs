@@ -23,20 +23,24 @@ pub(super) fn errors_to_digits(errors: &OutputErrors, digits: usize) -> String {
     errors.named().into_iter().filter_map(part).collect::<Vec<_>>().join(", ")
 }
 
+/// First and last numbers of the runs of ascending numbers.
+pub(super) fn runs(numbers: &[usize]) -> Vec<(usize, usize)> {
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+    runs.filter_map(|run| Some((*run.first()?, *run.last()?))).collect()
+}
+
 /// Ascending numbers with runs drawn together: 1-4, 7, 9-10.
 pub(super) fn ranges(numbers: &[usize]) -> String {
-    let mut runs: Vec<(usize, usize)> = Vec::new();
-    for &number in numbers {
-        match runs.last_mut() {
-            Some((_, last)) if *last + 1 == number => *last = number,
-            _ => runs.push((number, number)),
-        }
-    }
     let run = |(first, last): &(usize, usize)| match last - first {
         0 => first.to_string(),
         _ => format!("{first}-{last}"),
     };
-    runs.iter().map(run).collect::<Vec<_>>().join(", ")
+    runs(numbers).iter().map(run).collect::<Vec<_>>().join(", ")
+}
+
+/// `60 %` of a part of what is allowed.
+pub(super) fn part_in_words(part: Option<f64>) -> String {
+    part.map_or_else(|| "not known".to_owned(), |part| format!("{} %", significant(100.0 * part, 2)))
 }
 
 #[cfg(test)]

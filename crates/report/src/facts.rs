@@ -27,7 +27,7 @@ const MINOR: u32 = 6;
 /// is `null` in JSON.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Facts<'b> {
-    /// What is drawn of it is computed where a page needs it.
+    /// The body itself: its picture is computed if a page needs it.
     #[serde(skip)]
     pub(super) flex_body: &'b FlexBody,
     format: &'static str,
@@ -118,7 +118,7 @@ pub(super) struct InterfaceFacts {
     pub coupling: Option<&'static str>,
     /// Body frame; `None`: no reference point.
     pub reference: Option<[f64; 3]>,
-    /// The same point in model axes.
+    /// Reference point in model axes.
     pub reference_model: Option<[f64; 3]>,
     /// Largest deformation of the interface in a mode, relative to its largest motion in any; `None`: no
     /// reference point.
@@ -139,7 +139,7 @@ impl InterfaceFacts {
         }
     }
 
-    /// Whether it deforms although it was declared rigid.
+    /// Returns true if the interface deforms although it was declared rigid.
     pub(crate) fn breaks_its_word(&self) -> bool {
         self.coupling == Some(Coupling::Rigid.name()) && self.deformation.is_some_and(|part| part > RIGID)
     }
@@ -175,9 +175,9 @@ pub(super) struct ModeFacts {
     /// Unit: 1/time^2.
     pub eigenvalue: Vec<f64>,
     pub residual: Vec<f64>,
-    /// Where each mode comes from; empty when it is not known.
+    /// Origin of each mode; empty if it is not known.
     pub provenance: Vec<String>,
-    /// What the modes lack of static responses, for the loads of residual vectors.
+    /// Errors of the static responses of the modes, for the loads of residual vectors.
     pub truncation: Vec<Truncation>,
     pub damping_ratio: Vec<f64>,
     /// Of the modes that are to be eigenvectors: static shapes are none; of a Craig-Bampton body that of its
@@ -185,7 +185,7 @@ pub(super) struct ModeFacts {
     pub worst_residual: f64,
     /// Of a Craig-Bampton body: its coordinates, and its frequencies beside those of the free body.
     pub craig_bampton: Option<CraigBamptonFacts>,
-    /// Where damping was given.
+    /// Damping of the modes, if it was given.
     pub damping: Option<DampingFacts>,
     /// For each unit load.
     pub geometric_stiffness: Vec<GeometricStiffnessFacts>,
@@ -337,7 +337,7 @@ impl ModelFacts {
         }
     }
 
-    /// What rounding took; nothing of 64-bit floats.
+    /// Rounding of the storage; `None` for 64-bit floats.
     pub(crate) fn storage_in_words(&self) -> Option<&'static str> {
         (self.storage == Storage::F32.name())
             .then_some("shapes and inertia of the modes rounded to 32-bit floats")
@@ -359,7 +359,7 @@ impl ModelFacts {
         }
     }
 
-    /// What the structure of the mass matrix means for `exact`.
+    /// Structure of the mass matrix in words.
     fn mass_in_words(&self) -> &'static str {
         match MassStructure::from_name(self.mass_structure) {
             Some(MassStructure::RotationInvariant) => "consistent mass",
@@ -372,13 +372,14 @@ impl ModelFacts {
 impl ModeFacts {
     /// The residual of a mode; a static shape is no eigenvector and has none.
     pub(crate) fn residual_in_words(&self, j: usize) -> String {
-        match self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
-            true => "static shape".to_owned(),
-            false => significant(self.residual[j], 2),
+        if self.provenance.get(j).is_some_and(|origin| is_static(origin)) {
+            "static shape".to_owned()
+        } else {
+            significant(self.residual[j], 2)
         }
     }
 
-    /// Whose residual the worst is, where not of all modes.
+    /// Kind of modes that the worst residual is of; empty for all modes.
     pub(crate) fn whose_residual(&self) -> &'static str {
         if self.craig_bampton.is_some() {
             " of the fixed-interface modes"
@@ -389,7 +390,7 @@ impl ModeFacts {
         }
     }
 
-    /// How many modes come from which kind of shape, in the order of their first ones; empty where all are
+    /// Kinds of shapes with the number of modes that come from them, in the order of their first modes; empty if all are
     /// free modes.
     pub(crate) fn origins(&self) -> Vec<(&str, usize)> {
         let mut origins: Vec<(&str, usize)> = Vec::new();
@@ -447,8 +448,8 @@ impl RunFacts {
         Self {
             accuracy: run.accuracy.clone(),
             threads: run.threads,
-            wall_seconds: run.phases.iter().map(|p| p.wall_seconds).sum(),
-            cpu_seconds: run.phases.iter().map(|p| p.cpu_seconds).sum(),
+            wall_seconds: run.wall_seconds(),
+            cpu_seconds: run.cpu_seconds(),
             phases: run.phases.clone(),
             peak_memory_bytes: run.peak_memory_bytes,
             memory_estimate_bytes: run.memory_estimate_bytes,

@@ -1,6 +1,6 @@
 //! Words of a report that not every reader knows, explained where they stand and at the end.
 
-use super::markup::{escape, section};
+use super::document::{Block, Span, Term, heading};
 
 /// Words and what they mean.
 const WORDS: [(&str, &str); 14] = [
@@ -45,30 +45,20 @@ const WORDS: [(&str, &str); 14] = [
 ];
 
 /// A word with its explanation; a word that has none stays as it is.
-pub(super) fn word(word: &str) -> String {
-    let meaning = WORDS.iter().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning);
-    explained(word, meaning.unwrap_or(""))
+pub(super) fn word(word: &str) -> Span {
+    word_as(word, word)
 }
 
 /// Another form of a known word, `W2 (n)` or a plural.
-pub(super) fn word_as(known: &str, shown: &str) -> String {
-    let meaning = WORDS.iter().find(|(word, _)| *word == known).map(|(_, meaning)| *meaning);
-    explained(shown, meaning.unwrap_or(""))
-}
-
-fn explained(shown: &str, meaning: &str) -> String {
-    match meaning {
-        "" => escape(shown),
-        meaning => format!("<abbr title=\"{}\">{}</abbr>", escape(meaning), escape(shown)),
+pub(super) fn word_as(known: &str, shown: &str) -> Span {
+    match WORDS.iter().find(|(word, _)| *word == known) {
+        Some((_, meaning)) => Span::Word(shown.to_owned(), meaning),
+        None => Span::Plain(shown.to_owned()),
     }
 }
 
 /// All words at the end, for those who cannot point at one.
-pub(super) fn glossary(html: &mut String) {
-    section(html, "Words");
-    html.push_str("<details>\n<summary>What the words of this report mean</summary>\n<dl>\n");
-    for (word, meaning) in WORDS {
-        html.push_str(&format!("<dt>{}</dt><dd>{}</dd>\n", escape(word), escape(meaning)));
-    }
-    html.push_str("</dl>\n</details>\n");
+pub(super) fn glossary<'a>() -> [Block<'a>; 2] {
+    let terms = WORDS.map(|(word, meaning)| Term::page(word, meaning)).into();
+    [heading("Words"), Block::Fold("What the words of this report mean", vec![Block::Terms(terms)])]
 }

@@ -1,4 +1,4 @@
-//! What accuracy `certified` guarantees, in numbers that an engineer can quote.
+//! Guarantees of the accuracy `certified`, in numbers that an engineer can quote.
 
 use super::numbers::{counted, significant};
 use flexbody_body::flex_body::FlexBody;

@@ -1,111 +1,220 @@
-//! The report of a body as one web page: nothing loaded from elsewhere, readable without scripts, on a phone
-//! and on paper.
+//! The page of a document: nothing loaded from elsewhere, readable without scripts, on a phone and on paper.
 
-use super::Facts;
-use super::glossary::glossary;
-use super::heat_map::heat_maps;
-use super::html_body::body;
-use super::html_lumped::{lumped, lumped_modes};
-use super::html_modes::modes;
-use super::markup::{Page, diagnostics_table, escape, fold, section, sentence, table, terms, texts};
-use super::numbers::{bytes, counted, duration, significant};
+use super::chart::{Cells, colour_scale};
+use super::document::{Block, Document, Inline, Span, State, Table, Term};
+use super::numbers::plain;
 use super::picture::Embedded;
-use flexbody_base::diagnostic::Severity;
+use flexbody_base::diagnostic::{Diagnostic, Severity};
+use maud::{DOCTYPE, Markup, PreEscaped, Render, html};
 
-const STYLE: &str = include_str!("picture/embedded.css");
+const STYLE: &str = include_str!("report.css");
+const PICTURE_STYLE: &str = include_str!("picture/embedded.css");
 
-pub(super) fn render(facts: &Facts<'_>) -> String {
-    let picture = Embedded::of(facts.flex_body);
-    let mut html = String::new();
-    verdict(&mut html, facts);
-    body(&mut html, facts, picture.as_ref().map(|picture| picture.panel.as_str()));
-    // What is to be minded stands before everything that rests on it.
-    let urgent = facts.diagnostics.iter().any(|found| found.severity() != Severity::Note);
-    if urgent {
-        diagnostics_table(&mut html, &facts.diagnostics);
+/// Opens what is folded before a page is printed.
+const UNFOLD: &str = "<script>addEventListener(\"beforeprint\", () => document.querySelectorAll(\"details\").forEach((fold) => (fold.open = true)));</script>\n";
+
+/// A text of the user: escaped, and without characters that turn the direction of a text.
+pub(crate) struct Plain<'t>(pub &'t str);
+
+impl Render for Plain<'_> {
+    fn render_to(&self, buffer: &mut String) {
+        plain(self.0).render_to(buffer);
     }
-    modes(&mut html, facts);
-    lumped(&mut html, facts);
-    lumped_modes(&mut html, facts);
-    heat_maps(&mut html, facts.flex_body);
-    if !urgent {
-        diagnostics_table(&mut html, &facts.diagnostics);
-    }
-    run(&mut html, facts);
-    origin(&mut html, facts);
-    glossary(&mut html);
-    let page = Page { name: &facts.model.name, kind: "Flexible body report", generator: &facts.generator };
-    page.with(STYLE, &html, picture.as_ref().map_or("", |picture| picture.scripts.as_str()))
 }
 
-fn verdict(html: &mut String, facts: &Facts<'_>) {
-    let c = &facts.completeness;
-    let class = match c.verdict {
-        "proved" => "",
-        "given" => " given",
-        _ => " open",
+impl Render for Span {
+    fn render(&self) -> Markup {
+        let text = Plain(self.text());
+        html! {
+            @match self {
+                Self::Plain(_) => (text),
+                Self::Quantity(own) => (Plain(&raised(own))),
+                Self::Strong(own) => strong { (Plain(&raised(own))) },
+                Self::Error(_) => span class="error" { (text) },
+                Self::Warning(_) => span class="warning" { (text) },
+                Self::Code(_) => code { (text) },
+                Self::Word(_, meaning) => abbr title=(meaning) { (text) },
+            }
+        }
+    }
+}
+
+impl Render for Inline {
+    fn render(&self) -> Markup {
+        html! { @for span in &self.0 { (span) } }
+    }
+}
+
+/// A text with units as they are printed: the 2 of `t mm^2` raised.
+pub(crate) fn raised(text: &str) -> String {
+    text.replace("^2", "\u{b2}").replace("^3", "\u{b3}")
+}
+
+/// Writes the whole page.
+pub(super) fn render(document: &Document<'_>) -> String {
+    let mut page = Page::default();
+    let content = page.blocks(&document.blocks);
+    // A page may run what it brings, and load nothing.
+    let policy = if page.scripts.is_empty() {
+        "default-src 'none'; style-src 'unsafe-inline'"
+    } else {
+        "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
     };
-    let free = facts.modes.craig_bampton.as_ref().map(|craig_bampton| {
-        let holds = craig_bampton.holds(&facts.modes.frequency_hz);
-        format!(" {}.", escape(&sentence(&holds)))
-    });
-    html.push_str(&format!(
-        "<p class=\"verdict{class}\"><strong>{}</strong> {} flexible modes, {} to {} Hz. {}.{}</p>\n",
-        c.head,
-        facts.modes.count,
-        facts.modes.frequency_hz.first().map_or_else(String::new, |f| significant(*f, 5)),
-        facts.modes.frequency_hz.last().map_or_else(String::new, |f| significant(*f, 5)),
-        escape(&sentence(&c.sentence)),
-        free.unwrap_or_default(),
-    ));
+    let name = Plain(document.name);
+    let page = html! {
+        (DOCTYPE) "\n"
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(policy);
+                title { (name) ": " (document.kind.to_lowercase()) }
+                style { (PreEscaped(STYLE)) (PreEscaped(page.style)) }
+            }
+            body { "\n"
+                header { h1 { (name) } p class="quiet" { (document.kind) ", " (document.generator) } }
+                main { "\n" (content) }
+                (PreEscaped(page.scripts))
+            }
+        }
+    };
+    page.into_string() + "\n"
 }
 
-fn run(html: &mut String, facts: &Facts<'_>) {
-    let Some(run) = &facts.run else { return };
-    section(html, "Run");
-    let mut items = vec![
-        ("Time", format!("{} wall, {} CPU", duration(run.wall_seconds), duration(run.cpu_seconds))),
-        ("Threads", run.threads.to_string()),
-        ("Peak memory", run.peak_memory_bytes.map_or_else(|| "not known".to_owned(), bytes)),
-        ("Memory expected", run.memory_estimate_bytes.map_or_else(|| "not known".to_owned(), bytes)),
-        ("Accuracy", escape(&run.accuracy)),
-    ];
-    if let Some(output) = &run.output {
-        items.push(("Flex-body file", format!("{}, {}", escape(&output.name), bytes(output.bytes))));
+/// Style and scripts that the blocks of a page need beside their markup.
+#[derive(Default)]
+struct Page {
+    style: &'static str,
+    scripts: String,
+}
+
+impl Page {
+    fn blocks(&mut self, blocks: &[Block<'_>]) -> Markup {
+        html! { @for block in blocks { (self.block(block)) } }
     }
-    terms(html, items);
-    if !run.phases.is_empty() {
-        let row = |p: &super::Phase| vec![escape(&p.name), duration(p.wall_seconds), duration(p.cpu_seconds)];
-        let rows: Vec<_> = run.phases.iter().map(row).collect();
-        let mut phases = String::new();
-        table(&mut phases, "Phases", &texts(["Phase", "Wall", "CPU"]), &[0], &rows);
-        fold(html, "Time of each phase", &phases);
+
+    fn block(&mut self, block: &Block<'_>) -> Markup {
+        html! {
+            @match block {
+                Block::Line(_) | Block::Gap => {},
+                Block::Heading(title) => { h2 { (title) } "\n" },
+                Block::Verdict { state, head, rest } => (verdict(*state, head, rest)),
+                Block::Terms(items) => (terms(items)),
+                Block::Table(own) => (table(own)),
+                Block::Diagnostics(found) => { h2 { "Diagnostics" } (diagnostics(found)) },
+                Block::Paragraph(text) => p { (Plain(text)) },
+                Block::Quiet(text) => p class="quiet" { (Plain(text)) },
+                Block::Caution(text) => p class="mind" { (Plain(text)) },
+                Block::List(items) => ul { @for item in items { li { (item) } } },
+                Block::Chart(chart) => (chart),
+                Block::Bars(bars) => (bars),
+                Block::Maps(own) => (maps(own)),
+                Block::Fold(summary, blocks) => (self.fold(summary, blocks)),
+                Block::Preformatted(text) => (preformatted(text)),
+                Block::Picture(body, blocks) => (self.picture(Embedded::of(body), blocks)),
+            }
+        }
     }
-    if !run.counters.is_empty() {
-        let rows: Vec<_> = run.counters.iter().map(|(name, n)| vec![escape(name), n.to_string()]).collect();
-        let mut work = String::new();
-        table(&mut work, "Work", &texts(["Counter", "Count"]), &[0], &rows);
-        fold(html, "Work counts", &work);
+
+    fn fold(&mut self, summary: &str, blocks: &[Block<'_>]) -> Markup {
+        if !self.scripts.contains(UNFOLD) {
+            self.scripts.push_str(UNFOLD);
+        }
+        html! { details { summary { (summary) } (self.blocks(blocks)) } "\n" }
+    }
+
+    fn picture(&mut self, picture: Option<Embedded>, blocks: &[Block<'_>]) -> Markup {
+        let Some(Embedded { panel, scripts }) = picture else { return self.blocks(blocks) };
+        self.style = PICTURE_STYLE;
+        self.scripts.push_str(&scripts);
+        html! { div class="top" { (PreEscaped(panel)) div class="properties" { (self.blocks(blocks)) } } }
     }
 }
 
-fn origin(html: &mut String, facts: &Facts<'_>) {
-    section(html, "How to reproduce");
-    let model = &facts.model;
-    html.push_str(&format!(
-        "<p>{} with {} and these settings gives the same numbers.</p>\n",
-        escape(&facts.generator),
-        counted(model.files.len(), "input file"),
-    ));
-    let rows: Vec<_> = model
-        .files
-        .iter()
-        .map(|f| vec![escape(&f.role), escape(&f.name), format!("<code>{}</code>", escape(&f.sha256))])
-        .collect();
-    if !rows.is_empty() {
-        table(html, "Input files", &texts(["Role", "Name", "SHA-256"]), &[0, 1, 2], &rows);
+fn verdict(state: State, head: &str, rest: &str) -> Markup {
+    let class = match state {
+        State::Good => "verdict",
+        State::Given => "verdict given",
+        State::Open => "verdict open",
+    };
+    html! { p class=(class) { strong { (Plain(head)) } @if !rest.is_empty() { " " (Plain(rest)) } } "\n" }
+}
+
+/// Terms, those of one label below each other.
+fn terms(items: &[Term]) -> Markup {
+    let shown: Vec<&Term> = items.iter().filter(|term| term.is_in_page).collect();
+    html! {
+        @if !shown.is_empty() {
+            dl {
+                @for own in shown.chunk_by(|a, b| a.label == b.label) {
+                    dt { (own[0].label) } @for term in own { dd { (term.value) } } "\n"
+                }
+            }
+        }
     }
-    let settings = serde_json::to_string_pretty(&model.settings).expect("a JSON value is JSON");
-    let lines: Vec<String> = settings.lines().map(escape).collect();
-    fold(html, "Settings", &format!("<pre>{}</pre>\n", lines.join("\n")));
+}
+
+fn table(table: &Table) -> Markup {
+    let class = |i: usize| table.left.contains(&i).then_some("text");
+    html! {
+        div class="scroll" {
+            table {
+                caption { (table.caption) }
+                thead { tr { @for (i, head) in table.heads.iter().enumerate() { th scope="col" class=[class(i)] { (head) } } } }
+                "\n"
+                tbody {
+                    @for row in &table.rows {
+                        tr {
+                            th scope="row" { (row[0]) }
+                            @for (i, cell) in row.iter().enumerate().skip(1) { td class=[class(i)] { (cell) } }
+                        }
+                        "\n"
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Diagnostics in the order in which they were found.
+fn diagnostics(found: &[Diagnostic]) -> Markup {
+    if found.is_empty() {
+        return html! { p { "None." } };
+    }
+    let row = |diagnostic: &Diagnostic| {
+        let severity = diagnostic.severity();
+        let name = severity.name().to_owned();
+        let line = diagnostic.line().map_or_else(String::new, |line| format!(", line {line}"));
+        let place = diagnostic.file().map_or_else(String::new, |file| format!(" ({}{line})", file.display()));
+        vec![
+            diagnostic.code().id().into(),
+            match severity {
+                Severity::Error => Span::Error(name).into(),
+                Severity::Warning => Span::Warning(name).into(),
+                Severity::Note => name.into(),
+            },
+            format!("{}{place}", diagnostic.message()).into(),
+            diagnostic.help().into(),
+        ]
+    };
+    let heads = ["Code", "Severity", "Finding", "Help"];
+    let caption = "In the order in which they were found";
+    table(&Table::new(caption, heads, &[0, 1, 2, 3], found.iter().map(row).collect()))
+}
+
+fn preformatted(text: &str) -> Markup {
+    html! { pre { @for (i, line) in text.lines().enumerate() { @if i > 0 { "\n" } (Plain(line)) } } }
+}
+
+fn maps(maps: &[(Inline, Option<Cells>)]) -> Markup {
+    html! {
+        (colour_scale())
+        div class="maps" {
+            @for (caption, cells) in maps {
+                @let is_wide = cells.as_ref().is_some_and(|cells| cells.names.is_some());
+                figure class={ "map" @if is_wide { " wide" } } { figcaption { (caption) } @if let Some(cells) = cells { (cells) } }
+                "\n"
+            }
+        }
+    }
 }

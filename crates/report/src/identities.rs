@@ -1,25 +1,34 @@
 //! Results of checks, and diagnostics, for terminals and programs.
 
+use super::document::{Block, Inline, Table, cells};
 use super::numbers::significant;
+use super::text::{self, Screen};
 use flexbody_base::diagnostic::{Diagnostic, Severity};
 use flexbody_body::invariants::IdentityCheck;
 use serde_json::{Value, json};
 
 /// A table of identities, failed ones marked, and the count.
 pub fn identities_text(checks: &[IdentityCheck]) -> String {
-    let mut text = format!("{:26} {:>10} {:>10}  what must hold\n", "identity", "value", "limit");
-    for check in checks {
-        let (value, limit) = (significant(check.value, 2), significant(check.limit, 2));
-        let mark = if check.passed { "" } else { "  FAILED" };
-        text.push_str(&format!("{:26} {value:>10} {limit:>10}  {}{mark}\n", check.name, check.formula));
-    }
+    let rows = checks.iter().map(|c| check_row(c.name, [c.value, c.limit], c.formula, c.passed)).collect();
     let failed = checks.iter().filter(|c| !c.passed).count();
-    text.push_str(&match (failed, checks.len()) {
-        (0, 1) => "the identity holds\n".to_owned(),
-        (0, all) => format!("all {all} identities hold\n"),
-        (failed, all) => format!("{failed} of {all} identities FAILED\n"),
-    });
-    text
+    let end = match (failed, checks.len()) {
+        (0, 1) => "the identity holds".to_owned(),
+        (0, all) => format!("all {all} identities hold"),
+        (failed, all) => format!("{failed} of {all} identities FAILED"),
+    };
+    text::render(&[Block::Table(check_table("identity", rows)), Block::Line(end)], Screen::default())
+}
+
+/// The row of a check: name, value, limit, formula, and a mark of failure.
+pub(super) fn check_row(name: &str, [value, limit]: [f64; 2], formula: &str, passed: bool) -> Vec<Inline> {
+    let mark = if passed { "" } else { "FAILED" };
+    cells([name, &significant(value, 2), &significant(limit, 2), formula, mark].map(str::to_owned))
+}
+
+/// The table of checks for a terminal.
+pub(super) fn check_table(kind: &str, rows: Vec<Vec<Inline>>) -> Table {
+    let heads = [kind, "value", "limit", "what must hold", ""];
+    Table::new("", heads, &[0, 3, 4], rows).in_text(|_| true)
 }
 
 /// An array of objects with `name`, `formula`, `value` (null when not finite), `limit`, `passed`.

@@ -1,4 +1,4 @@
-//! What a body lacks of the model that it was made of.
+//! Errors of a body beside the model that it was made of.
 
 use super::errors_in_words::errors_to_digits;
 use super::numbers::significant;
@@ -6,7 +6,7 @@ use flexbody_motion::scene::OutputErrors;
 use flexbody_study::reference::ReferenceError;
 use serde::Serialize;
 
-/// What a body lacks of its model.
+/// Errors of a body beside its model.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct LackFacts {
     modes: usize,
@@ -51,7 +51,7 @@ impl LackFacts {
     }
 }
 
-/// What everything was measured against: the last of `lacks`, the first of which was that before anything was
+/// The reference of all measured errors: the last of `lacks`, the first of which was that before anything was
 /// enriched.
 pub(super) fn reference_in_words(lacks: &[LackFacts]) -> String {
     match lacks {

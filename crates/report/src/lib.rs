@@ -1,4 +1,4 @@
-//! What a user reads of a body: facts computed once, rendered as text, JSON and HTML; comparison of two
+//! Reports on bodies: facts computed once, rendered as text, JSON and HTML; comparison of two
 //! bodies; simulations; selections; trade studies; frequency responses; audits; the page that shows a body in
 //! motion.
 
@@ -11,31 +11,30 @@
 )]
 
 mod audit;
-mod bar_chart;
 mod batch;
+mod body_lumped;
+mod body_modes;
+mod body_report;
+mod chart;
 mod clusters;
 mod common_modes;
 mod comparison;
 mod comparison_report;
 mod completeness;
 mod craig_bampton;
+mod csv;
+mod document;
 mod errors_in_words;
 mod facts;
-mod frequency_chart;
 mod geometric_stiffness;
 mod glossary;
 mod guarantee;
 mod heat_map;
 mod html;
-mod html_body;
-mod html_lumped;
-mod html_modes;
 mod identities;
 mod lacks;
-mod line_chart;
 mod lumped;
 mod lumped_effect;
-mod markup;
 mod mass_properties;
 mod numbers;
 mod output;
@@ -43,8 +42,6 @@ mod picture;
 mod render;
 mod response;
 mod run_data;
-#[cfg(feature = "hdf5")]
-mod scatter_chart;
 mod selection;
 mod selection_cases;
 mod selection_verdict;
@@ -76,8 +73,9 @@ pub use response::{ResponseFacts, response_csv};
 pub use run_data::{LumpedModes, Phase, RunData};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
-pub use summary::{Screen, summary};
+pub use summary::summary;
 pub use term_facts::dropped_text;
+pub use text::Screen;
 #[cfg(feature = "hdf5")]
 pub use trade::{TradeFacts, trade_csv};
 #[cfg(feature = "hdf5")]

@@ -1,6 +1,7 @@
-//! What the lumped masses would have cost, ready to be told.
+//! Errors that lumped masses would have caused.
 
 use super::lumped_effect::{LumpedEffect, in_words};
+use super::numbers::{percent, significant};
 use super::run_data::LumpedModes;
 use flexbody_body::flex_body::LumpedBody;
 use flexbody_body::invariants::{ERROR_NORMS, Invariants};
@@ -113,13 +114,14 @@ impl LumpedFacts {
         }
     }
 
-    /// What is wrong with it; with `explained`, what the invariants of the modes are for.
+    /// Errors of the lumped mass in words; with `explained`, the invariants of the modes have their meaning.
     pub(crate) fn in_words(&self, explained: bool) -> String {
         let norms = &self.errors.worst_by_invariant;
         let norms: Vec<(&str, f64)> = norms.iter().map(|n| (n.invariant.as_str(), n.value)).collect();
-        match norms.is_empty() && self.negative_masses == 0 {
-            true => "not compared".to_owned(),
-            false => in_words(self.negative_masses, &self.effect, &norms, explained),
+        if norms.is_empty() && self.negative_masses == 0 {
+            "not compared".to_owned()
+        } else {
+            in_words(self.negative_masses, &self.effect, &norms, explained)
         }
     }
 }
@@ -156,5 +158,18 @@ impl LumpedModesFacts {
             subspace_cosine: lumped.subspace_cosine,
             errors: Errors::new(&lumped.comparison),
         }
+    }
+
+    /// `frequency 4 off by -10 %, subspace cosine 0.97`.
+    pub(crate) fn in_words(&self) -> String {
+        if !self.done {
+            return format!("not done: {}", self.remark);
+        }
+        let (Some(change), Some(mode)) = (self.worst_frequency_change, self.worst_frequency_mode) else {
+            return "no modes".to_owned();
+        };
+        let cosine = significant(self.subspace_cosine, 4);
+        let caution = if self.caution.is_empty() { String::new() } else { format!("; {}", self.caution) };
+        format!("frequency {mode} off by {}, subspace cosine {cosine}{caution}", percent(change))
     }
 }

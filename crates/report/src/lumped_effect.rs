@@ -1,4 +1,4 @@
-//! What lumped masses would do to a body, in the words of who uses it: its moments of inertia and the worst of
+//! Effect of lumped masses on a body, in the words of its user: its moments of inertia and the worst of
 //! what its modes take part in.
 
 use super::mass_properties::{centre_of_mass, inertia_about_com, principal_moments};
@@ -72,7 +72,7 @@ fn off(change: f64) -> String {
     }
 }
 
-/// In percent, two digits.
+/// A part in percent with two digits.
 fn rough(part: f64) -> String {
     if part.is_nan() { "an unknown part".to_owned() } else { format!("{} %", significant(100.0 * part, 2)) }
 }
@@ -87,7 +87,7 @@ pub(super) fn scheme_in_words(scheme: &str) -> &str {
     }
 }
 
-/// What an invariant of the modes is for.
+/// Meaning of an invariant of the modes.
 pub(super) fn meaning(invariant: &str) -> &'static str {
     match invariant {
         "modal_mass" => "the mass of the modes",

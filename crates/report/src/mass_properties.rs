@@ -27,7 +27,7 @@ pub(super) struct MassProperties {
     pub frame_origin: [f64; 3],
     /// Rows of the matrix whose columns are the body axes in model axes.
     pub frame_axes: [[f64; 3]; 3],
-    /// Where the frame lies, in words.
+    /// Place of the frame in words.
     pub frame: String,
     /// True if the frame follows the mean motion of the body.
     #[serde(skip)]

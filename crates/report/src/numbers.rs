@@ -18,6 +18,11 @@ pub(super) fn duration(seconds: f64) -> String {
     }
 }
 
+/// Times of a run: `3.25 s wall, 6.26 s CPU`.
+pub(super) fn times(wall_seconds: f64, cpu_seconds: f64) -> String {
+    format!("{} wall, {} CPU", duration(wall_seconds), duration(cpu_seconds))
+}
+
 /// A size in memory or on disk, decimal prefixes.
 pub(super) fn bytes(count: u64) -> String {
     let prefixes = [(1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
@@ -30,6 +35,12 @@ pub(super) fn bytes(count: u64) -> String {
 /// `count` things, with the plural of English nouns.
 pub(super) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// A fragment as a sentence begins.
+pub(super) fn sentence(fragment: &str) -> String {
+    let mut characters = fragment.chars();
+    characters.next().map_or_else(String::new, |first| first.to_uppercase().chain(characters).collect())
 }
 
 /// Three values and their unit.

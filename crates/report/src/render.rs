@@ -1,6 +1,7 @@
 //! The formats of a report.
 
-use super::{Facts, html, text};
+use super::document::Document;
+use super::{Facts, body_report};
 use serde::Serialize;
 use std::path::Path;
 
@@ -35,9 +36,5 @@ pub(super) fn json(facts: &impl Serialize) -> String {
 
 /// Writes the facts, ending with a line break.
 pub fn render(facts: &Facts<'_>, format: Format) -> String {
-    match format {
-        Format::Json => json(facts),
-        Format::Text => text::render(facts),
-        Format::Html => html::render(facts),
-    }
+    Document::render(facts, format, || body_report::document(facts))
 }

@@ -1,14 +1,12 @@
-//! What a user reads of a frequency response: facts, the compact summary, the table and the page with the
-//! plots.
+//! Report on a frequency response: facts, verdict, errors and plots.
 
 use super::Format;
+use super::chart::{Axis, Chart, Mark, Panel, Scale, Series};
+use super::csv;
+use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::facts::UnitFacts;
-use super::frequency_chart::{Curve, FrequencyAxis, Panel, Scale, frequency_chart};
-use super::markup::{diagnostics_table, escape, page, section, table, terms, texts};
-use super::numbers::{counted, duration, percent, plain, significant};
-use super::render::json;
+use super::numbers::{counted, percent, significant, times};
 use super::run_data::RunData;
-use super::text::{Page, diagnostics_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
@@ -16,13 +14,15 @@ use flexbody_study::response::{
     At, Complex, Effectivity, Function, Pair, Response, ResponseSettings, Spacing,
 };
 use serde::Serialize;
-use std::fmt::Write;
 
 /// Plots of each pair of places: the functions with the largest accelerances.
 const PLOTS: usize = 3;
 
 /// Pairs that are plotted.
 const PLOTTED_PAIRS: usize = 8;
+
+/// Decades that a panel shows at the most: those at its upper end.
+const MOST_DECADES: f64 = 10.0;
 
 /// Facts of a frequency response.
 #[derive(Debug, Clone, Serialize)]
@@ -72,7 +72,7 @@ struct CouplingFacts<'a> {
 
 impl CouplingFacts<'_> {
     fn in_words(&self) -> String {
-        let names = self.interfaces.iter().map(|name| format!("`{}`", plain(name))).collect::<Vec<_>>();
+        let names = self.interfaces.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>();
         let which = match names.as_slice() {
             [one] => format!("interface {one} is"),
             all => format!("interfaces {} are", all.join(", ")),
@@ -91,7 +91,7 @@ impl CouplingFacts<'_> {
     }
 }
 
-/// From one place to another.
+/// Facts of the response from one place to another.
 #[derive(Debug, Clone, Serialize)]
 struct PairFacts {
     from: String,
@@ -149,7 +149,7 @@ impl PairFacts {
     }
 
     fn name(&self) -> String {
-        format!("{} to {}", plain(&self.from), plain(&self.to))
+        format!("{} to {}", self.from, self.to)
     }
 
     /// The functions with the largest accelerances w^2 |H|, in their order.
@@ -213,19 +213,15 @@ impl<'a> ResponseFacts<'a> {
             pairs,
             diagnostics: &run.diagnostics,
             threads: run.threads,
-            wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
-            cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
+            wall_seconds: run.wall_seconds(),
+            cpu_seconds: run.cpu_seconds(),
             logarithmic: settings.band.spacing() == Spacing::Logarithmic,
         }
     }
 
-    /// As text, JSON or HTML, ending with a line break.
+    /// Renders the facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
-        match format {
-            Format::Json => json(self),
-            Format::Text => self.text(),
-            Format::Html => self.html(),
-        }
+        Document::render(self, format, || self.document())
     }
 
     /// Label and sentence of everything that is known beside the pairs.
@@ -235,17 +231,16 @@ impl<'a> ResponseFacts<'a> {
             ("Band", format!("{low} to {high} Hz, {} frequencies", self.frequencies_hz.len())),
             ("Modes", self.modes_in_words()),
         ];
-        let damping = match self.damped {
-            true => "that of the modes, in the model the same: D = M Psi C Psi'M",
-            false => {
-                "none: peaks have no height, and errors near them say little; --damping gives the modes some"
-            }
+        let damping = if self.damped {
+            "that of the modes, in the model the same: D = M Psi C Psi'M"
+        } else {
+            "none: peaks have no height, and errors near them say little; --damping gives the modes some"
         };
         entries.push(("Damping", damping.to_owned()));
         entries.push(("All nodes", self.solved_in_words()));
         entries.extend(self.coupling.map(|coupling| ("Coupling", coupling.in_words())));
-        let (wall, cpu) = (duration(self.wall_seconds), duration(self.cpu_seconds));
-        entries.push(("Time", format!("{wall} wall, {cpu} CPU, {}", counted(self.threads, "thread"))));
+        let times = times(self.wall_seconds, self.cpu_seconds);
+        entries.push(("Time", format!("{times}, {}", counted(self.threads, "thread"))));
         entries
     }
 
@@ -271,122 +266,98 @@ impl<'a> ResponseFacts<'a> {
         )
     }
 
-    fn text(&self) -> String {
-        let mut page = Page(String::new());
-        page.entry("Response", plain(self.body).as_str());
-        page.entry("Verdict", &self.verdict);
-        for (label, text) in self.entries() {
-            page.entry(label, &text);
-        }
-        if self.solved.is_some() {
-            page.0.push_str(
-                "\n  error      at Hz     level dB   at Hz     accurate to  estimate/error    pair\n",
-            );
-            for pair in &self.pairs {
-                let [error, at, level, level_at, to, effectivity] = cells(pair, "-");
-                let _ = writeln!(
-                    page.0,
-                    "  {error:<9}  {at:<8}  {level:<9}  {level_at:<8}  {to:<11}  {effectivity:<16}  {}",
-                    pair.name()
-                );
-            }
-            page.0.push('\n');
-        }
-        diagnostics_lines(&mut page, self.diagnostics);
-        page.0
-    }
-
-    fn html(&self) -> String {
-        let mut html = String::new();
-        let class = match self.passed {
-            Some(true) => "",
-            Some(false) => " open",
-            None => " given",
+    fn document(&self) -> Document<'_> {
+        let state = match self.passed {
+            Some(true) => State::Good,
+            Some(false) => State::Open,
+            None => State::Given,
         };
-        let verdict = escape(&self.verdict);
-        let _ = writeln!(html, "<p class=\"verdict{class}\"><strong>{verdict}.</strong></p>");
-        section(&mut html, "What is compared");
-        terms(&mut html, self.entries().into_iter().map(|(label, text)| (label, escape(&text))));
+        let head = [Term::text("Response", self.body), Term::text("Verdict", self.verdict.as_str())];
+        let entries = self.entries().into_iter().map(|(label, words)| Term::new(label, words));
+        let mut blocks = vec![
+            Block::Verdict { state, head: format!("{}.", self.verdict), rest: String::new() },
+            heading("What is compared"),
+            Block::Terms(head.into_iter().chain(entries).collect()),
+        ];
         if self.solved.is_some() {
-            section(&mut html, "Errors");
-            self.table(&mut html);
+            blocks.extend([Block::Gap, heading("Errors"), Block::Table(self.errors()), Block::Gap]);
         }
-        section(&mut html, "Transfer functions");
+        blocks.push(heading("Transfer functions"));
         if self.pairs.len() > PLOTTED_PAIRS {
-            let _ = writeln!(
-                html,
-                "<p>The first {PLOTTED_PAIRS} of {} pairs of places; the table of --csv has all.</p>",
-                self.pairs.len()
-            );
+            let all = self.pairs.len();
+            let some =
+                format!("The first {PLOTTED_PAIRS} of {all} pairs of places; the table of --csv has all.");
+            blocks.push(Block::Paragraph(some));
         }
-        for pair in self.pairs.iter().take(PLOTTED_PAIRS) {
-            self.plots(&mut html, pair);
-        }
-        diagnostics_table(&mut html, self.diagnostics);
-        page(self.body, "Frequency response", &self.generator, &html)
+        blocks.extend(self.pairs.iter().take(PLOTTED_PAIRS).flat_map(|pair| self.plots(pair)));
+        blocks.push(Block::Diagnostics(self.diagnostics));
+        Document { name: self.body, kind: "Frequency response", generator: &self.generator, blocks }
     }
 
-    fn table(&self, html: &mut String) {
-        let head = texts([
+    fn errors(&self) -> Table {
+        let heads = [
             "From, to",
-            "Largest error",
+            "Error",
             "at (Hz)",
-            "Largest level difference (dB)",
+            "Level difference (dB)",
             "at (Hz)",
             "Accurate to (Hz)",
             "Estimate / error",
-        ]);
+        ];
         let row = |pair: &PairFacts| {
-            let mut row = vec![escape(&format!("{} [{}]", pair.name(), pair.unit))];
-            row.extend(cells(pair, "&ndash;"));
+            let mut row: Vec<Inline> = vec![format!("{} [{}]", pair.name(), pair.unit).into()];
+            row.extend(cells(errors_of_pair(pair)));
             row
         };
-        let rows: Vec<_> = self.pairs.iter().map(row).collect();
         let caption = format!(
-            "Measured at the frequencies that were solved, over all directions of a pair; accurate to where no error, measured or estimated, is above {}",
+            "Largest errors and differences at the frequencies that were solved, over all directions of a pair; accurate to where no error, measured or estimated, is above {}",
             percent(self.tolerance)
         );
-        table(html, &caption, &head, &[0], &rows);
+        let rows = self.pairs.iter().map(row).collect();
+        Table { below: Some(0), ..Table::new(caption, heads, &[0], rows).in_text(|head| head != heads[0]) }
     }
 
-    fn plots(&self, html: &mut String, pair: &PairFacts) {
-        let axis = FrequencyAxis { hertz: self.frequencies_hz, logarithmic: self.logarithmic };
-        let shown = pair.strongest(self.frequencies_hz);
+    fn plots<'b>(&self, pair: &PairFacts) -> Vec<Block<'b>> {
+        let hertz = self.frequencies_hz;
+        let scale = if self.logarithmic { Scale::Logarithmic } else { Scale::Linear };
+        let ends = hertz.first().zip(hertz.last()).map(|(first, last)| [*first, *last]);
+        let Some(x) = ends.and_then(|ends| Axis::between("Hz", scale, ends)) else { return Vec::new() };
+        let shown = pair.strongest(hertz);
+        let mut blocks = Vec::new();
         for (i, function) in shown.iter().enumerate() {
-            let mut panels = vec![amplitude(function, &pair.unit), phase(function)];
+            let mut panels = vec![amplitude(function, hertz, &pair.unit), phase(function, hertz)];
             let last = i + 1 == shown.len();
             panels.extend(pair.errors.as_ref().filter(|_| last).map(|errors| self.error_panel(errors)));
             let title = format!("{}: {} for {}", pair.name(), function.to, function.from);
-            html.push_str(&frequency_chart(&title, &axis, &panels));
+            blocks.push(Block::Chart(Chart { title, x: x.clone(), panels }));
         }
-        if pair.functions.len() > shown.len() {
-            let _ = writeln!(
-                html,
-                "<p class=\"quiet\">{} of {} functions of this pair, those with the largest accelerances; the table of --csv has all.</p>",
-                shown.len(),
-                pair.functions.len()
+        let (some, all) = (shown.len(), pair.functions.len());
+        if all > some {
+            let words = format!(
+                "{some} of {all} functions of this pair, those with the largest accelerances; the table of --csv has all."
             );
+            blocks.push(Block::Quiet(words));
         }
+        blocks
     }
 
     fn error_panel(&self, errors: &ErrorFacts) -> Panel {
-        let measured = errors.measured.iter().map(|error| error.unwrap_or(f64::NAN)).collect();
-        Panel {
-            caption: "error of all directions, relative; dotted: the tolerance".to_owned(),
-            scale: Scale::Logarithmic,
-            height: 110.0,
-            curves: vec![
-                Curve { name: "estimated", values: errors.estimated.clone(), dots: false },
-                Curve { name: "measured", values: measured, dots: true },
-            ],
-            limit: Some(self.tolerance),
-        }
+        let hertz = self.frequencies_hz;
+        let measured = errors.measured.iter().map(|error| error.unwrap_or(f64::NAN));
+        let limit = vec![self.tolerance; hertz.len()];
+        let series = vec![
+            curve("estimated", Mark::Line, 0, hertz, errors.estimated.iter().copied()),
+            curve("measured", Mark::Dot, 1, hertz, measured),
+            curve("", Mark::Line, 2, hertz, limit.into_iter()),
+        ];
+        let caption = "error of all directions, relative; dotted: the tolerance".to_owned();
+        Panel { caption, y: decades("", &series), height: 110.0, series }
     }
 }
 
 /// Error, where; level difference, where; accurate to; estimate over error.
-fn cells(pair: &PairFacts, nothing: &str) -> [String; 6] {
-    let none = || nothing.to_owned();
+fn errors_of_pair(pair: &PairFacts) -> [String; 6] {
+    let none = || "-".to_owned();
     let errors = pair.errors.as_ref();
     let at = |at: Option<At>| at.map_or_else(none, |at| significant(at.hertz, 4));
     let largest = errors.and_then(|errors| errors.largest);
@@ -403,34 +374,39 @@ fn cells(pair: &PairFacts, nothing: &str) -> [String; 6] {
     ]
 }
 
-fn amplitude(function: &FunctionFacts, unit: &str) -> Panel {
-    let size = |z: &[f64; 2]| z[0].hypot(z[1]);
-    curves(function, size, format!("amplitude [{unit}]"), Scale::Logarithmic, 170.0)
+/// Values at all frequencies.
+fn curve(name: &str, mark: Mark, style: usize, hertz: &[f64], values: impl Iterator<Item = f64>) -> Series {
+    Series::new(name, mark, style, hertz.iter().zip(values).map(|(&hertz, value)| [hertz, value]).collect())
 }
 
-fn phase(function: &FunctionFacts) -> Panel {
-    let angle = |z: &[f64; 2]| z[1].atan2(z[0]).to_degrees();
-    curves(function, angle, "phase [degrees]".to_owned(), Scale::Degrees, 80.0)
+/// The axis of the highest decades of all series; of one decade if no value is positive.
+fn decades(unit: &str, series: &[Series]) -> Axis {
+    let values = || series.iter().flat_map(|series| series.points.iter().map(|point| point[1]));
+    let axis = Axis::decades(unit, values(), MOST_DECADES);
+    axis.or_else(|| Axis::decades(unit, [0.1, 1.0].into_iter(), 1.0)).expect("both ends are positive")
 }
 
-/// A panel of something of a function, reduced and full.
-fn curves(
-    function: &FunctionFacts,
-    of: fn(&[f64; 2]) -> f64,
-    caption: String,
-    scale: Scale,
-    height: f64,
-) -> Panel {
-    let mut curves =
-        vec![Curve { name: "reduced", values: function.reduced.iter().map(of).collect(), dots: false }];
+fn amplitude(function: &FunctionFacts, hertz: &[f64], unit: &str) -> Panel {
+    let series = curves(function, hertz, Mark::Line, |z| z[0].hypot(z[1]));
+    Panel { caption: "amplitude".to_owned(), y: decades(unit, &series), height: 170.0, series }
+}
+
+fn phase(function: &FunctionFacts, hertz: &[f64]) -> Panel {
+    let series = curves(function, hertz, Mark::Angle, |z| z[1].atan2(z[0]).to_degrees());
+    Panel { caption: "phase".to_owned(), y: Axis::degrees(), height: 80.0, series }
+}
+
+/// Values of a function, reduced and of all nodes.
+fn curves(function: &FunctionFacts, hertz: &[f64], mark: Mark, of: fn(&[f64; 2]) -> f64) -> Vec<Series> {
+    let mut curves = vec![curve("reduced", mark, 0, hertz, function.reduced.iter().map(of))];
     if function.full.iter().any(Option::is_some) {
-        let values = function.full.iter().map(|z| z.as_ref().map_or(f64::NAN, of)).collect();
-        curves.push(Curve { name: "all nodes", values, dots: true });
+        let values = function.full.iter().map(|z| z.as_ref().map_or(f64::NAN, of));
+        curves.push(curve("all nodes", Mark::Dot, 1, hertz, values));
     }
-    Panel { caption, scale, height, curves, limit: None }
+    curves
 }
 
-/// What came out, as a sentence without a full stop.
+/// Result of the response, a sentence without a full stop.
 fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool>) -> String {
     let tolerance = percent(settings.tolerance);
     let how = |pair: &PairFacts| match pair.errors.as_ref().map(|errors| errors.worst == errors.largest) {
@@ -450,11 +426,10 @@ fn verdict(pairs: &[PairFacts], settings: &ResponseSettings, passed: Option<bool
             let ends =
                 pairs.iter().filter_map(|pair| pair.errors.as_ref()).map(|e| e.accurate_to_hz.unwrap_or(0.0));
             let accurate_to = ends.fold(f64::INFINITY, f64::min);
-            let until = match accurate_to > 0.0 {
-                true => {
-                    format!("it is accurate to {tolerance} up to {} Hz only", significant(accurate_to, 4))
-                }
-                false => format!("it is nowhere accurate to {tolerance}"),
+            let until = if accurate_to > 0.0 {
+                format!("it is accurate to {tolerance} up to {} Hz only", significant(accurate_to, 4))
+            } else {
+                format!("it is nowhere accurate to {tolerance}")
             };
             format!(
                 "The reduced body does not answer as all nodes do: {until}, and off by {} at {} Hz{}, {}",
@@ -487,25 +462,23 @@ pub fn response_csv(response: &Response) -> String {
             );
         }
     }
-    let mut out = head.iter().map(|cell| super::simulation::csv_cell(cell)).collect::<Vec<_>>().join(",");
-    out.push('\n');
-    let optional = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
+    let mut table = String::new();
+    csv::push_row(&mut table, head.iter().map(|cell| csv::text(cell)));
     for (i, hertz) in response.frequencies.iter().enumerate() {
-        let mut cells = vec![format!("{hertz:e}")];
+        let mut cells = vec![csv::number(*hertz)];
         for pair in &response.pairs {
             for function in &pair.functions {
                 let (reduced, full) = (function.reduced[i], function.full[i]);
                 cells.extend(
                     [Some(reduced.re), Some(reduced.im), full.map(|z| z.re), full.map(|z| z.im)]
-                        .map(optional),
+                        .map(csv::number),
                 );
             }
             if let Some(errors) = &pair.errors {
-                cells.extend([errors.measured[i], Some(errors.estimated[i])].map(optional));
+                cells.extend([errors.measured[i], Some(errors.estimated[i])].map(csv::number));
             }
         }
-        out.push_str(&cells.join(","));
-        out.push('\n');
+        csv::push_row(&mut table, cells);
     }
-    out
+    table
 }

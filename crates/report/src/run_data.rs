@@ -1,4 +1,4 @@
-//! What only the run knows: times, memory, counters, diagnostics. Never stored in the flex-body file.
+//! Data of a run that are never stored in the flex-body file: times, memory, counters, diagnostics.
 
 use flexbody_base::diagnostic::Diagnostic;
 
@@ -38,7 +38,7 @@ pub struct RunData {
     pub phases: Vec<Phase>,
     /// Largest resident memory of the process, where the system tells it.
     pub peak_memory_bytes: Option<u64>,
-    /// What was expected of it before the work, where it was.
+    /// Memory that was expected before the work, if it was estimated.
     pub memory_estimate_bytes: Option<u64>,
     /// Number of threads.
     pub threads: usize,
@@ -52,4 +52,16 @@ pub struct RunData {
     pub output: Option<(String, u64)>,
     /// Modes from the lumped masses too, where asked for.
     pub lumped_modes: Vec<LumpedModes>,
+}
+
+impl RunData {
+    /// Time of all phases. Unit: s.
+    pub(super) fn wall_seconds(&self) -> f64 {
+        self.phases.iter().map(|phase| phase.wall_seconds).sum()
+    }
+
+    /// Processor time of all phases and threads. Unit: s.
+    pub(super) fn cpu_seconds(&self) -> f64 {
+        self.phases.iter().map(|phase| phase.cpu_seconds).sum()
+    }
 }

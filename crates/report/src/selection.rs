@@ -1,22 +1,20 @@
-//! What a user reads of a selection: which terms and modes a scene needs, and on what grounds.
+//! Report on a selection: the terms and modes that a scene needs, and the grounds of the decision.
 
 use super::Format;
+use super::document::{Block, Document, Inline, State, Table, Term, cells, heading};
 use super::errors_in_words::{errors_in_words, ranges};
 use super::lacks::{LackFacts, reference_in_words};
-use super::markup::{diagnostics_table, escape, page, section, table, terms};
 use super::numbers::significant;
-use super::render::json;
 use super::run_data::RunData;
 use super::selection_cases::{CaseFacts, cases_table};
 use super::selection_verdict::SelectionVerdict;
-use super::text::{Page, diagnostics_lines};
+use super::text::{self, Screen};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::{CaseSelection, Ground, Participation, Selection, Trial};
 use serde::Serialize;
-use std::fmt::Write;
 
 /// Rows of modes that a summary shows.
 const MODES_SHOWN: usize = 12;
@@ -36,12 +34,12 @@ pub struct SelectionFacts<'a> {
     modes: ModesFacts<'a>,
     chosen: Option<TrialFacts<'a>>,
     multiplications_before: usize,
-    /// What the body, and those before it that were enriched, lack of the model; nothing where only a file is
+    /// Errors of the body, and of those before it that were enriched, beside the model; nothing where only a file is
     /// at hand.
     reference: Vec<LackFacts>,
     significance: Vec<SignificanceFacts>,
     trials: Vec<TrialFacts<'a>>,
-    /// What belongs to each load case, where there are several.
+    /// Facts of each load case, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cases: Vec<CaseFacts<'a>>,
     diagnostics: &'a [Diagnostic],
@@ -81,11 +79,11 @@ struct ModesFacts<'a> {
 #[derive(Debug, Clone, Serialize)]
 struct ResponseFacts<'a> {
     load: &'a str,
-    /// What the selected modes lack of the response of the body.
+    /// Error of the selected modes beside the response of the body.
     selected_lack: f64,
-    /// What the modes of the body lack of the response of the model.
+    /// Error of the modes of the body beside the response of the model.
     body_lacks: Option<f64>,
-    /// The same without its residual vectors.
+    /// Error of the modes of the body without its residual vectors.
     without_residual_vectors: Option<f64>,
 }
 
@@ -229,14 +227,10 @@ impl<'a> SelectionFacts<'a> {
 
     /// The facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
-        match format {
-            Format::Json => json(self),
-            Format::Text => self.text(),
-            Format::Html => self.html(),
-        }
+        Document::render(self, format, || self.document())
     }
 
-    /// What was decided about a term, in words.
+    /// Decision about a term in words.
     fn verdict(term: &TermFacts<'_>) -> String {
         let verdict = if term.kept { "keep" } else { "drop" };
         if term.limit > 0.0 {
@@ -260,109 +254,96 @@ impl<'a> SelectionFacts<'a> {
         }
     }
 
-    fn tolerance_in_words(&self) -> String {
-        errors_in_words(&self.tolerance.map(Some))
-    }
-
-    fn modes_in_words(&self) -> String {
-        format!("{} of {}: {}", self.modes.kept.len(), self.modes.of, self.modes.reason)
-    }
-
     /// The five lines of the verdict.
     pub fn summary(&self) -> String {
-        let mut page = Page(String::new());
-        page.entry("Selection", &format!("{}: {}", self.scene, self.body));
-        for (label, line) in self.verdict.lines() {
-            page.entry(label, line);
-        }
-        page.0
+        text::render(&[Block::Terms(self.head())], Screen::default())
     }
 
-    fn text(&self) -> String {
-        let mut page = Page(self.summary() + "\nDetails\n");
-        for term in &self.terms {
-            page.entry(term.group, &Self::verdict(term));
-        }
-        page.entry("Guideline", self.guideline);
-        page.entry("Modes", &self.modes_in_words());
-        if self.modes.kept.len() < self.modes.of {
-            page.entry("", &format!("kept: {}", ranges(&self.modes.kept)));
-        }
-        if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
-            page.entry("Errors", &format!("{}, measured against everything", errors_in_words(errors)));
-            page.entry("Reference", &reference_in_words(&self.reference));
-        }
-        for (i, case) in self.cases.iter().enumerate() {
-            page.entry(if i == 0 { "Load cases" } else { "" }, &case.in_words());
-        }
-        for (i, input) in self.inputs.iter().enumerate() {
-            let label = if i == 0 { "Inputs" } else { "" };
-            page.entry(label, &format!("{} {}: {}", input.name, significant(input.value, 4), input.source));
-        }
-        page.entry("Allowed", &self.tolerance_in_words());
-        diagnostics_lines(&mut page, self.diagnostics);
-        page.0
-    }
-
-    fn html(&self) -> String {
-        let mut html = String::new();
+    /// The verdict, in a page without what is to be taken: it has that at its head.
+    fn head(&self) -> Vec<Term> {
         let [asked, (label, taken), rest @ ..] = self.verdict.lines();
-        let class = if self.verdict.holds { "" } else { " open" };
-        let _ = writeln!(html, "<p class=\"verdict{class}\"><strong>{label} {}.</strong></p>", escape(taken));
-        terms(&mut html, [asked].into_iter().chain(rest).map(|(label, line)| (label, escape(line))));
-        section(&mut html, "Decision");
-        let decided = self.terms.iter().map(|term| (term.group, escape(&Self::verdict(term))));
-        let mut items: Vec<(&str, String)> = decided.collect();
-        items.push(("Guideline", escape(self.guideline)));
-        items.push(("Modes", escape(&self.modes_in_words())));
-        items.push(("Kept", ranges(&self.modes.kept)));
-        if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
-            items.push(("Errors", format!("{}, measured", errors_in_words(errors))));
-            items.push(("Reference", escape(&reference_in_words(&self.reference))));
-        }
-        terms(&mut html, items);
+        let mut terms = vec![Term::text("Selection", format!("{}: {}", self.scene, self.body))];
+        terms.extend([Term::new(asked.0, asked.1), Term::text(label, taken)]);
+        terms.extend(rest.map(|(label, line)| Term::new(label, line)));
+        terms
+    }
+
+    fn document(&self) -> Document<'_> {
+        let [_, (label, taken), ..] = self.verdict.lines();
+        let state = if self.verdict.holds { State::Good } else { State::Open };
+        let mut blocks = vec![
+            Block::Verdict { state, head: format!("{label} {taken}."), rest: String::new() },
+            Block::Terms(self.head()),
+            Block::Gap,
+            Block::Line("Details".to_owned()),
+            heading("Decision"),
+            Block::Terms(self.decision()),
+        ];
         if !self.cases.is_empty() {
-            section(&mut html, "Load cases");
-            cases_table(&mut html, &self.cases);
+            let cases = self.cases.iter().map(|case| Term::text("Load cases", case.in_words()));
+            blocks.extend([
+                heading("Load cases"),
+                Block::Terms(cases.collect()),
+                Block::Table(cases_table(&self.cases)),
+            ]);
         }
-        section(&mut html, "Inputs");
-        let inputs = self
-            .inputs
-            .iter()
-            .map(|input| (input.name, format!("{}: {}", significant(input.value, 5), escape(input.source))));
-        terms(&mut html, inputs.chain([("Tolerances", self.tolerance_in_words())]));
-        section(&mut html, "Sizes of the terms");
-        let head = ["Term", "beside", "Group", "Guideline", "Formula", "Tier 0", "Tier 1", "Slack"];
-        let rows: Vec<Vec<String>> = self
-            .significance
-            .iter()
-            .map(|one| {
-                let own = one.tier_1.map_or_else(String::new, |own| significant(own, 3));
-                let slack = one.tier_1.map_or_else(String::new, |own| significant(one.tier_0 / own, 3));
-                let (bound, texts) = (significant(one.tier_0, 3), [one.term, one.beside, one.group]);
-                let mut row: Vec<String> = texts.map(escape).to_vec();
-                row.extend([escape(one.guideline), escape(one.formula), bound, own, slack]);
-                row
-            })
-            .collect();
-        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 has the norms of the invariants; slack is their ratio.";
-        table(&mut html, caption, &head.map(str::to_owned), &[1, 2, 3, 4], &rows);
-        section(&mut html, "Trials");
-        self.trials_table(&mut html);
+        let tolerances = errors_in_words(&self.tolerance.map(Some));
+        let input = |input: &InputFacts<'_>| {
+            let value = significant(input.value, 4);
+            Term::new(input.name, format!("{}: {}", significant(input.value, 5), input.source))
+                .in_text("Inputs", format!("{} {value}: {}", input.name, input.source))
+        };
+        let inputs = self.inputs.iter().map(input);
+        let inputs = inputs.chain([Term::new("Tolerances", tolerances).short("Allowed")]).collect();
+        blocks.extend([heading("Inputs"), Block::Terms(inputs)]);
+        blocks.extend([heading("Sizes of the terms"), Block::Table(self.sizes())]);
+        blocks.extend([heading("Trials"), Block::Table(self.trials())]);
         if !self.modes.shares.is_empty() {
-            section(&mut html, "Modes");
-            self.modes_table(&mut html);
+            blocks.extend([heading("Modes"), Block::Table(self.shares())]);
         }
         if !self.modes.static_responses.is_empty() {
-            section(&mut html, "Static responses");
-            self.responses_table(&mut html);
+            blocks.extend([heading("Static responses"), Block::Table(self.responses())]);
         }
-        diagnostics_table(&mut html, self.diagnostics);
-        page(self.scene, "Terms and modes that a scene needs", &self.generator, &html)
+        blocks.push(Block::Diagnostics(self.diagnostics));
+        let (name, kind) = (self.scene, "Terms and modes that a scene needs");
+        Document { name, kind, generator: &self.generator, blocks }
     }
 
-    fn trials_table(&self, html: &mut String) {
-        let head = [
+    fn decision(&self) -> Vec<Term> {
+        let mut terms: Vec<Term> =
+            self.terms.iter().map(|term| Term::new(term.group, Self::verdict(term))).collect();
+        terms.push(Term::new("Guideline", self.guideline));
+        let modes = &self.modes;
+        terms.push(Term::new("Modes", format!("{} of {}: {}", modes.kept.len(), modes.of, modes.reason)));
+        let kept = ranges(&modes.kept);
+        terms.push(if modes.kept.len() < modes.of {
+            Term::new("Kept", kept.as_str()).in_text("", format!("kept: {kept}"))
+        } else {
+            Term::page("Kept", kept)
+        });
+        if let Some(errors) = self.chosen.as_ref().and_then(|chosen| chosen.errors.as_ref()) {
+            terms.push(Term::new(
+                "Errors",
+                format!("{}, measured against everything", errors_in_words(errors)),
+            ));
+            terms.push(Term::new("Reference", reference_in_words(&self.reference)));
+        }
+        terms
+    }
+
+    fn sizes(&self) -> Table {
+        let heads = ["Term", "beside", "Group", "Guideline", "Formula", "Tier 0", "Tier 1", "Slack"];
+        let row = |one: &SignificanceFacts| {
+            let words = [one.term, one.beside, one.group, one.guideline, one.formula].map(Inline::from);
+            let numbers = [Some(one.tier_0), one.tier_1, one.tier_1.map(|own| one.tier_0 / own)];
+            words.into_iter().chain(cells(numbers.map(known))).collect()
+        };
+        let caption = "Bounds at the largest amplitude and angular velocity. Tier 0 follows from I0 and the frequencies, tier 1 has the norms of the invariants; slack is their ratio.";
+        Table::new(caption, heads, &[1, 2, 3, 4], self.significance.iter().map(row).collect())
+    }
+
+    fn trials(&self) -> Table {
+        let heads = [
             "Terms",
             "Modes",
             "Tier",
@@ -373,74 +354,59 @@ impl<'a> SelectionFacts<'a> {
             "Reaction",
             "Verdict",
         ];
-        let number = |value: Option<f64>| value.map_or_else(String::new, |value| significant(value, 3));
-        let rows: Vec<Vec<String>> = self
-            .trials
-            .iter()
-            .chain(&self.chosen)
-            .map(|trial| {
-                let errors = trial.errors.unwrap_or_default().named();
-                let verdict = match (trial.passed, trial.remark) {
-                    (true, _) => "within".to_owned(),
-                    (false, "") => "beyond".to_owned(),
-                    (false, remark) => escape(remark),
-                };
-                let verdict = match trial.case {
-                    Some(case) => format!("{verdict} (case {})", escape(case)),
-                    None => verdict,
-                };
-                let sizes = [trial.modes, trial.tier.into(), trial.multiplications];
-                let mut row = vec![trial.groups()];
-                row.extend(sizes.map(|size| size.to_string()));
-                row.extend(errors.map(|(_, error)| number(error)));
-                row.push(verdict);
-                row
-            })
-            .collect();
+        let row = |trial: &TrialFacts<'_>| {
+            let verdict = match (trial.passed, trial.remark) {
+                (true, _) => "within",
+                (false, "") => "beyond",
+                (false, remark) => remark,
+            };
+            let case = trial.case.map_or_else(String::new, |case| format!(" (case {case})"));
+            let sizes = [trial.modes, trial.tier.into(), trial.multiplications].map(|size| size.to_string());
+            let errors = trial.errors.unwrap_or_default().named().map(|(_, error)| known(error));
+            let mut row: Vec<Inline> = vec![trial.groups().into()];
+            row.extend(cells(sizes).into_iter().chain(cells(errors)));
+            row.push(format!("{verdict}{case}").into());
+            row
+        };
         let caption = "Errors of models with fewer terms or modes: guaranteed bounds (tiers 0 and 1) or measured (tier 2). The last row is the selection.";
-        table(html, caption, &head.map(str::to_owned), &[8], &rows);
+        Table::new(caption, heads, &[8], self.trials.iter().chain(&self.chosen).map(row).collect())
     }
 
-    fn responses_table(&self, html: &mut String) {
+    fn responses(&self) -> Table {
         let part = |value: Option<f64>| {
             value.map_or_else(|| "not recorded".to_owned(), |v| significant(100.0 * v, 3))
         };
-        let rows: Vec<Vec<String>> = self
-            .modes
-            .static_responses
-            .iter()
-            .map(|one| {
-                let selected = part(Some(one.selected_lack));
-                vec![escape(one.load), selected, part(one.body_lacks), part(one.without_residual_vectors)]
-            })
-            .collect();
-        let head = ["Load", "Selected modes, %", "Body, %", "Body without residual vectors, %"];
+        let row = |one: &ResponseFacts<'_>| {
+            let lacks = [Some(one.selected_lack), one.body_lacks, one.without_residual_vectors].map(part);
+            std::iter::once(one.load.into()).chain(cells(lacks)).collect()
+        };
+        let heads = ["Load", "Selected modes, %", "Body, %", "Body without residual vectors, %"];
         let caption = "What modes lack of the static response, in the norm of K: the selected of that of the body, and the body of that of the model.";
-        table(html, caption, &head.map(str::to_owned), &[], &rows);
+        Table::new(caption, heads, &[], self.modes.static_responses.iter().map(row).collect())
     }
 
-    fn modes_table(&self, html: &mut String) {
+    fn shares(&self) -> Table {
         let mut shares = self.modes.shares.clone();
         shares.sort_by(|a, b| b.stress.max(b.deflection).total_cmp(&a.stress.max(a.deflection)));
-        let rows: Vec<Vec<String>> = shares
-            .iter()
-            .take(MODES_SHOWN)
-            .map(|share| {
-                vec![
-                    share.number.to_string(),
-                    significant(share.amplitude, 3),
-                    significant(100.0 * share.deflection, 3),
-                    significant(100.0 * share.stress, 3),
-                    if share.kept { "kept" } else { "dropped" }.to_owned(),
-                ]
-            })
-            .collect();
-        let head = ["Mode", "Amplitude", "Deflection, %", "Stress, %", "Verdict"];
+        shares.truncate(MODES_SHOWN);
+        let row = |share: &ShareFacts| {
+            let verdict = if share.kept { "kept" } else { "dropped" };
+            let [deflection, stress] =
+                [share.deflection, share.stress].map(|part| significant(100.0 * part, 3));
+            let amplitude = significant(share.amplitude, 3);
+            cells([share.number.to_string(), amplitude, deflection, stress, verdict.to_owned()])
+        };
+        let heads = ["Mode", "Amplitude", "Deflection, %", "Stress, %", "Verdict"];
         let caption = format!(
             "Largest amplitude of the modes that do most, and what each does alone relative to all together ({} of {}).",
-            rows.len(),
+            shares.len(),
             self.modes.of
         );
-        table(html, &caption, &head.map(str::to_owned), &[4], &rows);
+        Table::new(caption, heads, &[4], shares.iter().map(row).collect())
     }
+}
+
+/// A number with three digits; empty for what is not known.
+fn known(value: Option<f64>) -> String {
+    value.map_or_else(String::new, |value| significant(value, 3))
 }

@@ -1,9 +1,8 @@
-//! What a selection for several load cases is in each of them.
+//! Facts of a selection in each of several load cases.
 
-use super::errors_in_words::errors_in_words;
+use super::document::{Table, cells};
+use super::errors_in_words::{errors_in_words, part_in_words};
 use super::lacks::LackFacts;
-use super::markup::{escape, table};
-use super::numbers::significant;
 use flexbody_body::flex_body::TermGroup;
 use flexbody_motion::scene::{OutputErrors, PerQuantity};
 use flexbody_study::selection::CaseSelection;
@@ -20,12 +19,12 @@ pub(super) struct CaseFacts<'a> {
     worst: Option<f64>,
     /// The output that this is of.
     output: Option<&'static str>,
-    /// What is left of the tolerances.
+    /// Part of the tolerances that is left.
     budget: Option<f64>,
     passed: bool,
-    /// What the selection holds because of this case more than of any other: groups, and `modes`.
+    /// Parts of the selection that this case needs most of all cases: groups, and `modes`.
     binds: Vec<&'static str>,
-    /// What the body lacks of the model in this case, and those before it that were enriched.
+    /// Errors of the body beside the model in this case, and of those before it that were enriched.
     reference: Vec<LackFacts>,
 }
 
@@ -48,11 +47,6 @@ impl<'a> CaseFacts<'a> {
         }
     }
 
-    fn part(&self) -> String {
-        self.worst
-            .map_or_else(|| "not known".to_owned(), |worst| format!("{} %", significant(100.0 * worst, 2)))
-    }
-
     fn binds_in_words(&self) -> String {
         if self.binds.is_empty() { "nothing".to_owned() } else { self.binds.join(", ") }
     }
@@ -63,15 +57,20 @@ impl<'a> CaseFacts<'a> {
 
     /// `braking: stress 1.2 %, 60 % of what is allowed; decides W1, modes`.
     pub(crate) fn in_words(&self) -> String {
-        let binds = match self.binds.is_empty() {
-            true => "decides nothing".to_owned(),
-            false => format!("decides {}", self.binds_in_words()),
+        let binds = if self.binds.is_empty() {
+            "decides nothing".to_owned()
+        } else {
+            format!("decides {}", self.binds_in_words())
         };
         match &self.errors {
             Some(errors) => {
                 let beyond = if self.passed { "" } else { ", too much" };
                 let errors = errors_in_words(errors);
-                format!("{}: {errors}: {} of what is allowed{beyond}; {binds}", self.name, self.part())
+                format!(
+                    "{}: {errors}: {} of what is allowed{beyond}; {binds}",
+                    self.name,
+                    part_in_words(self.worst)
+                )
             }
             None => format!("{}: {binds}", self.name),
         }
@@ -79,14 +78,19 @@ impl<'a> CaseFacts<'a> {
 }
 
 /// The errors of the selected model in every load case, and what each decides.
-pub(super) fn cases_table(html: &mut String, cases: &[CaseFacts<'_>]) {
-    let head =
+pub(super) fn cases_table(cases: &[CaseFacts<'_>]) -> Table {
+    let heads =
         ["Load case", "Errors", "Of what is allowed", "Decides", "The body lacks of the model (estimated)"];
     let row = |case: &CaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
-        vec![escape(case.name), errors, case.part(), case.binds_in_words(), case.lacks_in_words()]
+        cells([
+            case.name.to_owned(),
+            errors,
+            part_in_words(case.worst),
+            case.binds_in_words(),
+            case.lacks_in_words(),
+        ])
     };
-    let rows: Vec<Vec<String>> = cases.iter().map(row).collect();
     let caption = "The selected model, measured against everything in each load case. A case decides a group or the number of modes where the model without it is furthest beyond what is allowed.";
-    table(html, caption, &head.map(str::to_owned), &[1, 3, 4], &rows);
+    Table::new(caption, heads, &[1, 3, 4], cases.iter().map(row).collect())
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 /// The five lines.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct SelectionVerdict {
-    /// Whether what was asked for is reached.
+    /// True if the requirements are met.
     pub holds: bool,
     pub asked: String,
     pub take: String,
@@ -32,7 +32,7 @@ impl SelectionVerdict {
         }
     }
 
-    /// With their labels.
+    /// The lines with their labels.
     pub(crate) fn lines(&self) -> [(&'static str, &str); 5] {
         let take = if self.holds { "Take" } else { "Best found" };
         let lines = [&self.asked, &self.take, &self.why, &self.error, &self.saves].map(String::as_str);
@@ -41,7 +41,7 @@ impl SelectionVerdict {
     }
 }
 
-/// What a group of terms stands for.
+/// Meaning of a group of terms.
 fn meaning(group: TermGroup) -> &'static str {
     match group {
         TermGroup::W1 => "centrifugal load, and inertia that follows the deflection",
@@ -86,15 +86,17 @@ fn in_case(case: Option<usize>, selection: &Selection) -> String {
 fn take(selection: &Selection) -> String {
     let numbers: Vec<usize> = selection.modes.iter().map(|j| j + 1).collect();
     let frequency = |j: Option<&usize>| significant(j.map_or(0.0, |&j| selection.frequencies_hz[j]), 3);
-    let which = match numbers.len() == selection.n_modes {
-        true => "all".to_owned(),
-        false => format!("of {}: {}", selection.n_modes, ranges(&numbers)),
+    let which = if numbers.len() == selection.n_modes {
+        "all".to_owned()
+    } else {
+        format!("of {}: {}", selection.n_modes, ranges(&numbers))
     };
     let (first, last) = (frequency(selection.modes.first()), frequency(selection.modes.last()));
     let held: Vec<&str> = held_groups(selection).map(TermGroup::name).collect();
-    let groups = match held.is_empty() {
-        true => "the inertia of the undeformed body alone".to_owned(),
-        false => format!("the inertia terms {}", held.join(", ")),
+    let groups = if held.is_empty() {
+        "the inertia of the undeformed body alone".to_owned()
+    } else {
+        format!("the inertia terms {}", held.join(", "))
     };
     format!("{} ({which}; {first} to {last} Hz) and {groups}", counted(numbers.len(), "mode"))
 }

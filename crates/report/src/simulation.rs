@@ -1,13 +1,12 @@
-//! What a user reads of a simulation: facts, the summary, the table and the page with plots.
+//! Report on a simulation: facts, verdict, motion and plots.
 
 use super::Format;
+use super::chart::{Axis, Chart, Mark, Panel, STYLES, Scale, Series};
+use super::csv;
+use super::document::{Block, Document, State, Term, heading, quantity};
 use super::facts::UnitFacts;
-use super::line_chart::{Line, STYLES, line_chart};
-use super::markup::{diagnostics_table, escape, page, printed, section, terms};
-use super::numbers::{counted, significant};
-use super::render::json;
+use super::numbers::{counted, significant, times};
 use super::run_data::RunData;
-use super::text::{Page, diagnostics_lines};
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::generator;
 use flexbody_base::units::UnitSystem;
@@ -18,7 +17,6 @@ use flexbody_motion::scene::{Drift, Path, Recording, Scheme};
 use nalgebra::Vector3;
 use serde::Serialize;
 use std::f64::consts::TAU;
-use std::fmt::Write;
 
 /// Facts of a simulation, and its recording.
 #[derive(Debug, Clone, Serialize)]
@@ -43,7 +41,7 @@ pub struct SimulationFacts<'a> {
     largest_spin_components: [f64; 3],
     /// Axes of the model at the start.
     gravity: Option<[f64; 3]>,
-    /// What carries the body, and its natural frequencies so.
+    /// Carrier of the body, and the natural frequencies of the carried body.
     carried: Option<CarriedFacts<'a>>,
     /// Description of the origin of the frame.
     frame_origin: String,
@@ -176,19 +174,15 @@ impl<'a> SimulationFacts<'a> {
             largest_conditions_torque: recording.conditions.as_deref().map(longest),
             points: points.map(|(path, peak)| PointFacts::new(path, peak.value)).collect(),
             diagnostics: &run.diagnostics,
-            wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
-            cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
+            wall_seconds: run.wall_seconds(),
+            cpu_seconds: run.cpu_seconds(),
             recording,
         }
     }
 
     /// The facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
-        match format {
-            Format::Json => json(self),
-            Format::Text => self.text(),
-            Format::Html => self.html(),
-        }
+        Document::render(self, format, || self.document())
     }
 
     fn method_in_words(&self) -> String {
@@ -235,7 +229,7 @@ impl<'a> SimulationFacts<'a> {
         format!("{most}; at most {x}, {y}, {z} about the axes of the model")
     }
 
-    /// What carries the body, and what that and the reference conditions have to bear.
+    /// Carrier of the body, and the forces on it and on the reference conditions.
     fn support_in_words(&self) -> Vec<(&'static str, String)> {
         let torque = |value: f64| format!("{} {}", significant(value, 5), self.units.torque());
         let mut words = Vec::from_iter(self.carried_in_words().map(|carried| ("Carried", carried)));
@@ -262,167 +256,104 @@ impl<'a> SimulationFacts<'a> {
         Some(format!("by {}; natural frequencies so {}{more} Hz", carried.by, first.join(" ")))
     }
 
-    fn text(&self) -> String {
-        let mut page = Page(String::new());
-        let duration = significant(self.duration, 6);
-        let instants = counted(self.instants, "instant");
-        page.entry(
-            "Simulation",
-            &format!("{}: {}, {duration} {}, {instants}", self.scene, self.body, self.units.time()),
+    fn document(&self) -> Document<'_> {
+        let [energy, linear, angular] =
+            [self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift]
+                .map(|v| format!("{v:.1e}"));
+        let head = format!("Energy drift {energy}, momentum drift {linear} (linear), {angular} (angular).");
+        let method = format!("{}: {}", self.method_in_words(), self.work_in_words());
+        let drift = format!("energy {energy}, linear momentum {linear}, angular momentum {angular}");
+        let mut terms = vec![self.body_in_words(), Term::text("Method", method.as_str())];
+        terms.extend(self.energies());
+        terms.push(Term::text("Drift", drift));
+        terms.extend(self.motion());
+        terms.push(Term::text("Time", times(self.wall_seconds, self.cpu_seconds)));
+        let mut blocks = vec![
+            Block::Verdict { state: State::Good, head, rest: method + "." },
+            heading("Motion"),
+            Block::Terms(terms),
+            heading("Plots"),
+        ];
+        blocks.extend(self.plots().into_iter().map(Block::Chart));
+        blocks.push(Block::Diagnostics(self.diagnostics));
+        let (name, generator) = (self.scene, self.generator.as_str());
+        Document { name, kind: "Simulation of a flexible body", generator, blocks }
+    }
+
+    fn body_in_words(&self) -> Term {
+        let (duration, time) = (significant(self.duration, 6), self.units.time());
+        let words = format!("{}, {duration} {time}, {}", self.body, counted(self.instants, "instant"));
+        Term::new("Body", words.as_str()).in_text("Simulation", format!("{}: {words}", self.scene))
+    }
+
+    fn energies(&self) -> [Term; 3] {
+        let at = |energy: &EnergyFacts, when: &str| {
+            Term::new("Energy", quantity(format!("{} at the {when}", self.energy_in_words(energy))))
+        };
+        let work = format!("{} {}", significant(self.last.work, 6), self.units.energy());
+        let work = Term::new("Energy", quantity(format!("work of loads and damping {work}")));
+        let work = if self.last.work == 0.0 { Term { text: None, ..work } } else { work };
+        [at(&self.first, "start"), at(&self.last, "end"), work]
+    }
+
+    fn motion(&self) -> Vec<Term> {
+        let gravity = self.gravity_in_words().map(|gravity| Term::new("Gravity", quantity(gravity)));
+        let mut terms = Vec::from_iter(gravity);
+        terms.push(Term::new("Spin", format!("at most {}", self.spin_in_words())));
+        terms.extend(
+            self.support_in_words().into_iter().map(|(label, words)| Term::new(label, quantity(words))),
         );
-        page.entry("Method", &format!("{}: {}", self.method_in_words(), self.work_in_words()));
-        page.entry("Energy", &format!("{} at the start", self.energy_in_words(&self.first)));
-        page.entry("", &format!("{} at the end", self.energy_in_words(&self.last)));
-        if self.last.work != 0.0 {
-            let work = significant(self.last.work, 6);
-            page.entry("", &format!("work of loads and damping {work} {}", self.units.energy()));
-        }
-        page.entry(
-            "Drift",
-            &format!(
-                "energy {:.1e}, linear momentum {:.1e}, angular momentum {:.1e}",
-                self.energy_drift, self.linear_momentum_drift, self.angular_momentum_drift
-            ),
-        );
-        if let Some(gravity) = self.gravity_in_words() {
-            page.entry("Gravity", &gravity);
-        }
-        page.entry("Spin", &format!("at most {}", self.spin_in_words()));
-        for (what, words) in self.support_in_words() {
-            page.entry(what, &words);
-        }
         let part = significant(100.0 * self.largest_deflection, 3);
-        page.entry("Deflection", &format!("{part} % of the largest extent of the body"));
-        for point in &self.points {
+        terms.push(Term::new("Deflection", format!("{part} % of the largest extent of the body")));
+        let length = self.units.length();
+        terms.extend(self.points.iter().map(|point| {
             let [x, y, z] = point.last_place.map(|v| significant(v, 6));
-            let deflection = significant(point.largest_deflection, 4);
-            let length = &self.units.length();
-            page.entry(
-                "Point",
-                &format!(
-                    "{}: ends at {x}, {y}, {z} {length}, deflected by at most {deflection} {length}",
-                    point.name
-                ),
-            );
-        }
-        let (wall, cpu) = (self.wall_seconds, self.cpu_seconds);
-        page.entry(
-            "Time",
-            &format!("{} wall, {} CPU", super::numbers::duration(wall), super::numbers::duration(cpu)),
-        );
-        diagnostics_lines(&mut page, self.diagnostics);
-        page.0
+            let (name, deflection) = (point.name, significant(point.largest_deflection, 4));
+            let words = format!("ends at {x}, {y}, {z} {length}, deflected by at most {deflection} {length}");
+            Term::new("Point", format!("{name}: {words}"))
+        }));
+        terms
     }
 
-    fn html(&self) -> String {
-        let mut html = String::new();
-        let small = |drift: f64| format!("{drift:.1e}");
-        let _ = writeln!(
-            html,
-            "<p class=\"verdict\"><strong>Energy drift {}, momentum drift {} (linear), {} (angular).</strong> {}: {}.</p>",
-            small(self.energy_drift),
-            small(self.linear_momentum_drift),
-            small(self.angular_momentum_drift),
-            escape(&self.method_in_words()),
-            self.work_in_words()
-        );
-        section(&mut html, "Motion");
-        let mut items = vec![
-            ("Body", escape(self.body)),
-            (
-                "Duration",
-                format!(
-                    "{} {}, {}",
-                    significant(self.duration, 6),
-                    escape(&self.units.time()),
-                    counted(self.instants, "instant")
-                ),
-            ),
-            ("Energy at the start", printed(&self.energy_in_words(&self.first))),
-            ("Energy at the end", printed(&self.energy_in_words(&self.last))),
-            (
-                "Work of loads and damping",
-                format!("{} {}", significant(self.last.work, 6), printed(&self.units.energy())),
-            ),
-            ("Largest spin", escape(&self.spin_in_words())),
-            (
-                "Largest deflection",
-                format!(
-                    "{} % of the largest extent of the body",
-                    significant(100.0 * self.largest_deflection, 3)
-                ),
-            ),
-        ];
-        items.extend(self.gravity_in_words().map(|gravity| ("Gravity", printed(&gravity))));
-        items.extend(self.support_in_words().into_iter().map(|(what, words)| (what, printed(&words))));
-        for point in &self.points {
-            let [x, y, z] = point.last_place.map(|v| significant(v, 6));
-            items.push((
-                "Point",
-                format!(
-                    "{}, deflected by at most {} {length}; ends at {x}, {y}, {z} {length}",
-                    escape(point.name),
-                    significant(point.largest_deflection, 4),
-                    length = escape(&self.units.length())
-                ),
-            ));
-        }
-        terms(&mut html, items);
-        section(&mut html, "Plots");
-        self.plots(&mut html);
-        diagnostics_table(&mut html, self.diagnostics);
-        page(self.scene, "Simulation of a flexible body", &self.generator, &html)
-    }
-
-    fn plots(&self, html: &mut String) {
+    fn plots(&self) -> Vec<Chart> {
         let Recording { time, states, balances, paths, reactions, .. } = self.recording;
-        let mut chart = |title: &str, lines: Vec<Line>, unit: String| {
-            html.push_str(&line_chart(title, time, &lines, &self.units.time(), &unit));
+        let (units, mut charts) = (&self.units, Vec::new());
+        let mut plot = |title: &str, unit: String, lines: Vec<Line>| {
+            charts.extend(line_chart(title, time, &units.time(), lines, &unit));
         };
-        let line = |name: &str, values: Vec<f64>| Line { name: name.to_owned(), values };
-        let components = |vectors: &[Vector3<f64>]| -> Vec<Line> {
-            (0..3).map(|k| line(["x", "y", "z"][k], vectors.iter().map(|v| v[k]).collect())).collect()
+        let along = |name: &str, value: &dyn Fn(&Balance) -> f64| Line {
+            name: name.to_owned(),
+            values: balances.iter().map(value).collect(),
         };
-        let energy = self.units.energy();
-        let along = |value: fn(&Balance) -> f64| balances.iter().map(value).collect::<Vec<_>>();
         let internal = vec![
-            line("kinetic, no flight", along(|b| b.kinetic - b.flight)),
-            line("elastic", along(|b| b.elastic)),
-            line("work", along(|b| b.work)),
+            along("kinetic, no flight", &|b| b.kinetic - b.flight),
+            along("elastic", &|b| b.elastic),
+            along("work", &|b| b.work),
         ];
-        chart("Energy", internal, energy.clone());
+        plot("Energy", units.energy(), internal);
         let first = balances.first().map_or(0.0, |b| b.kinetic + b.elastic);
-        let lost = balances.iter().map(|b| b.kinetic + b.elastic - first - b.work).collect();
-        chart("Drift of the energy", vec![line("less work", lost)], energy);
-        let omega: Vec<_> = states.iter().map(|state| state.omega).collect();
-        chart(
-            "Angular velocity, axes of the model",
-            components(&omega),
-            format!("rad/{}", self.units.time()),
-        );
-        chart("Modal coordinates that move most", self.liveliest(), self.modal_unit());
+        let lost = along("less work", &|b| b.kinetic + b.elastic - first - b.work);
+        plot("Drift of the energy", units.energy(), vec![lost]);
+        let omega = components(states.iter().map(|state| state.omega));
+        plot("Angular velocity, axes of the model", format!("rad/{}", units.time()), omega);
+        let modal = format!("{}^(1/2) {}", units.mass(), units.length());
+        plot("Modal coordinates that move most", modal, self.largest_coordinates());
         for path in paths {
+            let (deflection, acceleration) = (path.deflection.iter(), path.acceleration.iter());
             let title = format!("Deflection of {}, axes of the model", path.name);
-            chart(&title, components(&path.deflection), self.units.length().clone());
+            plot(&title, units.length(), components(deflection.copied()));
             let title = format!("Acceleration of {}, world axes", path.name);
-            chart(&title, components(&path.acceleration), self.units.acceleration());
+            plot(&title, units.acceleration(), components(acceleration.copied()));
         }
         if let Some(reactions) = reactions {
-            let torques: Vec<_> = reactions.iter().map(|(_, torque)| *torque).collect();
-            chart(
-                "Torque of the prescribed motion, axes of the model",
-                components(&torques),
-                self.units.torque(),
-            );
+            let torques = components(reactions.iter().map(|(_, torque)| *torque));
+            plot("Torque of the prescribed motion, axes of the model", units.torque(), torques);
         }
-    }
-
-    fn modal_unit(&self) -> String {
-        format!("{}^(1/2) {}", self.units.mass(), self.units.length())
+        charts
     }
 
     /// The modal coordinates with the largest amplitudes.
-    fn liveliest(&self) -> Vec<Line> {
+    fn largest_coordinates(&self) -> Vec<Line> {
         let states = &self.recording.states;
         let nf = states.first().map_or(0, |state| state.q.len());
         let peak = |j: usize| states.iter().map(|state| state.q[j].abs()).fold(0.0, f64::max);
@@ -434,6 +365,33 @@ impl<'a> SimulationFacts<'a> {
         };
         modes.iter().take(STYLES).map(line).collect()
     }
+}
+
+/// Line of a chart over time.
+struct Line {
+    name: String,
+    values: Vec<f64>,
+}
+
+fn components(vectors: impl Iterator<Item = Vector3<f64>> + Clone) -> Vec<Line> {
+    let line = |(k, name): (usize, &str)| Line {
+        name: name.to_owned(),
+        values: vectors.clone().map(|vector| vector[k]).collect(),
+    };
+    ["x", "y", "z"].into_iter().enumerate().map(line).collect()
+}
+
+/// Lines over time; `None` if there is nothing to draw.
+fn line_chart(title: &str, time: &[f64], time_unit: &str, lines: Vec<Line>, unit: &str) -> Option<Chart> {
+    let x = Axis::between(time_unit, Scale::Linear, [*time.first()?, *time.last()?])?;
+    let y = Axis::around(unit, lines.iter().flat_map(|line| line.values.iter().copied()))?;
+    let series = |(style, line): (usize, &Line)| {
+        let points = time.iter().zip(&line.values).map(|(&t, &value)| [t, value]).collect();
+        Series::new(&line.name, Mark::Line, style, points)
+    };
+    let series = lines.iter().enumerate().map(series).collect();
+    let panel = Panel { caption: String::new(), y, height: 170.0, series };
+    Some(Chart { title: title.to_owned(), x, panels: vec![panel] })
 }
 
 /// A recording as a table of comma-separated values, a row for every instant; numbers round-trip.
@@ -461,7 +419,8 @@ pub fn simulation_csv(recording: &Recording) -> String {
             head.extend(xyz(&format!("{} {what}", path.name)));
         }
     }
-    let mut out = head.iter().map(|cell| csv_cell(cell)).collect::<Vec<_>>().join(",");
+    let mut table = String::new();
+    csv::push_row(&mut table, head.iter().map(|cell| csv::text(cell)));
     for (i, (time, (state, balance))) in time.iter().zip(states.iter().zip(balances)).enumerate() {
         let mut row = vec![*time];
         row.extend(&state.origin);
@@ -485,18 +444,7 @@ pub fn simulation_csv(recording: &Recording) -> String {
                 row.extend(&vectors[i]);
             }
         }
-        out.push('\n');
-        out.push_str(&row.iter().map(|value| format!("{value:e}")).collect::<Vec<_>>().join(","));
+        csv::push_row(&mut table, row.into_iter().map(csv::number));
     }
-    out.push('\n');
-    out
-}
-
-/// Names are data: quoted where they hold what separates.
-pub(super) fn csv_cell(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
-    }
+    table
 }

@@ -1,6 +1,6 @@
-//! Which groups of the kinetic energy a body holds, and why.
+//! Groups of the kinetic energy that a body holds, and the reasons.
 
-use super::numbers::{plain, significant};
+use super::numbers::significant;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ pub(super) struct TermFacts {
     /// `W1`, `W2`, `W3`.
     pub group: &'static str,
     pub kept: bool,
-    /// What was decided about it; `None`: nobody asked.
+    /// Decision about the group; `None`: no selection was made.
     pub decision: Option<DecisionFacts>,
 }
 
@@ -52,7 +52,7 @@ impl TermFacts {
                 significant(decision.limit, 3)
             ),
         };
-        format!("{} {what}{error}: {}", self.group, plain(&decision.reason))
+        format!("{} {what}{error}: {}", self.group, decision.reason)
     }
 }
 

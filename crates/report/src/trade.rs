@@ -1,14 +1,13 @@
-//! What a user reads of a trade study: facts, the compact summary, the table and the page with the plot.
+//! Report on a trade study: facts, verdict, candidates and the plot of error against cost.
 
 use super::Format;
+use super::chart::{Axis, Chart, Mark, Panel, Series};
+use super::csv;
+use super::document::{Block, Document, Inline, Span, State, Table, Term, cells, heading};
 use super::errors_in_words::errors_in_words;
 use super::lacks::{LackFacts, reference_in_words};
-use super::markup::{diagnostics_table, escape, page, section, table, terms};
-use super::numbers::{bytes, counted, duration, plain, significant};
-use super::render::json;
+use super::numbers::{bytes, counted, duration, significant, times};
 use super::run_data::RunData;
-use super::scatter_chart::{Chart, Series, scatter_chart};
-use super::text::{Page, diagnostics_lines};
 use super::trade_cases::{TradeCaseFacts, case_facts, cases_table};
 use super::trade_nodes::NodalFacts;
 use super::trade_verdict::verdict_lines;
@@ -21,7 +20,10 @@ use flexbody_study::trade::{
     CandidateKind, InCase, LumpedMass, Measured, ReferenceKind, Trade, TradeCase, TradeRow,
 };
 use serde::Serialize;
-use std::fmt::Write;
+
+/// Columns of the Pareto front in a text.
+const IN_TEXT: [&str; 7] =
+    ["No.", "What", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
 
 /// Errors below this part of the tolerance are none on the plot.
 const NO_ERROR: f64 = 1e-6;
@@ -36,10 +38,10 @@ pub struct TradeFacts<'a> {
     scene: &'a str,
     body: &'a str,
     reference: ReferenceKind,
-    /// How the equations of all nodes were integrated, where they are the reference; of several load cases in
+    /// Integration of the equations of all nodes, where they are the reference; of several load cases in
     /// the first.
     nodal: Option<NodalFacts>,
-    /// What the body of row 1, and those before it that were enriched, lack of the model; nothing where only
+    /// Errors of the body of row 1, and of those before it that were enriched, beside the model; nothing where only
     /// a file is at hand. Of several load cases in that where it is most.
     reference_lacks: Vec<LackFacts>,
     /// Of several load cases the least of any.
@@ -50,7 +52,7 @@ pub struct TradeFacts<'a> {
     recommended: Option<usize>,
     front: Vec<usize>,
     rows: Vec<RowFacts<'a>>,
-    /// What belongs to each load case, where there are several.
+    /// Facts of each load case, if there are several.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cases: Vec<TradeCaseFacts<'a>>,
     diagnostics: &'a [Diagnostic],
@@ -79,7 +81,7 @@ struct RowFacts<'a> {
     groups: Vec<&'static str>,
     /// Scheme by which its mass was lumped.
     lumped: Option<&'a str>,
-    /// What was lumped: the `couplings`, or the `whole` mass before the modes were computed.
+    /// Lumped part: the `couplings`, or the `whole` mass before the modes were computed.
     lumped_part: Option<&'static str>,
     storage: &'static str,
     failed: Option<&'a Diagnostic>,
@@ -141,6 +143,26 @@ impl<'a> MeasuredFacts<'a> {
     }
 }
 
+impl MeasuredFacts<'_> {
+    /// Cells of the table of candidates; with the time of its preprocessing where there are `several` sources.
+    fn cells(&self, several: bool) -> Vec<Inline> {
+        let none = || "\u{2013}".to_owned();
+        let number = |value: Option<f64>| value.map_or_else(none, |value| significant(value, 3));
+        let mut row = cells([
+            self.multiplications.to_string(),
+            self.seconds.evaluation.map_or_else(none, short),
+            self.seconds.integration.map_or_else(none, duration),
+            self.steps.map_or_else(none, |steps| steps.to_string()),
+            bytes(self.file_bytes),
+        ]);
+        row.extend(several.then(|| self.seconds.preprocessing.map_or_else(none, duration).into()));
+        row.extend(cells(self.errors.named().map(|(_, error)| number(error))));
+        row.push(significant(self.worst, 3).into());
+        row.extend(self.case.map(Inline::from));
+        row
+    }
+}
+
 impl<'a> RowFacts<'a> {
     fn new(number: usize, row: &'a TradeRow, cases: &'a [TradeCase]) -> Self {
         let candidate = &row.candidate;
@@ -167,7 +189,7 @@ impl<'a> RowFacts<'a> {
             words.push_str(", not the lowest");
         }
         if let (Some(scheme), Some(part)) = (self.lumped, self.lumped_part) {
-            let _ = write!(words, ", {} {part}", plain(scheme));
+            words.push_str(&format!(", {scheme} {part}"));
         }
         if self.storage == Storage::F32.name() {
             words.push_str(", f32");
@@ -179,7 +201,7 @@ impl<'a> RowFacts<'a> {
         if self.groups.is_empty() { "no group".to_owned() } else { self.groups.join(" ") }
     }
 
-    /// Whether it has all modes up to its last.
+    /// Returns true if the candidate has all modes up to its last.
     fn lowest(&self) -> bool {
         self.mode_numbers.last() == Some(&self.modes)
     }
@@ -211,8 +233,8 @@ impl<'a> TradeFacts<'a> {
             cases: case_facts(trade, lacks),
             diagnostics: &run.diagnostics,
             threads: run.threads,
-            wall_seconds: run.phases.iter().map(|phase| phase.wall_seconds).sum(),
-            cpu_seconds: run.phases.iter().map(|phase| phase.cpu_seconds).sum(),
+            wall_seconds: run.wall_seconds(),
+            cpu_seconds: run.cpu_seconds(),
         };
         let names = facts.names();
         let is_nodal = trade.cases.iter().any(|case| case.nodal.is_some());
@@ -228,11 +250,7 @@ impl<'a> TradeFacts<'a> {
 
     /// The facts in a format, ending with a line break.
     pub fn render(&self, format: Format) -> String {
-        match format {
-            Format::Json => json(self),
-            Format::Text => self.text(),
-            Format::Html => self.html(),
-        }
+        Document::render(self, format, || self.document())
     }
 
     fn tolerances_in_words(&self) -> String {
@@ -243,13 +261,6 @@ impl<'a> TradeFacts<'a> {
         match self.reference {
             ReferenceKind::Full => "the whole body",
             ReferenceKind::Nodal => "the motion of all nodes",
-        }
-    }
-
-    fn reference_told(&self) -> String {
-        match &self.nodal {
-            None => self.against().to_owned(),
-            Some(nodal) => format!("{}: {}", self.against(), nodal.in_words()),
         }
     }
 
@@ -264,174 +275,140 @@ impl<'a> TradeFacts<'a> {
         rows
     }
 
-    fn text(&self) -> String {
-        let mut page = Page(String::new());
-        let count = counted(self.rows.len(), "candidate");
-        page.entry(
-            "Trade",
-            &format!("{}: {}, {count} against {}", plain(self.scene), plain(self.body), self.against()),
-        );
-        for line in &self.verdict {
-            page.entry(line.label, &line.text);
-        }
+    fn document(&self) -> Document<'_> {
+        let mut blocks = self.verdict();
         let names = self.names();
-        for (i, case) in self.cases.iter().enumerate() {
-            page.entry(if i == 0 { "Load cases" } else { "" }, &case.in_words(&names));
-        }
-        if let Some(nodal) = &self.nodal {
-            page.entry("Nodes", &nodal.in_words());
-        }
-        page.entry("Whole body", &reference_in_words(&self.reference_lacks));
-        page.0.push_str("\n  multiplications  evaluation  simulation      file  error/tol  what\n");
-        for row in self.shown() {
-            let Some(measured) = &row.measured else { continue };
-            let taken = if self.recommended == Some(row.number) { '>' } else { ' ' };
-            let _ = writeln!(
-                page.0,
-                "{taken} {:>15}  {:>10}  {:>10}  {:>8}  {:>9}  {}",
-                measured.multiplications,
-                measured.seconds.evaluation.map_or_else(String::new, short),
-                measured.seconds.integration.map_or_else(String::new, duration),
-                bytes(measured.file_bytes),
-                significant(measured.worst, 3),
-                row.in_words()
-            );
-        }
-        page.0.push('\n');
-        let failed = self.rows.iter().filter(|row| row.failed.is_some()).count();
-        if failed > 0 {
-            page.entry("Failed", &format!("{}: --json and --report say why", counted(failed, "candidate")));
-        }
-        let (wall, cpu) = (duration(self.wall_seconds), duration(self.cpu_seconds));
-        page.entry("Time", &format!("{wall} wall, {cpu} CPU, {}", counted(self.threads, "thread")));
-        diagnostics_lines(&mut page, self.diagnostics);
-        page.0
-    }
-
-    fn html(&self) -> String {
-        let mut html = String::new();
-        let class = if self.recommended.is_some() { "" } else { " open" };
-        let [asked, taken, rest @ ..] = &self.verdict[..] else { return html };
-        let _ = writeln!(
-            html,
-            "<p class=\"verdict{class}\"><strong>{}: {}.</strong></p>",
-            taken.label,
-            escape(&taken.text)
-        );
-        terms(&mut html, [asked].into_iter().chain(rest).map(|line| (line.label, escape(&line.text))));
-        section(&mut html, "What is compared");
-        terms(
-            &mut html,
-            [
-                ("Body", escape(self.body)),
-                ("Reference", self.reference_told()),
-                ("Whole body", escape(&reference_in_words(&self.reference_lacks))),
-                ("Tolerances", escape(&self.tolerances_in_words())),
-                (
-                    "Candidates",
-                    format!(
-                        "{}, each integrated with the method and the step of the reference",
-                        self.rows.len()
-                    ),
-                ),
-                ("Cost", "multiplications of one evaluation of the equations of motion".to_owned()),
-                (
-                    "Time",
-                    format!(
-                        "{} wall, {} CPU, {}",
-                        duration(self.wall_seconds),
-                        duration(self.cpu_seconds),
-                        counted(self.threads, "thread")
-                    ),
-                ),
-            ],
-        );
+        let cases = self.cases.iter().map(|case| Term::text("Load cases", case.in_words(&names)));
+        blocks.push(Block::Terms(cases.collect()));
+        blocks.extend([heading("What is compared"), Block::Terms(self.compared())]);
         if !self.cases.is_empty() {
-            section(&mut html, "Load cases");
-            cases_table(&mut html, &self.cases, &self.names());
+            blocks.extend([heading("Load cases"), Block::Table(cases_table(&self.cases, &names))]);
         }
-        section(&mut html, "Error against cost");
-        html.push_str(&self.chart());
-        section(&mut html, "Pareto front");
-        self.table(&mut html, "No other candidate is as cheap and as accurate", &self.shown());
-        section(&mut html, "All candidates");
-        self.table(&mut html, "In the order in which they were tried", &self.rows.iter().collect::<Vec<_>>());
-        diagnostics_table(&mut html, self.diagnostics);
-        page(self.scene, "Trade study", &self.generator, &html)
+        blocks.push(heading("Error against cost"));
+        blocks.extend(self.chart().map(Block::Chart));
+        let front = self.table("No other candidate is as cheap and as accurate", &self.shown());
+        let front = Block::Table(front.in_text(|head| IN_TEXT.contains(&head)));
+        blocks.extend([Block::Gap, heading("Pareto front"), front, Block::Gap]);
+        let all = self.table("In the order in which they were tried", &self.rows.iter().collect::<Vec<_>>());
+        blocks.extend([heading("All candidates"), Block::Table(all), Block::Terms(self.work())]);
+        blocks.push(Block::Diagnostics(self.diagnostics));
+        Document { name: self.scene, kind: "Trade study", generator: &self.generator, blocks }
     }
 
-    fn chart(&self) -> String {
+    /// The verdict, in a page without what is to be taken: it has that at its head.
+    fn verdict<'b>(&self) -> Vec<Block<'b>> {
+        let count = counted(self.rows.len(), "candidate");
+        let title = format!("{}: {}, {count} against {}", self.scene, self.body, self.against());
+        let mut terms = vec![Term::text("Trade", title)];
+        terms.extend(self.verdict.iter().enumerate().map(|(i, line)| match i {
+            1 => Term::text(line.label, line.text.as_str()),
+            _ => Term::new(line.label, line.text.as_str()),
+        }));
+        let state = if self.recommended.is_some() { State::Good } else { State::Open };
+        let taken = self.verdict.get(1).map(|line| format!("{}: {}.", line.label, line.text));
+        let head = taken.map(|head| Block::Verdict { state, head, rest: String::new() });
+        head.into_iter().chain([Block::Terms(terms)]).collect()
+    }
+
+    fn compared(&self) -> Vec<Term> {
+        let reference = match &self.nodal {
+            None => Term::page("Reference", self.against()),
+            Some(nodal) => {
+                let words = nodal.in_words();
+                Term::new("Reference", format!("{}: {words}", self.against())).in_text("Nodes", words)
+            }
+        };
+        let candidates =
+            format!("{}, each integrated with the method and the step of the reference", self.rows.len());
+        vec![
+            Term::page("Body", self.body),
+            reference,
+            Term::new("Whole body", reference_in_words(&self.reference_lacks)),
+            Term::page("Tolerances", self.tolerances_in_words()),
+            Term::page("Candidates", candidates),
+            Term::page("Cost", "multiplications of one evaluation of the equations of motion"),
+            Term::page("Time", self.time_in_words()),
+        ]
+    }
+
+    fn time_in_words(&self) -> String {
+        format!("{}, {}", times(self.wall_seconds, self.cpu_seconds), counted(self.threads, "thread"))
+    }
+
+    /// Failures and times at the end of a text.
+    fn work(&self) -> Vec<Term> {
+        let failed = self.rows.iter().filter(|row| row.failed.is_some()).count();
+        let why = format!("{}: --json and --report say why", counted(failed, "candidate"));
+        let failed = (failed > 0).then(|| Term::text("Failed", why));
+        failed.into_iter().chain([Term::text("Time", self.time_in_words())]).collect()
+    }
+
+    /// Error against cost; `None` if nothing was measured.
+    fn chart(&self) -> Option<Chart> {
         let point = |number: usize| {
             let measured = self.rows[number - 1].measured.as_ref()?;
-            Some((measured.multiplications as f64, measured.worst))
+            Some([measured.multiplications as f64, measured.worst.max(NO_ERROR)])
         };
-        let series = |kind: CandidateKind| {
+        let of_kind = |(i, kind): (usize, CandidateKind)| {
             let rows = self.rows.iter().filter(move |row| row.kind == kind);
-            let named = rows.filter_map(|row| {
-                let (cost, error) = point(row.number)?;
-                Some((format!("{}: {}", row.number, row.in_words()), cost, error))
-            });
-            Series { name: kind.name(), points: named.collect() }
+            let (points, titles) = rows
+                .filter_map(|row| Some((point(row.number)?, format!("{}: {}", row.number, row.in_words()))))
+                .unzip();
+            let mark = [Mark::Disc, Mark::Square, Mark::Triangle, Mark::Circle][i % 4];
+            Series { titles, ..Series::new(kind.name(), mark, i, points) }
         };
-        let chart = Chart {
-            title: "Largest ratio of error to tolerance against multiplications per evaluation",
-            x: "multiplications per evaluation",
-            y: "largest error / tolerance",
-            front: self.front.iter().filter_map(|&number| point(number)).collect(),
-            ring: self.recommended.and_then(point),
-            most: self.allowed_multiplications.map(|most| most as f64),
-            floor: NO_ERROR,
-        };
-        scatter_chart(&chart, &CandidateKind::ALL.map(series))
+        let mut series: Vec<Series> = CandidateKind::ALL.into_iter().enumerate().map(of_kind).collect();
+        let measured = || series.iter().flat_map(|own| &own.points);
+        let most = self.allowed_multiplications.map(|most| most as f64);
+        let costs = measured().map(|point| point[0]).chain(most);
+        let x = Axis::decades("multiplications per evaluation", costs, f64::INFINITY)?;
+        // The tolerance is always seen.
+        let errors = measured().map(|point| point[1]).chain([1.0]);
+        let y = Axis::decades("largest error / tolerance", errors, f64::INFINITY)?;
+        let front = self.front.iter().filter_map(|&number| point(number)).collect();
+        let ring = self.recommended.and_then(point).into_iter().collect();
+        let allowed = x.ends().map(|cost| [cost, 1.0]).to_vec();
+        series.insert(0, Series::new("what is allowed", Mark::Line, 1, allowed));
+        series.extend(
+            most.map(|most| Series::new("", Mark::Line, 1, y.ends().map(|error| [most, error]).to_vec())),
+        );
+        series.insert(0, Series::new("Pareto front", Mark::Line, 0, front));
+        series.push(Series::new("recommended", Mark::Ring, 0, ring));
+        let title = "Largest ratio of error to tolerance against multiplications per evaluation".to_owned();
+        Some(Chart { title, x, panels: vec![Panel { caption: String::new(), y, height: 330.0, series }] })
     }
 
-    fn table(&self, html: &mut String, caption: &str, rows: &[&RowFacts<'a>]) {
+    fn table(&self, caption: &str, rows: &[&RowFacts<'a>]) -> Table {
         // A body alone is one source, and nobody knows how long it took to make.
         let several = self.rows.iter().any(|row| row.source != self.rows[0].source);
-        let none = || "&ndash;".to_owned();
-        let optional = |value: Option<f64>| value.map_or_else(none, |v| significant(v, 3));
-        let made_in = |m: &MeasuredFacts<'_>| m.seconds.preprocessing.map_or_else(none, duration);
-        let mut head = vec!["No.", "What"];
-        head.extend(several.then_some("Of"));
-        head.extend(["To (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
-        head.extend(several.then_some("Made in"));
-        head.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
-        head.extend((!self.cases.is_empty()).then_some("Worst case"));
-        let cells = |row: &&RowFacts<'a>| {
-            let take = if self.recommended == Some(row.number) { "&#9654;&nbsp;" } else { "" };
-            let mut cells =
-                vec![format!("{take}{}", row.number), escape(&row.in_words()).replace(' ', "&nbsp;")];
-            cells.extend(several.then(|| escape(row.source)));
-            cells.push(significant(row.last_frequency_hz, 5));
+        let mut heads = vec!["No.", "What"];
+        heads.extend(several.then_some("Of"));
+        heads.extend(["To (Hz)", "Multiplications", "Evaluation", "Simulation", "Steps", "File"]);
+        heads.extend(several.then_some("Made in"));
+        heads.extend(["Attitude (rad)", "Deflection", "Stress", "Reaction", "Error / tolerance"]);
+        heads.extend((!self.cases.is_empty()).then_some("Worst case"));
+        let row = |row: &&RowFacts<'a>| {
+            let taken = if self.recommended == Some(row.number) { ">\u{a0}" } else { "" };
+            let mut row_cells =
+                cells([format!("{taken}{}", row.number), row.in_words().replace(' ', "\u{a0}")]);
+            row_cells.extend(several.then(|| row.source.into()));
+            row_cells.push(significant(row.last_frequency_hz, 5).into());
             match (&row.measured, row.failed) {
-                (Some(m), _) => {
-                    cells.extend([
-                        m.multiplications.to_string(),
-                        m.seconds.evaluation.map_or_else(none, short),
-                        m.seconds.integration.map_or_else(none, duration),
-                        m.steps.map_or_else(none, |steps| steps.to_string()),
-                        bytes(m.file_bytes),
-                    ]);
-                    cells.extend(several.then(|| made_in(m)));
-                    cells.extend(m.errors.named().map(|(_, error)| optional(error)));
-                    cells.push(significant(m.worst, 3));
-                    cells.extend(m.case.map(escape));
-                }
+                (Some(measured), _) => row_cells.extend(measured.cells(several)),
                 (None, failed) => {
                     let message = failed.map_or("", |diagnostic| diagnostic.message());
-                    cells.push(format!("<span class=\"error\">{}</span>", escape(message)));
-                    cells.extend(std::iter::repeat_n(String::new(), head.len() - cells.len()));
+                    row_cells.push(Span::Error(message.to_owned()).into());
                 }
             }
-            cells
+            row_cells.resize(heads.len(), Inline::default());
+            row_cells
         };
-        let rows: Vec<Vec<String>> = rows.iter().map(cells).collect();
-        let head: Vec<String> = head.iter().map(|cell| (*cell).to_owned()).collect();
-        table(html, caption, &head, if several { &[1, 2] } else { &[1] }, &rows);
+        let rows = rows.iter().map(row).collect();
+        Table::new(caption, heads.iter().copied(), if several { &[0, 1, 2] } else { &[0, 1] }, rows)
     }
 }
 
-/// What the reference lacks in the load case where it lacks most at last.
+/// Errors of the reference in the load case where its last error is largest.
 fn worst_lacks(lacks: &[Vec<ReferenceError>]) -> &[ReferenceError] {
     let last = |rounds: &&Vec<ReferenceError>| rounds.last().map_or(-1.0, |own| own.worst);
     // The first of equals.
@@ -450,14 +427,12 @@ fn short(seconds: f64) -> String {
 
 /// The study as a table of comma-separated values, a row for every candidate; numbers round-trip.
 pub fn trade_csv(trade: &Trade) -> String {
-    let mut out = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
+    let mut table = "number,source,kind,modes,last_frequency_hz,groups,lumped,lumped_part,storage,multiplications,evaluation_seconds,\
                    integration_seconds,preprocessing_seconds,steps,file_bytes,attitude,deflection,stress,reaction,worst,\
                    case,on_front,recommended,failed\n"
         .to_owned();
     for (at, row) in trade.rows.iter().enumerate() {
         let facts = RowFacts::new(at + 1, row, &trade.cases);
-        let text = |text: &str| super::simulation::csv_cell(text);
-        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:e}"));
         let m = facts.measured.as_ref();
         let errors = m.map(|m| m.errors).unwrap_or_default();
         let count = |number: fn(&MeasuredFacts<'_>) -> Option<u64>| {
@@ -465,32 +440,31 @@ pub fn trade_csv(trade: &Trade) -> String {
         };
         let cells = [
             facts.number.to_string(),
-            text(facts.source),
-            text(facts.kind.name()),
+            csv::text(facts.source),
+            csv::text(facts.kind.name()),
             facts.modes.to_string(),
-            number(Some(facts.last_frequency_hz)),
+            csv::number(facts.last_frequency_hz),
             facts.groups.join(" "),
-            text(facts.lumped.unwrap_or_default()),
+            csv::text(facts.lumped.unwrap_or_default()),
             facts.lumped_part.unwrap_or_default().to_owned(),
             facts.storage.to_owned(),
             count(|m| Some(m.multiplications as u64)),
-            number(m.and_then(|m| m.seconds.evaluation)),
-            number(m.and_then(|m| m.seconds.integration)),
-            number(m.and_then(|m| m.seconds.preprocessing)),
+            csv::number(m.and_then(|m| m.seconds.evaluation)),
+            csv::number(m.and_then(|m| m.seconds.integration)),
+            csv::number(m.and_then(|m| m.seconds.preprocessing)),
             count(|m| m.steps),
             count(|m| Some(m.file_bytes)),
-            number(errors.attitude),
-            number(errors.deflection),
-            number(errors.stress),
-            number(errors.reaction),
-            number(m.map(|m| m.worst)),
-            text(m.and_then(|m| m.case).unwrap_or_default()),
+            csv::number(errors.attitude),
+            csv::number(errors.deflection),
+            csv::number(errors.stress),
+            csv::number(errors.reaction),
+            csv::number(m.map(|m| m.worst)),
+            csv::text(m.and_then(|m| m.case).unwrap_or_default()),
             trade.front.contains(&at).to_string(),
             (trade.recommended.row() == Some(at)).to_string(),
-            text(facts.failed.map_or("", |failed| failed.message())),
+            csv::text(facts.failed.map_or("", |failed| failed.message())),
         ];
-        out.push_str(&cells.join(","));
-        out.push('\n');
+        csv::push_row(&mut table, cells);
     }
-    out
+    table
 }

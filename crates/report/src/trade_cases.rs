@@ -1,9 +1,9 @@
-//! What the load cases of a trade study are to its candidates.
+//! Load cases of a trade study: the errors of its candidates there, and the decisions.
 
-use super::errors_in_words::errors_in_words;
+use super::document::{Table, cells};
+use super::errors_in_words::{errors_in_words, part_in_words};
 use super::lacks::LackFacts;
-use super::markup::{escape, table};
-use super::numbers::{counted, plain, significant};
+use super::numbers::counted;
 use super::trade_nodes::NodalFacts;
 use flexbody_motion::scene::{OutputErrors, Tolerance};
 use flexbody_study::reference::ReferenceError;
@@ -29,9 +29,9 @@ pub(super) struct TradeCaseFacts<'a> {
     /// that no other case rules out.
     ruled_out: usize,
     ruled_out_alone: usize,
-    /// How the equations of all nodes were integrated, where they are the reference.
+    /// Integration of the equations of all nodes, where they are the reference.
     nodal: Option<NodalFacts>,
-    /// What the body of row 1, and those before it that were enriched, lack of the model in this case.
+    /// Errors of the body of row 1, and of those before it that were enriched, beside the model in this case.
     reference_lacks: Vec<LackFacts>,
 }
 
@@ -59,11 +59,6 @@ pub(super) fn case_facts<'a>(trade: &'a Trade, lacks: &[Vec<ReferenceError>]) ->
 }
 
 impl TradeCaseFacts<'_> {
-    fn part(&self) -> String {
-        self.worst
-            .map_or_else(|| "not known".to_owned(), |worst| format!("{} %", significant(100.0 * worst, 2)))
-    }
-
     /// `rules out 12 cheaper candidates, 3 of them alone`.
     fn decides(&self) -> String {
         match self.ruled_out {
@@ -82,15 +77,15 @@ impl TradeCaseFacts<'_> {
     /// `braking: stress 1.2 %: 60 % of what is allowed; rules out ...; alone it takes 6 modes, W1`.
     pub(crate) fn in_words(&self, names: &[String]) -> String {
         let errors = self.errors.as_ref().map_or_else(String::new, |errors| {
-            format!("{}: {} of what is allowed; ", errors_in_words(errors), self.part())
+            format!("{}: {} of what is allowed; ", errors_in_words(errors), part_in_words(self.worst))
         });
-        format!("{}: {errors}{}; alone it takes {}", plain(self.name), self.decides(), self.alone(names))
+        format!("{}: {errors}{}; alone it takes {}", self.name, self.decides(), self.alone(names))
     }
 }
 
 /// The errors of the recommended candidate in every load case, and what each decides.
-pub(super) fn cases_table(html: &mut String, cases: &[TradeCaseFacts<'_>], names: &[String]) {
-    let head = [
+pub(super) fn cases_table(cases: &[TradeCaseFacts<'_>], names: &[String]) -> Table {
+    let heads = [
         "Load case",
         "Errors",
         "Of what is allowed",
@@ -101,9 +96,15 @@ pub(super) fn cases_table(html: &mut String, cases: &[TradeCaseFacts<'_>], names
     let row = |case: &TradeCaseFacts<'_>| {
         let errors = case.errors.as_ref().map_or_else(|| "not measured".to_owned(), errors_in_words);
         let lacks = case.reference_lacks.last().map_or_else(|| "not known".to_owned(), LackFacts::parts);
-        vec![escape(case.name), errors, case.part(), case.decides(), case.alone(names), lacks]
+        cells([
+            case.name.to_owned(),
+            errors,
+            part_in_words(case.worst),
+            case.decides(),
+            case.alone(names),
+            lacks,
+        ])
     };
-    let rows: Vec<Vec<String>> = cases.iter().map(row).collect();
     let caption = "The recommended candidate in each load case. A case rules out the cheaper candidates whose errors are beyond its tolerances; what it takes alone is the cheapest candidate that is within them.";
-    table(html, caption, &head.map(str::to_owned), &[1, 3, 4, 5], &rows);
+    Table::new(caption, heads, &[1, 3, 4, 5], cases.iter().map(row).collect())
 }

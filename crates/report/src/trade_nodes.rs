@@ -1,11 +1,11 @@
-//! How the equations of all nodes were integrated for a trade study.
+//! Integration of the equations of all nodes for a trade study.
 
 use super::numbers::significant;
 use flexbody_motion::scene::Scheme;
 use flexbody_study::trade::NodalIntegration;
 use serde::Serialize;
 
-/// How the equations of all nodes were integrated.
+/// Integration of the equations of all nodes.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct NodalFacts {
     rows: usize,

@@ -2,7 +2,7 @@
 
 use super::errors_in_words::errors_in_words;
 use super::lacks::LackFacts;
-use super::numbers::{duration, plain, significant};
+use super::numbers::{duration, significant};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::trade::{InCase, Measured, Recommendation, Trade, TradeRow};
 
@@ -78,9 +78,10 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
     let (output, error, allowed) = own.deciding().errors.decisive(&case.tolerance);
     let part = error / allowed;
     let times = significant(part, 2);
-    let reference = match part <= 1.0 && case.reserved > 0.0 {
-        true => format!(", beside the {} that the reference itself lacks", significant(case.reserved, 2)),
-        false => String::new(),
+    let reference = if part <= 1.0 && case.reserved > 0.0 {
+        format!(", beside the {} that the reference itself lacks", significant(case.reserved, 2))
+    } else {
+        String::new()
     };
     format!(
         "{first}; the next cheaper one, {}, is off in {output} by {times} times what is allowed{}{reference}",
@@ -92,7 +93,7 @@ fn why(trade: &Trade, names: &[String], measured: &Measured) -> String {
 /// ` in case braking`, of several load cases.
 fn in_case(trade: &Trade, measured: &Measured) -> String {
     let name = trade.cases[measured.case].name.as_ref();
-    name.map_or_else(String::new, |name| format!(" in case {}", plain(name)))
+    name.map_or_else(String::new, |name| format!(" in case {name}"))
 }
 
 fn error(trade: &Trade, measured: &Measured, lacking: Option<&ReferenceError>) -> String {

@@ -5,12 +5,14 @@ mod motion;
 
 use super::Format;
 use super::facts::UnitFacts;
+use super::html::Plain;
 use super::numbers::{bytes, counted, plain, significant};
 use super::picture::{Drawing, HALF_STEP, Packed, SCRIPT, ShownBody, script};
 use super::render::json;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_file::RecordedMotion;
+use maud::Render;
 use motion::ShownMotion;
 use serde::Serialize;
 
@@ -21,14 +23,14 @@ const STYLE: &str = include_str!("view/view.css");
 /// page stays below 10 MB.
 const ROOM: usize = 7_000_000;
 
-/// What a page shows, computed.
+/// Facts and markup of a page.
 #[derive(Debug, Clone)]
 pub struct View {
     facts: ViewFacts,
     page: String,
 }
 
-/// What was put into a page, for the terminal and for programs.
+/// Contents of a page, for the terminal and for programs.
 #[derive(Debug, Clone, Serialize)]
 struct ViewFacts {
     model: String,
@@ -86,7 +88,7 @@ impl View {
         &self.page
     }
 
-    /// What was drawn.
+    /// Renders the facts of the drawing.
     pub fn render(&self, format: Format) -> String {
         match format {
             Format::Json => json(&self.facts),
@@ -117,7 +119,7 @@ impl ViewFacts {
     }
 }
 
-/// What the page says of the body.
+/// Names and values beside the picture of the body.
 fn terms(
     body: &FlexBody,
     drawing: &Drawing<'_>,
@@ -151,7 +153,7 @@ fn terms(
 /// The whole page.
 fn page(title: &str, data: &ShownBody<'_, ShownMotion>, arrays: &[Packed]) -> String {
     let facts = data.json();
-    let title = super::markup::escape(title);
+    let title = Plain(title).render().into_string();
     let arrays: String = arrays.iter().map(script).collect();
     let parts =
         [("STYLE", STYLE), ("SCRIPT", SCRIPT), ("TITLE", &title), ("FACTS", &facts), ("ARRAYS", &arrays)];

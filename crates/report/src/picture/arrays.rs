@@ -14,9 +14,10 @@ impl Packed {
 
     /// Indices of so many vertices: 16 bits each where these are enough.
     pub(crate) fn indices(name: &'static str, vertices: usize, values: &[u32]) -> Self {
-        let bytes: Vec<u8> = match vertices > usize::from(u16::MAX) {
-            true => values.iter().flat_map(|value| value.to_le_bytes()).collect(),
-            false => values.iter().flat_map(|value| value.to_le_bytes()[..2].to_vec()).collect(),
+        let bytes: Vec<u8> = if vertices > usize::from(u16::MAX) {
+            values.iter().flat_map(|value| value.to_le_bytes()).collect()
+        } else {
+            values.iter().flat_map(|value| value.to_le_bytes()[..2].to_vec()).collect()
         };
         Self::of_bytes(name, &bytes)
     }

@@ -1,4 +1,4 @@
-//! What of a body is drawn: its surface, thinned where it is large, or its nodes as points.
+//! Drawn parts of a body: its surface, thinned where it is large, or its nodes as points.
 
 use super::arrays::Packed;
 use crate::numbers::counted;
@@ -104,7 +104,7 @@ impl<'b> Drawing<'b> {
         arrays
     }
 
-    /// How many modes it moves in.
+    /// Number of modes that it moves in.
     pub(crate) fn modes(&self) -> usize {
         self.sizes.len()
     }
@@ -178,7 +178,7 @@ impl<'b> Drawing<'b> {
         self.centre.into()
     }
 
-    /// What 32767 stands for in positions.
+    /// Position that 32767 stands for.
     pub(crate) fn half(&self) -> f64 {
         self.half
     }
@@ -190,7 +190,7 @@ impl<'b> Drawing<'b> {
         if radius > 0.0 { radius } else { 1.0 }
     }
 
-    /// What 32767 stands for in the shape of mode `j`.
+    /// Component of the shape of mode `j` that 32767 stands for.
     pub(crate) fn scale(&self, j: usize) -> f64 {
         self.sizes[j][0]
     }
@@ -200,7 +200,7 @@ impl<'b> Drawing<'b> {
         self.sizes[j][1]
     }
 
-    /// How far a drawn node may be from its place, along an axis.
+    /// Largest distance of a drawn node from its place, along an axis.
     #[cfg(feature = "hdf5")]
     pub(crate) fn position_error(&self) -> f64 {
         self.half * HALF_STEP

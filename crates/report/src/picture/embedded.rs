@@ -17,7 +17,7 @@ const MODES: usize = 60;
 
 /// The parts of a report that draw its body.
 pub(crate) struct Embedded {
-    /// Where the body is seen.
+    /// Element with the picture.
     pub panel: String,
     /// Elements for the end of the page: numbers and script.
     pub scripts: String,
@@ -42,7 +42,7 @@ impl Embedded {
     }
 }
 
-/// What is drawn, where that is not all.
+/// Drawn parts in words, with those that are left out.
 fn drawn(body: &FlexBody, drawing: &Drawing<'_>) -> String {
     let mut told = vec![match drawing.kind() {
         "points" => "nodes as points, since the file has no surface".to_owned(),

@@ -1,4 +1,4 @@
-//! What the script of a page is told of a body: names, places of its points, modes and interfaces.
+//! Data of a body for the script of a page: names, places of its points, modes and interfaces.
 
 use super::drawing::{Drawing, turned};
 use crate::facts::UnitFacts;
@@ -9,7 +9,7 @@ use flexbody_body::flex_body::{FlexBody, Interface, is_static};
 use flexbody_body::invariants::principal_axes;
 use serde::Serialize;
 
-/// What draws a body in a page, from the numbers and texts that the page has.
+/// The script that draws a body in a page, from the numbers and texts that the page has.
 pub(crate) const SCRIPT: &str = include_str!("view.js");
 
 /// The centre of mass and the principal axes, in model axes.
@@ -29,7 +29,7 @@ impl Placed {
         }
     }
 
-    /// Where an axis of this length from the centre of mass ends.
+    /// End of an axis of this length from the centre of mass.
     pub(super) fn axis_end(&self, axis: &[f64; 3], length: f64) -> [f64; 3] {
         [0, 1, 2].map(|k| self.centre_of_mass[k] + length * axis[k])
     }
@@ -78,7 +78,7 @@ struct ShownInterface {
 }
 
 impl<'a, M: Serialize> ShownBody<'a, M> {
-    /// What is shown of `body` with the modes of `drawing`, with `terms` beside it, moved by `motion`.
+    /// Data of `body` with the modes of `drawing`, with `terms` beside it, moved by `motion`.
     pub(crate) fn new(
         body: &FlexBody,
         drawing: &Drawing<'_>,
@@ -104,7 +104,7 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
         }
     }
 
-    /// As JSON that no text in it ends the element of.
+    /// Returns the data as JSON in which no text ends the element of the page.
     pub(crate) fn json(&self) -> String {
         let json = serde_json::to_string(self).expect("structs of numbers and texts are valid JSON");
         json.replace('<', "\\u003c")
@@ -114,9 +114,10 @@ impl<'a, M: Serialize> ShownBody<'a, M> {
 fn mode(body: &FlexBody, drawing: &Drawing<'_>, j: usize) -> ShownMode {
     let hertz = significant(body.frequencies_hz()[j], 5);
     let origin = body.modes().provenance.get(j).map_or("mode", String::as_str);
-    let (label, kind) = match is_static(origin) {
-        true => (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz")),
-        false => (format!("{}: {hertz} Hz", j + 1), origin.to_owned()),
+    let (label, kind) = if is_static(origin) {
+        (format!("{}: {origin}", j + 1), format!("{origin}; its eigenvalue stands for {hertz} Hz"))
+    } else {
+        (format!("{}: {hertz} Hz", j + 1), origin.to_owned())
     };
     ShownMode {
         label: plain(&label),

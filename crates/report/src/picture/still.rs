@@ -37,9 +37,10 @@ pub(crate) fn still(body: &FlexBody) -> Option<String> {
         "<svg class=\"still\" viewBox=\"0 0 {WIDTH} {:.0}\" role=\"img\" aria-label=\"The part, undeformed, with its principal axes of inertia 1, 2 and 3 at the centre of mass and the axes of the model in the corner.\">\n",
         view.height
     );
-    match drawing.triangle_corners().is_empty() && drawing.edge_ends().is_empty() {
-        true => points(&mut svg, &drawing, &view),
-        false => surface(&mut svg, &drawing, &view),
+    if drawing.triangle_corners().is_empty() && drawing.edge_ends().is_empty() {
+        points(&mut svg, &drawing, &view)
+    } else {
+        surface(&mut svg, &drawing, &view)
     }
     principal_axes(&mut svg, &placed, &view);
     corner(&mut svg, &view);
@@ -61,9 +62,10 @@ struct Projection {
 impl Projection {
     fn onto_page(drawing: &Drawing<'_>, placed: &Placed, plane: bool) -> Option<Self> {
         let turned = |axis, angle| Rotation3::from_axis_angle(&axis, angle);
-        let turn = match plane {
-            true => turned(Vector3::x_axis(), -0.35),
-            false => turned(Vector3::x_axis(), -1.12) * turned(Vector3::z_axis(), -0.6),
+        let turn = if plane {
+            turned(Vector3::x_axis(), -0.35)
+        } else {
+            turned(Vector3::x_axis(), -1.12) * turned(Vector3::z_axis(), -0.6)
         };
         let mut own = Self {
             turn: turn.into_inner(),
@@ -167,7 +169,7 @@ fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
     path
 }
 
-/// How bright a triangle is, by its angle to the light.
+/// Brightness of a triangle, by its angle to the light.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 to 1 before
 fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();

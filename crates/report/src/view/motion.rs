@@ -83,9 +83,10 @@ impl ShownMotion {
 
     /// `2000 of 100000 instants`.
     pub(super) fn in_words(&self) -> String {
-        match self.written == self.time.len() {
-            true => self.written.to_string(),
-            false => format!("{} of {}", self.time.len(), counted(self.written, "instant")),
+        if self.written == self.time.len() {
+            self.written.to_string()
+        } else {
+            format!("{} of {}", self.time.len(), counted(self.written, "instant"))
         }
     }
 }

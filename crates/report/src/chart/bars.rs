@@ -1,0 +1,81 @@
+//! Bars of values on one axis, in groups.
+
+use super::{At, Axis, STYLES, label, segment};
+use crate::html::Plain;
+use maud::{Markup, Render, html};
+
+/// Places on the drawing, in its own units: the names of the groups, the bars, the values at their ends.
+const NAMES: f64 = 112.0;
+const PLOT: f64 = 560.0;
+const VALUES: f64 = 168.0;
+const BAR: f64 = 13.0;
+const GAP: f64 = 11.0;
+const TOP: f64 = 22.0;
+
+/// Groups of bars.
+pub(crate) struct Bars {
+    pub description: String,
+    pub caption: String,
+    pub axis: Axis,
+    pub groups: Vec<(String, Vec<Bar>)>,
+}
+
+/// One bar; a value that is not known has none.
+pub(crate) struct Bar {
+    pub style: usize,
+    pub value: f64,
+    /// Value and name, which stand at the end of the bar.
+    pub label: String,
+    pub name: String,
+}
+
+impl Render for Bars {
+    fn render(&self) -> Markup {
+        let mut top = TOP;
+        let mut next = |bars: &[Bar]| {
+            let own = top + 0.5 * GAP;
+            top += bars.len() as f64 * BAR + GAP;
+            own
+        };
+        let tops: Vec<f64> = self.groups.iter().map(|(_, bars)| next(bars)).collect();
+        html! {
+            figure {
+                svg viewBox=(format!("0 0 {} {top}", NAMES + PLOT + VALUES)) role="img" aria-label=(self.description) {
+                    @for (at, text) in self.axis.ticks() {
+                        @let x = NAMES + PLOT * at;
+                        (segment("grid", [x, TOP], [x, top]))
+                        (label("tick", "middle", [x, 14.0], text))
+                    }
+                    @for ((name, bars), top) in self.groups.iter().zip(tops) {
+                        "\n"
+                        (label("", "end", [NAMES - 8.0, top + 0.5 * BAR * bars.len() as f64 + 4.0], &shortened(name)))
+                        @for (i, bar) in bars.iter().enumerate() { (self.bar(bar, top + BAR * i as f64)) }
+                    }
+                }
+                figcaption { (self.caption) }
+            }
+        }
+    }
+}
+
+impl Bars {
+    fn bar(&self, bar: &Bar, y: f64) -> Markup {
+        let part = if bar.value.is_infinite() { Some(1.0) } else { self.axis.at(bar.value.abs()) };
+        let width = PLOT * part.unwrap_or(0.0);
+        html! {
+            rect class={ "s" (bar.style % STYLES) } x=(NAMES) y=(At(y)) width=(At(width)) height=(BAR - 2.0) {}
+            text x=(At(NAMES + width + 5.0)) y=(At(y + BAR - 3.0)) {
+                (Plain(&bar.label)) " " tspan class="tick" { (Plain(&shortened(&bar.name))) }
+            }
+        }
+    }
+}
+
+/// A name that fits beside the bars.
+fn shortened(name: &str) -> String {
+    const LONGEST: usize = 16;
+    if name.chars().count() <= LONGEST {
+        return name.to_owned();
+    }
+    name.chars().take(LONGEST - 1).chain(['…']).collect()
+}

@@ -1,0 +1,309 @@
+//! Charts of reports: inline SVG, readable without colour and without scripts.
+
+mod axis;
+mod bars;
+mod cells;
+
+pub(crate) use axis::{Axis, Scale};
+pub(crate) use bars::{Bar, Bars};
+pub(crate) use cells::{Cells, DECADES, STEPS, colour_scale, step};
+
+use crate::html::{Plain, raised};
+use maud::{Markup, Render, html};
+
+/// Places on the drawing, in its own units: the labels of the vertical axis, the panels, the names of the series.
+const LEFT: f64 = 92.0;
+const WIDTH: f64 = 600.0;
+const NAMES: f64 = 148.0;
+const TOP: f64 = 24.0;
+const BOTTOM: f64 = 52.0;
+/// Distance of two panels.
+const GAP: f64 = 30.0;
+/// Distance of two names.
+const NAME: f64 = 18.0;
+/// Half the size of a mark.
+const MARK: f64 = 4.0;
+/// Columns that the points of a line are gathered to: no more can be seen.
+const COLUMNS: usize = 600;
+/// Lines and colours of the style sheet.
+pub(crate) const STYLES: usize = 3;
+
+/// Panels with a common horizontal axis, one above the other.
+pub(crate) struct Chart {
+    pub title: String,
+    pub x: Axis,
+    pub panels: Vec<Panel>,
+}
+
+/// Series over a common vertical axis.
+pub(crate) struct Panel {
+    pub caption: String,
+    pub y: Axis,
+    pub height: f64,
+    pub series: Vec<Series>,
+}
+
+/// Points of one kind.
+pub(crate) struct Series {
+    /// Name in the legend; a series without one is not in it.
+    pub name: String,
+    pub mark: Mark,
+    /// Number of the line and colour in the style sheet.
+    pub style: usize,
+    pub points: Vec<[f64; 2]>,
+    /// Texts that a pointer at the points shows; empty for none.
+    pub titles: Vec<String>,
+}
+
+impl Series {
+    /// Returns a series of points without titles.
+    pub(crate) fn new(name: &str, mark: Mark, style: usize, points: Vec<[f64; 2]>) -> Self {
+        Self { name: name.to_owned(), mark, style: style % STYLES, points, titles: Vec::new() }
+    }
+}
+
+/// Drawing of the points of a series; trade studies, which need HDF5, have most of them.
+#[cfg_attr(not(feature = "hdf5"), allow(dead_code))]
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Mark {
+    /// A line through the points.
+    Line,
+    /// A line that is interrupted where an angle jumps from -180 to 180 degrees.
+    Angle,
+    Dot,
+    Disc,
+    Square,
+    Triangle,
+    Circle,
+    /// A ring around a point of another series.
+    Ring,
+}
+
+/// A coordinate with the digits that a drawing needs.
+pub(super) struct At(pub f64);
+
+impl Render for At {
+    fn render_to(&self, buffer: &mut String) {
+        format!("{:.1}", self.0).render_to(buffer);
+    }
+}
+
+/// A line of the class.
+pub(super) fn segment(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2]) -> Markup {
+    html! { line class=(class) x1=(At(x1)) y1=(At(y1)) x2=(At(x2)) y2=(At(y2)) {} }
+}
+
+/// A label of the given anchor: `start`, `middle` or `end`.
+pub(super) fn label(class: &str, anchor: &str, [x, y]: [f64; 2], text: &str) -> Markup {
+    html! { text class=(class) x=(At(x)) y=(At(y)) text-anchor=(anchor) { (Plain(text)) } }
+}
+
+impl Render for Chart {
+    fn render(&self) -> Markup {
+        let heights: f64 = self.panels.iter().map(|panel| panel.height + GAP).sum();
+        let size = format!("0 0 {} {}", LEFT + WIDTH + NAMES, TOP + heights - GAP + BOTTOM);
+        let mut top = TOP;
+        let placed: Vec<Placed<'_>> = self
+            .panels
+            .iter()
+            .map(|panel| {
+                let own = Placed { x: &self.x, panel, top };
+                top += panel.height + GAP;
+                own
+            })
+            .collect();
+        html! {
+            figure {
+                figcaption { (Plain(&self.title)) }
+                svg viewBox=(size) role="img" aria-label=(Plain(&self.title)) {
+                    @for panel in &placed { (panel.grid()) (panel.series()) (panel.legend()) "\n" }
+                    @if let Some(last) = placed.last() { (last.below()) }
+                }
+            }
+        }
+    }
+}
+
+/// A panel at its place.
+struct Placed<'c> {
+    x: &'c Axis,
+    panel: &'c Panel,
+    top: f64,
+}
+
+impl Placed<'_> {
+    fn bottom(&self) -> f64 {
+        self.top + self.panel.height
+    }
+
+    fn place(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let (across, up) = (self.x.at(x)?, self.panel.y.at(y)?);
+        Some([LEFT + WIDTH * across, self.top + self.panel.height * (1.0 - up)])
+    }
+
+    fn grid(&self) -> Markup {
+        let (top, bottom) = (self.top, self.bottom());
+        html! {
+            (label("tick", "start", [LEFT, top - 7.0], &self.panel.caption))
+            @for (up, text) in self.panel.y.ticks() {
+                @let y = top + self.panel.height * (1.0 - up);
+                (segment("grid", [LEFT, y], [LEFT + WIDTH, y]))
+                (label("tick", "end", [LEFT - 6.0, y + 4.0], text))
+            }
+            @for (across, _) in self.x.ticks() {
+                @let x = LEFT + WIDTH * across;
+                (segment("grid", [x, top], [x, bottom]))
+            }
+            @let middle = format!("translate(14 {:.1}) rotate(-90)", 0.5 * (top + bottom));
+            text class="tick" transform=(middle) text-anchor="middle" { (Plain(&raised(&self.panel.y.label))) }
+        }
+    }
+
+    /// Labels of the horizontal axis, below the panel.
+    fn below(&self) -> Markup {
+        let y = self.bottom();
+        html! {
+            @for (across, text) in self.x.ticks() {
+                (label("tick", "middle", [LEFT + WIDTH * across, y + 18.0], text))
+            }
+            (label("tick", "middle", [LEFT + 0.5 * WIDTH, y + 40.0], &self.x.label))
+        }
+    }
+
+    fn series(&self) -> Markup {
+        html! {
+            @for series in &self.panel.series {
+                @if matches!(series.mark, Mark::Line | Mark::Angle) {
+                    @for piece in pieces(&series.points, series.mark).filter(|piece| piece.len() > 1) {
+                        (self.line(series.style, piece))
+                    }
+                } @else {
+                    @for (i, point) in series.points.iter().enumerate() {
+                        @if let Some(at) = self.place(*point) {
+                            (mark(series, at, series.titles.get(i)))
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn line(&self, style: usize, points: &[[f64; 2]]) -> Markup {
+        let places = gathered(points).into_iter().filter_map(|point| self.place(point));
+        let places: Vec<String> = places.map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
+        html! { polyline class={ "l" (style) } points=(places.join(" ")) {} }
+    }
+
+    /// Names of the series beside the panel, each behind its mark.
+    fn legend(&self) -> Markup {
+        let from = LEFT + WIDTH + 10.0;
+        let named =
+            self.panel.series.iter().filter(|series| !series.name.is_empty() && !series.points.is_empty());
+        html! {
+            @for (i, series) in named.enumerate() {
+                @let y = self.top + 12.0 + NAME * i as f64;
+                @if matches!(series.mark, Mark::Line | Mark::Angle) {
+                    (segment(&format!("l{}", series.style), [from, y], [from + 22.0, y]))
+                } @else {
+                    (mark(series, [from + 11.0, y], None))
+                }
+                (label("", "start", [from + 28.0, y + 4.0], &series.name))
+            }
+        }
+    }
+}
+
+/// The mark of a point, by shape and colour.
+fn mark(series: &Series, [x, y]: [f64; 2], title: Option<&String>) -> Markup {
+    let style = series.style;
+    let title = html! { @if let Some(title) = title { title { (Plain(title)) } } };
+    let disc = |radius: f64| {
+        html! { circle class={ "s" (style) } cx=(At(x)) cy=(At(y)) r=(radius) { (title) } }
+    };
+    match series.mark {
+        Mark::Line | Mark::Angle | Mark::Dot => disc(2.4),
+        Mark::Disc => disc(MARK),
+        Mark::Square => html! {
+            rect class={ "s" (style) } x=(At(x - MARK)) y=(At(y - MARK)) width=(2.0 * MARK) height=(2.0 * MARK) { (title) }
+        },
+        Mark::Triangle => {
+            let path = format!("M{x:.1} {:.1}l{MARK} {}h-{}z", y - MARK, 2.0 * MARK, 2.0 * MARK);
+            html! { path class={ "s" (style) } d=(path) { (title) } }
+        }
+        Mark::Circle => {
+            html! { circle class={ "l" (style) } cx=(At(x)) cy=(At(y)) r=(MARK + 1.5) { (title) } }
+        }
+        Mark::Ring => html! { circle class="ring" cx=(At(x)) cy=(At(y)) r="8" { (title) } },
+    }
+}
+
+/// The pieces of a line: whole, or of angles between the jumps from one end of the circle to the other.
+fn pieces(points: &[[f64; 2]], mark: Mark) -> impl Iterator<Item = &[[f64; 2]]> {
+    points.chunk_by(move |a, b| mark != Mark::Angle || (b[1] - a[1]).abs() <= 180.0)
+}
+
+/// The finite points of a line, gathered to the smallest and the largest value of every column where there are many.
+fn gathered(points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let all: Vec<[f64; 2]> = points.iter().copied().filter(|[_, value]| value.is_finite()).collect();
+    let size = all.len().div_ceil(COLUMNS);
+    if size <= 2 {
+        return all;
+    }
+    let mut kept = Vec::new();
+    for column in all.chunks(size) {
+        let by = |better: fn(f64, f64) -> bool| {
+            (1..column.len()).fold(0, |best, i| if better(column[i][1], column[best][1]) { i } else { best })
+        };
+        let (low, high) = (by(|a, b| a < b), by(|a, b| a > b));
+        kept.extend([column[low.min(high)], column[low.max(high)]]);
+    }
+    kept
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn drawn(y: Axis, mark: Mark, points: Vec<[f64; 2]>) -> String {
+        let x =
+            Axis::between("Hz", Scale::Linear, [points[0][0], points[points.len() - 1][0]]).expect("a range");
+        let mut series = Series::new("a <name>", mark, 0, points);
+        series.titles.push("<b>".to_owned());
+        let panel = Panel { caption: String::new(), y, height: 100.0, series: vec![series] };
+        Chart { title: "t".to_owned(), x, panels: vec![panel] }.render().into_string()
+    }
+
+    #[test]
+    fn gathered_lines_keep_their_peaks() {
+        let mut points: Vec<[f64; 2]> = (0..100_000).map(|i| [f64::from(i), 0.0]).collect();
+        (points[54_321][1], points[54_330][1]) = (7.0, -3.0);
+        let kept = gathered(&points);
+        assert!(kept.len() <= 2 * COLUMNS);
+        for value in [7.0, -3.0] {
+            assert!(kept.iter().any(|point| point[1] == value));
+        }
+        assert!(kept.is_sorted_by(|a, b| a[0] <= b[0]));
+    }
+
+    #[test]
+    fn a_phase_that_wraps_is_no_line_across_the_panel() {
+        let points = vec![[1.0, -170.0], [2.0, -175.0], [3.0, 175.0], [4.0, 170.0]];
+        let chart = drawn(Axis::degrees(), Mark::Angle, points);
+        assert_eq!(chart.matches("<polyline").count(), 2, "{chart}");
+    }
+
+    #[test]
+    fn points_stand_where_their_values_are_and_unknown_ones_nowhere() {
+        let y = || Axis::decades("", [1e-2, 1.0].into_iter(), 9.0).expect("a range");
+        let chart = drawn(y(), Mark::Disc, vec![[1.0, 1.0], [2.0, f64::NAN], [3.0, 0.0], [5.0, 1e-3]]);
+        // Two points, and one in the legend.
+        assert_eq!(chart.matches("<circle").count(), 3, "{chart}");
+        assert!(chart.contains(&format!("cx=\"{LEFT:.1}\" cy=\"{TOP:.1}\"")), "{chart}");
+        assert!(chart.contains(&format!("cx=\"{:.1}\" cy=\"{:.1}\"", LEFT + WIDTH, TOP + 100.0)), "{chart}");
+        assert!(!chart.contains("NaN") && !chart.contains("inf"), "{chart}");
+        assert!(
+            chart.contains("&lt;b&gt;") && !chart.contains("<b>") && !chart.contains("<name>"),
+            "{chart}"
+        );
+    }
+}
