@@ -108,7 +108,7 @@ fn telling_library(folder: &Path) -> Option<PathBuf> {
 fn no_file_makes_hdf5_load_libraries() {
     let (folder, plugins) = (tet4(), tempfile::tempdir().expect("a folder"));
     let Some(mark) = telling_library(plugins.path()) else { return };
-    let of = fixtures().join("codes/FB101/hdf5_unknown_filter/K.h5");
+    let of = fixtures().join("cases/files/FB101-hdf5_unknown_filter/K.h5");
     fs::copy(of, folder.path().join("K.h5")).expect("copied");
     edit(&folder.path().join("model.toml"), "K.mtx", "K.h5");
     let run = Command::new(env!("CARGO_BIN_EXE_flexbody"))
