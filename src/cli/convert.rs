@@ -19,14 +19,14 @@ use flexbody_body::convert::{Conversion, ConvertSettings, Lumping, MeshChoice, c
 use flexbody_body::flex_body::Storage;
 use flexbody_body::invariants::LumpedScheme;
 use flexbody_body::verification::accept;
-use flexbody_eigen::{Accuracy, Method, Wanted};
+use flexbody_eigen::{Accuracy, Method, PlannedAttempt, Wanted};
 use flexbody_input::{
     ImportedColumns, LoadSource, MatrixLocation, ModelFiles, read_imported, read_model, read_nodal_masses,
 };
 use flexbody_linalg::context::Event;
 use flexbody_model::{CheckedModel, FeModel};
 use flexbody_motion::scene::LoadCases;
-use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SelectionFacts, render};
+use flexbody_report::{Facts, Format, LumpedModes, Phase, RunData, SearchAttempt, SelectionFacts, render};
 use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
 
 pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
@@ -440,6 +440,14 @@ pub(super) fn wanted(arguments: &ConvertArguments, units: &UnitSystem) -> Wanted
     }
 }
 
+fn search_attempt(attempt: &PlannedAttempt) -> SearchAttempt {
+    SearchAttempt {
+        way: attempt.way.name().to_owned(),
+        bytes: attempt.needs.bytes,
+        failure: attempt.failure.clone(),
+    }
+}
+
 fn run_data(
     output: (String, u64),
     conversion: &Conversion,
@@ -481,6 +489,7 @@ fn run_data(
         memory_estimate_bytes: None,
         threads,
         diagnostics,
+        attempts: conversion.plan.iter().flat_map(|plan| plan.attempts.iter().map(search_attempt)).collect(),
         counters: counters.iter().map(|&(name, count)| (name.to_owned(), count)).collect(),
         accuracy: conversion.body.source().settings["accuracy"].as_str().unwrap_or_default().to_owned(),
         output: Some(output),

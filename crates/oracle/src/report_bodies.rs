@@ -17,7 +17,7 @@ use flexbody_body::invariants::{
 };
 use flexbody_linalg::SymmetricMatrix;
 use flexbody_model::{Coupling, Nodes};
-use flexbody_report::{Phase, RunData};
+use flexbody_report::{Phase, RunData, SearchAttempt};
 use nalgebra::{Matrix3, Vector3};
 
 /// lambda of a frequency in hertz.
@@ -163,10 +163,16 @@ pub fn run_data() -> RunData {
                 .at_line(9),
         ],
         counters: vec![("factorisations".to_owned(), 2), ("solves".to_owned(), 96)],
+        attempts: vec![attempt("cycles", Some("3 of 20 modes converged")), attempt("double precision", None)],
         accuracy: "standard".to_owned(),
         output: Some(("mount.flex.h5".to_owned(), 1_234_567)),
         lumped_modes: vec![],
     }
+}
+
+/// An attempt to find the modes, which failed for a reason or found them.
+fn attempt(way: &str, failure: Option<&str>) -> SearchAttempt {
+    SearchAttempt { way: way.to_owned(), bytes: 412_000_000, failure: failure.map(str::to_owned) }
 }
 
 /// A cuboid 3 x 2 x 1 of mass 6 with its corner at the origin: trilinear hexahedra, consistent mass.

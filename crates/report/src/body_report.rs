@@ -7,7 +7,7 @@ use super::facts::{Facts, InterfaceFacts, ModelFacts, RunFacts};
 use super::glossary::{glossary, word_as};
 use super::heat_map::heat_maps;
 use super::numbers::{bytes, coordinates, counted, duration, sentence, significant, times, triple};
-use super::run_data::Phase;
+use super::run_data::{Phase, SearchAttempt};
 use flexbody_base::diagnostic::Severity;
 use flexbody_body::flex_body::{FlexBody, MassStructure};
 
@@ -191,7 +191,23 @@ fn run<'a>(run: &RunFacts) -> Vec<Block<'a>> {
     );
     let counts = run.counters.iter().map(|(name, count)| cells([name.clone(), count.to_string()]));
     fold("Work counts", "Work", &["Counter", "Count"], counts.collect());
+    let attempts = attempts(&run.attempts).into_iter().map(cells);
+    fold("Attempts to find the modes", "Attempts", &["Algorithm", "Memory", "Outcome"], attempts.collect());
     blocks
+}
+
+/// Name, memory and outcome of each attempt: the first that did not fail found the modes, those after it were not made.
+fn attempts(attempts: &[SearchAttempt]) -> Vec<[String; 3]> {
+    let found = attempts.iter().position(|attempt| attempt.failure.is_none());
+    let row = |(at, attempt): (usize, &SearchAttempt)| {
+        let outcome = match &attempt.failure {
+            Some(failure) => format!("failed: {failure}"),
+            None if found == Some(at) => "found the modes".to_owned(),
+            None => "not needed".to_owned(),
+        };
+        [attempt.way.clone(), bytes(attempt.bytes), outcome]
+    };
+    attempts.iter().enumerate().map(row).collect()
 }
 
 /// Inputs and settings of the run.

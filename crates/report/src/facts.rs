@@ -7,7 +7,7 @@ use super::guarantee::GuaranteeFacts;
 use super::lumped::{LumpedFacts, LumpedModesFacts};
 use super::mass_properties::MassProperties;
 use super::numbers::{coordinates, counted, percent, significant};
-use super::run_data::{Phase, RunData};
+use super::run_data::{Phase, RunData, SearchAttempt};
 use super::term_facts::TermFacts;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::provenance::{self, SourceFile};
@@ -19,7 +19,7 @@ use serde::{Serialize, Serializer};
 
 /// Version of the JSON report: a newer major breaks readers, a newer minor only adds keys.
 const MAJOR: u32 = 1;
-const MINOR: u32 = 6;
+const MINOR: u32 = 7;
 
 /// Everything that a report says. Its JSON form is the contract `schemas/report.schema.json`.
 ///
@@ -249,6 +249,7 @@ pub(super) struct RunFacts {
     pub memory_estimate_bytes: Option<u64>,
     #[serde(serialize_with = "as_map")]
     pub counters: Vec<(String, u64)>,
+    pub attempts: Vec<SearchAttempt>,
     pub output: Option<OutputFacts>,
 }
 
@@ -454,6 +455,7 @@ impl RunFacts {
             peak_memory_bytes: run.peak_memory_bytes,
             memory_estimate_bytes: run.memory_estimate_bytes,
             counters: run.counters.clone(),
+            attempts: run.attempts.clone(),
             output: run
                 .output
                 .as_ref()

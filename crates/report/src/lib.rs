@@ -70,7 +70,7 @@ pub use identities::{diagnostics_json, identities_json, identities_text};
 pub use output::output_json;
 pub use render::{Format, render};
 pub use response::{ResponseFacts, response_csv};
-pub use run_data::{LumpedModes, Phase, RunData};
+pub use run_data::{LumpedModes, Phase, RunData, SearchAttempt};
 pub use selection::SelectionFacts;
 pub use simulation::{SimulationFacts, simulation_csv};
 pub use summary::summary;

@@ -1,6 +1,7 @@
 //! Data of a run that are never stored in the flex-body file: times, memory, counters, diagnostics.
 
 use flexbody_base::diagnostic::Diagnostic;
+use serde::Serialize;
 
 /// One phase of a run.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -46,12 +47,25 @@ pub struct RunData {
     pub diagnostics: Vec<Diagnostic>,
     /// Work counts by name.
     pub counters: Vec<(String, u64)>,
+    /// Attempts by which the modes could be searched for, in their order; empty on the dense path.
+    pub attempts: Vec<SearchAttempt>,
     /// `fast`, `standard`, `certified`.
     pub accuracy: String,
     /// Name and size in bytes of the flex-body file.
     pub output: Option<(String, u64)>,
     /// Modes from the lumped masses too, where asked for.
     pub lumped_modes: Vec<LumpedModes>,
+}
+
+/// One attempt to find the modes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SearchAttempt {
+    /// Name of the algorithm.
+    pub way: String,
+    /// Memory that it takes, estimated before the work. Unit: bytes.
+    pub bytes: u64,
+    /// The reason why it found no modes; `None` for the attempt that found them and for those after it.
+    pub failure: Option<String>,
 }
 
 impl RunData {
