@@ -61,13 +61,13 @@ impl WorkCounter {
 /// ```
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
-    /// Bytes that the work may allocate on top of the memory in use; `None`: no limit.
+    /// Bytes that the work may allocate in addition to the memory in use; `None` for no limit.
     pub memory: Option<u64>,
-    /// Seconds that the work may take by its own estimate, made before it starts; `None`: no limit.
+    /// Seconds that the work may take by its own estimate, made before it starts; `None` for no limit.
     pub longest: Option<f64>,
-    /// The listener.
+    /// Listener for progress.
     pub watch: Watch<'a>,
-    /// The counter of the work; `None`: it is not counted.
+    /// Counter of the work; `None` if the work is not counted.
     pub counter: Option<&'a WorkCounter>,
 }
 
@@ -82,7 +82,7 @@ impl<'a> Context<'a> {
         Self { watch, ..Context::QUIET }
     }
 
-    /// Returns this context with its work counted by `counter` instead.
+    /// Returns this context with its work counted by `counter`.
     pub fn counted_by<'b>(&self, counter: &'b WorkCounter) -> Context<'b>
     where
         'a: 'b,
@@ -95,12 +95,12 @@ impl<'a> Context<'a> {
         Self { counter: None, ..*self }
     }
 
-    /// Returns this context without a listener, for a part of the work that does not tell how far it is.
+    /// Returns this context without a listener, for work that reports no progress.
     pub fn unheard(&self) -> Self {
         Self { watch: Context::QUIET.watch, ..*self }
     }
 
-    /// Returns this context with no limits of memory and time.
+    /// Returns this context without limits of memory and time.
     pub fn unlimited(&self) -> Self {
         Self { memory: None, longest: None, ..*self }
     }
@@ -127,7 +127,7 @@ impl<'a> Context<'a> {
         (self.watch)(Event::Fraction(done));
     }
 
-    /// Returns the bytes that may still be allocated: the limit, or the largest number without one.
+    /// Returns the number of bytes that may still be allocated: the limit, or the largest number if there is no limit.
     pub fn available(&self) -> u64 {
         self.memory.unwrap_or(u64::MAX)
     }
