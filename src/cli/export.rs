@@ -1,4 +1,4 @@
-//! `flexbody export`.
+//! Command `flexbody export`.
 
 use super::arguments::ExportArguments;
 use super::outcome::{Outcome, refuse_warnings};
@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     Ok(Outcome { text, json: format!("{json:#}"), diagnostics, passed: true })
 }
 
-/// The largest share of the stiffness of inertia over the load cases of a scene; nothing of a body without.
+/// Returns the largest share of the stiffness of inertia over the load cases of a scene; `None` for a body without it.
 fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScene>> {
     let mut largest: Option<InertiaInScene> = None;
     for scene in LoadCases::read(path, None)?.iter() {
@@ -87,10 +87,10 @@ fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScen
     Ok(largest)
 }
 
-/// Of more files than these the first is told, and what the others are together.
+/// Number of files up to which each is listed. Of more files the first is listed, with a summary of the others.
 const MOST_LINES: usize = 8;
 
-/// `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
+/// Parses the points: `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
 fn points(text: &str) -> Result<Points> {
     match text {
         "nodes" => return Ok(Points::Nodes),
