@@ -9,7 +9,8 @@ use nalgebra::Vector3;
 ///
 /// The frame has its origin at the centre of mass of the undeformed body, or at the reference point that carries it,
 /// and the axes of the model, which turn with the body. Modal coordinates are those of the body; positions and attitude
-/// may differ from those of the body's own frame.
+/// may differ from those of the body's own frame. The functions of an `instant` panic when the motion has no such
+/// instant.
 #[derive(Debug, Clone)]
 pub struct Motion {
     pub(super) recording: Recording,
@@ -44,7 +45,7 @@ impl Motion {
     /// Returns the modal coordinates at an instant (nf).
     ///
     /// # Panics
-    /// If there is no such instant. This holds for all functions with an `instant`.
+    /// If there is no such instant.
     pub fn modal_coordinates(&self, instant: usize) -> &[f64] {
         &self.recording.states[instant].q
     }

@@ -71,6 +71,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
         OutputSlot::commit_all(done.slots)?;
         return Ok(done.outcome);
     }
+    // Several bodies: reserve the outputs of all before the first conversion.
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| BodyOutputs::of(arguments, Some(number))));

@@ -81,8 +81,8 @@ pub fn stand_by() {
     drop(book());
 }
 
-/// Ends the run with exit code `code` and makes its outputs final. If the run `has_results` is false, the outputs are
-/// taken back, and the files that they replaced are restored.
+/// Ends the run with exit code `code` and makes its outputs final. If `has_results` is false, the outputs are taken
+/// back, and the files that they replaced are restored.
 pub fn end_run(code: ExitCode, has_results: bool) {
     let mut book = book();
     if has_results {

@@ -97,6 +97,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         );
         return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(folder).into());
     }
+    // The result must belong to these matrices, and have one eigenvalue per mode.
     let path = folder.join(RESULT);
     if !path.exists() {
         return Err(unfinished(folder, prepared));
@@ -114,6 +115,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         let by = format!("{by} ({} ranks)", result.ranks);
         CountElsewhere { negative, zero, shift, by }
     });
+    // Modes in the rows of the model, then the check of the condensation products.
     let n = model.stiffness().n();
     let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
     let index = index_bytes(result.index_bytes)?;

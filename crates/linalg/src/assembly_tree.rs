@@ -297,11 +297,13 @@ fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
         children[s.parent as usize].push(i as u32);
     }
     for s in 0..supernodes.len() {
+        // Children come first in this numbering: their merges are known.
         let mut candidates = std::mem::take(&mut children[s]);
         // The child with the most rows shares most of its structure with the parent.
         candidates.sort_by_key(|&c| (std::cmp::Reverse(supernodes[c as usize].rows.len()), c));
         let mut kept = Vec::new();
         for c in candidates {
+            // Zeros of the merged block: its size minus the structural entries of both.
             let (child, parent) = (&supernodes[c as usize], &supernodes[s]);
             let width = child.columns.len() + parent.columns.len();
             let merged = Supernode::size(width, parent.rows.len());
@@ -318,6 +320,7 @@ fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
                 kept.push(c);
                 continue;
             }
+            // Merge: the parent takes the columns and the children of the child.
             let mut columns = std::mem::take(&mut supernodes[c as usize].columns);
             supernodes[c as usize].rows = Vec::new();
             columns.append(&mut supernodes[s].columns);
@@ -347,6 +350,7 @@ fn sort_for_memory(supernodes: &[Supernode], children: &mut [Vec<u32>]) {
             let need = |c: u32| peak[c as usize] - left(c);
             need(b).total_cmp(&need(a)).then(a.cmp(&b))
         });
+        // Peak of the subtree: children in this order, each leaving its contribution, then the front.
         let mut held = 0.0;
         let mut most = 0.0f64;
         for &c in &children[s] {

@@ -147,8 +147,8 @@ pub fn accumulate<const W: usize>(hi: &mut [f64; W], lo: &mut [f64; W], a: f64, 
     }
 }
 
-/// Adds a (x + y) to hi + lo, lane by lane, for |y| <= u |x|. After N additions the error of a lane is at most 4 u^2 (N
-/// + 3) times its sum of all |a x|.
+/// Adds a (x + y) to hi + lo, lane by lane, for |y| <= u |x|. After N additions the error of a lane is at most
+/// 4 u^2 (N + 3) times its sum of all |a x|.
 #[inline(always)]
 pub fn accumulate_pair<const W: usize>(
     hi: &mut [f64; W],

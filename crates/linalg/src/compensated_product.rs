@@ -45,6 +45,7 @@ impl CompensatedBlock {
 pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>) -> CompensatedBlock {
     let n = a.n() * block;
     assert!(x.nrows() == n && x.ncols() <= LANES, "shapes of a compensated product");
+    // Pack the columns row by row.
     let mut packed = vec![[0.0; LANES]; n];
     for c in 0..x.ncols() {
         for (row, value) in packed.iter_mut().zip(x.col(c).iter()) {
@@ -98,6 +99,7 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
             (0..a.ncols()).map(column).collect()
         })
         .collect();
+    // Add the partial sums in fixed order.
     let mut total = vec![[DoubleDouble::default(); LANES]; a.ncols()];
     for part in &partial {
         for (sum, part) in total.iter_mut().zip(part) {

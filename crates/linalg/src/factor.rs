@@ -423,8 +423,8 @@ impl<T: Real> Solve for Cholesky<'_, T> {
     }
 }
 
-/// Ratio of the entries of M to those of K and M together above which the factor of M uses the structure of the joint
-/// factor: computing its own structure would take longer than it saves.
+/// Ratio of the number of entries of M to that of K, both counted in blocks of vertices, above which the factor of M
+/// uses the structure of the joint factor: computing its own structure would take longer than it saves.
 const NEARLY_FULL: f64 = 0.5;
 
 /// Returns true if M is positive semidefinite up to rounding. Its Cholesky factorisation must succeed after the
@@ -437,6 +437,7 @@ pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> boo
     let mass = pencil.mass();
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
+    // Count the entries of both matrices in blocks of vertices.
     let by_vertices =
         |matrix: &SymmetricMatrix, rows: usize| matrix.as_csc().nnz() as f64 / (rows * rows) as f64;
     let full = by_vertices(pencil.stiffness(), rows * pencil.block());

@@ -133,6 +133,7 @@ pub(super) fn extend_add<T: Real>(
     let w = pivots.width;
     for (p, panel) in source.panels.iter().enumerate() {
         let (first, width) = (p * PANEL, source.panel_width(p));
+        // Columns that stay adjacent are added run by run.
         let runs = runs(&places[first..first + width], w);
         for (i, row) in panel.chunks_exact(width).enumerate() {
             let place = places[first + i];

@@ -6,9 +6,9 @@ use std::ops::{AddAssign, Div, Mul, SubAssign};
 
 /// Real or complex number.
 pub trait Scalar: Copy + Mul<Output = Self> + Div<Output = Self> + AddAssign + SubAssign {
-    /// Zero.
+    /// Number zero.
     const ZERO: Self;
-    /// One.
+    /// Number one.
     const ONE: Self;
     /// Returns the product with a real number.
     fn times(self, real: f64) -> Self;

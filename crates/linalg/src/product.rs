@@ -164,9 +164,11 @@ fn pass<const B: usize, const W: usize>(
 ) {
     let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
+    // Pack the columns row by row.
     let rows = (0..a.n()).into_par_iter().with_min_len(ROWS);
     let packed: Vec<[[f64; W]; B]> =
         rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
+    // Give each task its rows of all columns.
     let mut targets: Vec<_> =
         y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS * B)).collect();
     let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS))

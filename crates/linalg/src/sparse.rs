@@ -56,6 +56,7 @@ impl CscMatrix {
     /// # Panics
     /// If an index is out of range.
     pub fn from_triplets(n_rows: usize, n_cols: usize, triplets: &[(u32, u32, f64)]) -> Self {
+        // Count the entries of each column, then distribute them.
         let mut count = vec![0usize; n_cols + 1];
         for &(r, c, v) in triplets {
             assert!((r as usize) < n_rows && (c as usize) < n_cols, "triplet out of range");
@@ -162,6 +163,7 @@ impl CscMatrix {
         assert!(self.n_rows == self.n_cols && to.len() == self.n_cols, "permutation of a square matrix");
         let stays = |new: &u32| *new != u32::MAX;
         let n = to.iter().filter(|new| stays(new)).count();
+        // Inverse permutation, then column pointers, then the columns in parallel.
         let mut from = vec![u32::MAX; n];
         for (old, &new) in to.iter().enumerate().filter(|(_, new)| stays(new)) {
             from[new as usize] = old as u32;
@@ -330,6 +332,7 @@ impl SymmetricMatrix {
         for j in 0..n {
             let (ra, va) = matrix.column(j);
             let (rb, vb) = transpose.column(j);
+            // Merge two ascending columns.
             let (mut a, mut b) = (0, 0);
             while a < ra.len() || b < rb.len() {
                 let row = match (ra.get(a), rb.get(b)) {

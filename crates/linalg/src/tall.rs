@@ -177,6 +177,7 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
     let squares = |k: usize| -> f64 {
         let (chunk, column) = (k % chunks, k / chunks);
         let part = a.col(column).subrows(chunk * ROWS, ROWS.min(a.nrows() - chunk * ROWS));
+        // Eight sums side by side over each chunk of rows.
         let (lanes, rest) = contiguous(part).as_chunks::<8>();
         let mut sums = [0.0; 8];
         lanes.iter().for_each(|x| (0..8).for_each(|w| sums[w] += x[w] * x[w]));

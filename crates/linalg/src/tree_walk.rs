@@ -39,6 +39,7 @@ pub(crate) struct TreeWalk {
 impl TreeWalk {
     /// Divides the tree by the work at each supernode.
     pub(crate) fn new(tree: &AssemblyTree, work: &[f64]) -> Self {
+        // Work of each subtree, and its first supernode.
         let mut below = work.to_vec();
         let mut first: Vec<usize> = (0..tree.len()).collect();
         for s in 0..tree.len() {
@@ -56,6 +57,7 @@ impl TreeWalk {
         let mut branches: Vec<Vec<Segment>> = (0..tree.len()).map(|_| Vec::new()).collect();
         let gather = |children: Vec<usize>, branches: &mut Vec<Vec<Segment>>| -> Vec<Segment> {
             let heavy: Vec<usize> = children.into_iter().filter(|&c| below[c] >= heavy).collect();
+            // A single heavy child extends the segment downward.
             if let [one] = heavy[..] {
                 return std::mem::take(&mut branches[one]);
             }
@@ -161,6 +163,7 @@ fn up<S: Send, U: Send, E: Send>(
     let start = segment.supernodes.start;
     let results: Vec<Result<Open<U>, E>> =
         split(segment, slots).into_par_iter().map(|(branch, slots)| up(tree, branch, slots, visit)).collect();
+    // Branches in parallel, then the rest of the segment in elimination order.
     let mut pending: Vec<Option<U>> = segment.supernodes.clone().map(|_| None).collect();
     for result in results {
         for (s, value) in result? {
@@ -196,6 +199,7 @@ fn down<S: Send, D: Send>(
             pending[c as usize - start] = Some(message);
         }
     }
+    // The rest of the segment is done: each branch receives its messages.
     let parts = split(segment, slots);
     let mut tasks = Vec::with_capacity(parts.len());
     for (branch, slots) in parts {

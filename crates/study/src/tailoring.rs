@@ -239,6 +239,7 @@ pub fn convert_for(
     let Enriched { made: mut conversion, rounds } = enriched;
     let selection = select(&conversion.body, &rounds, cases, context)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
+    // Record the scene and its histories as sources of the body.
     let mut parts = reduced.into_parts();
     let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
     for source in cases.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {

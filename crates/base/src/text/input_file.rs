@@ -291,8 +291,10 @@ pub struct SeenFile {
 }
 
 impl SeenFile {
+    /// Refuses a file that has changed since it was read.
+    ///
     /// # Errors
-    /// FB132 for a file that is no longer the one that was read.
+    /// FB132 if the file has changed.
     pub fn refuse_changed(&self) -> Result<(), Diagnostic> {
         self.state.refuse_changed(&self.path)
     }

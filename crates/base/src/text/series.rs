@@ -199,6 +199,7 @@ impl<'f> Layout<'f> {
     fn of(bytes: &'f [u8]) -> Option<Self> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let mut comment = None;
+        // First line that is not a comment, and the last comment before it.
         let mut lines = numbered(bytes).filter(|(_, line)| !line.is_empty());
         let (line, first) = lines.by_ref().find(|&(_, line)| {
             let found = is_comment(line);

@@ -58,6 +58,7 @@ impl<'a> Table<'a> {
         let Some((header_line, header)) = lines.next() else {
             return Err(Diagnostic::new(Code::FileEmpty, "table has no lines").in_file(path));
         };
+        // Separator of the header, then its columns in their order.
         let separator = [b';', b'\t', b',']
             .into_iter()
             .find(|separator| header.contains(separator))

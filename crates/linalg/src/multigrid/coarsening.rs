@@ -76,6 +76,7 @@ pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block
 pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     let mut l = [[0.0; B]; B];
     for j in 0..B {
+        // Cholesky factor L, column by column.
         let pivot = a[j][j] - l[j][..j].iter().map(|x| x * x).sum::<f64>();
         if pivot.is_nan() || pivot <= NO_PIVOT * a[j][j] {
             return None;
@@ -86,6 +87,7 @@ pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
             l[i][j] = rest / l[j][j];
         }
     }
+    // L^-1, and A^-1 = L^-T L^-1.
     let mut lower = [[0.0; B]; B];
     for j in 0..B {
         lower[j][j] = 1.0 / l[j][j];
@@ -135,6 +137,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         let (of_node, count) = aggregates(strong);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
         of_node.iter().enumerate().for_each(|(node, &own)| members[own as usize].push(node as u32));
+        // Orthonormalise the motions of each group.
         let found: Vec<(Motions<B, C>, Block<C, C>)> = members
             .par_iter()
             .with_min_len(GROUPS)

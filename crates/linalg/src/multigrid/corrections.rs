@@ -105,6 +105,7 @@ where
     /// Makes one step of conjugate gradients for all active columns.
     fn step(&self, work: &mut Work<'_, B>) {
         let pairs = work.slots.map(|slot| slot.map(|slot| slot.aim.pair));
+        // Precondition and project the residual, update the direction, step along it.
         let mut z = (self.cycle)(&work.r);
         self.deflation.project(&mut z, &pairs);
         let rz = products(&work.r, &z);

@@ -140,6 +140,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, STRONG)?;
         let mass = masses_beside(fine.matrix(), pencil.mass(), 1.0 / heaviest);
         let mut coarser = Vec::new();
+        // Coarsen until a dense inverse is cheap.
         while next.a.n_rows() * C > BOTTOM {
             if coarser.len() == MOST_LEVELS {
                 return None;

@@ -41,10 +41,12 @@ impl<const B: usize, const C: usize> Level<B, C> {
     ) -> Option<(Self, Coarse<C>)> {
         let diagonal = diagonal(matrix);
         let inverse: Vec<[[f64; B]; B]> = diagonal.iter().map(inverse).collect::<Option<_>>()?;
+        // Groups of strongly coupled nodes, with a basis of their motions.
         let groups = Aggregates::new(&strong_couplings(matrix, &diagonal, least_coupling), motions);
         if groups.count * C >= matrix.nodes() * B {
             return None;
         }
+        // Smoothed prolongation P, and the coarse matrix P'AP.
         let smoother = Smoother::new(stored(matrix), inverse.iter().map(narrow).collect())?;
         let p = groups.smoothed(matrix, &inverse, PROLONGATION / f64::from(smoother.largest));
         let r = p.transposed(groups.count);

@@ -63,8 +63,8 @@ pub struct Enriched<B> {
 /// case asks for more or if the last round improved no case. `body` returns the body of a result of `make`.
 ///
 /// # Errors
-/// The errors of `make` and of [`trace`](flexbody_motion::scene::trace), and damping of the scene beside damping of the
-/// model.
+/// The errors of `make` and of [`trace`](flexbody_motion::scene::trace); FB225 if both scene and model state a
+/// damping.
 pub fn enrich<B>(
     model: &FeModel,
     cases: &LoadCases,

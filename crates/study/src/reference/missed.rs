@@ -127,6 +127,7 @@ impl Missed {
     /// the elastic energy of E z(t). `moving` is z (k x m).
     pub(super) fn dominant(&self, moving: &Mat<f64>, enough: f64) -> Mat<f64> {
         let none = || Mat::zeros(self.forces.nrows(), 0);
+        // Principal directions of the elastic energy.
         let Some((turned, roots)) = principal(self.energy.clone(), ROUNDING, usize::MAX) else {
             return none();
         };
@@ -213,6 +214,7 @@ impl<'v> Beside<'v> {
         let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else {
             return Mat::zeros(responses.nrows(), 0);
         };
+        // Amplitudes scaled to the root of the elastic energy; their principal directions over time.
         let moving = gram(turned.as_ref(), amplitudes.as_ref());
         let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
         let covariance = combine(moving.as_ref(), moving.transpose().to_owned().as_ref());

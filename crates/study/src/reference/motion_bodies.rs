@@ -119,7 +119,8 @@ impl<'m> MotionBodies<'m> {
     }
 
     /// Returns the largest errors of the motion of `body` in each load case. Returns `None` if the body cannot be
-    /// compared with the reference, or if a scene states initial values of modes, which it counts in the reference.
+    /// compared with the reference, or if a scene states initial values of modes, whose numbers refer to the
+    /// reference.
     fn errors(&self, measures: &[Measure<'_>], body: &FlexBody) -> Result<Option<Vec<OutputErrors>>> {
         // Rigid motions that the frame of a scene adds to the modes have no stiffness and do not matter here.
         let Some(shared) = body.stiffness_beside(self.reference, self.model) else { return Ok(None) };

@@ -19,8 +19,8 @@ const BLOCK: usize = 256;
 ///     - S_b M S_a Psi omega_b omega_a q - H Psi q = F phi
 /// ```
 ///
-/// with V, V' - g and R of [`Inertia`](super::residual::Inertia), and the stiffness of inertia H, which is linear in V'
-/// - g, omega' and the products of omega.
+/// with V, V' - g and R of [`Inertia`](super::residual::Inertia), and the stiffness of inertia H, which is linear in
+/// V' - g, omega' and the products of omega.
 ///
 /// P maps forces to modal forces and to amplitudes of compressed forces. P F is computed once; P r = (P F) phi then
 /// holds at every instant.
@@ -111,11 +111,13 @@ impl<'v> Projected<'v> {
             let column = functions.col_as_slice_mut(i);
             let mut places = column.iter_mut();
             let mut put = |value: f64| *places.next().expect("as many functions as vectors") = value;
+            // The order is that of the columns of F: loads, elastic, damping and inertia forces.
             loads.iter().for_each(|load| load.col_as_slice(i).iter().for_each(|value| put(*value)));
             now.q.iter().chain(&now.qd).chain(&now.qdd).for_each(|value| put(*value));
             free.col_as_slice(i).iter().for_each(|value| put(*value));
             let (omega, rate): (Vector3<f64>, Vector3<f64>) =
                 (view.axes * now.omega, view.axes * now.omega_rate);
+            // Rotation about each axis.
             for &a in self.turns {
                 now.qd.iter().for_each(|qd| put(omega[a] * qd));
                 moving.col_as_slice(i).iter().for_each(|value| put(omega[a] * value));
@@ -124,6 +126,7 @@ impl<'v> Projected<'v> {
                 }
                 now.q.iter().zip(&now.qd).for_each(|(q, qd)| put(rate[a] * q + omega[a] * qd));
             }
+            // Stiffness of inertia: components of the rigid acceleration times q.
             let rigid = view.rigid_acceleration(now);
             for unit in &units {
                 let amount = rigid.linear.dot(&unit.linear)

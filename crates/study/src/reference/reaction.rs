@@ -23,6 +23,7 @@ impl NodalView<'_> {
         field: &Displacements,
     ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let Inertia { u, ud, momentum, change } = self.inertia_of_turned(motion, field);
+        // Resultants of momentum, its change and the loads.
         let momenta = self.resultants(self.extended_rigid.as_ref(), &momentum);
         let changes = self.resultants(self.extended_rigid.as_ref(), &change);
         let loads = self.resultants(self.rigid.as_ref(), &self.loads_of(motion));

@@ -30,8 +30,10 @@ impl Turning {
             true => Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, own[(0, 0)])),
             false => Matrix3::from_fn(|a, b| own[(a, b)]),
         };
+        // J_ab = R_a'M R_b.
         let inertia = square(&gram(turns.as_ref(), weighted.as_ref()));
         let change = |j: usize| {
+            // Change of J_ab: (e_a x u)'M R_b and its transpose.
             let repeated = Mat::from_fn(turns.nrows(), turns.ncols(), |row, _| extended[(row, j)]);
             let mut turned = Mat::<f64>::zeros(turns.nrows(), turns.ncols());
             let axis = |k: usize| view.axes.column(if plane { 2 } else { k }).into_owned();
@@ -66,6 +68,7 @@ impl Turning {
         state[6] = 1.0;
         let mut angles = vec![0.0];
         for (i, pair) in motion.windows(2).enumerate() {
+            // Constant coefficients over the step: exact by the matrix exponential.
             let midway = |row: usize| 0.5 * (amplitudes[(row, i)] + amplitudes[(row, i + 1)]);
             let c: Vec<f64> = (0..amplitudes.nrows()).map(midway).collect();
             let step = pair[1].time - pair[0].time;
@@ -120,6 +123,7 @@ fn central_turns(view: &NodalView<'_>) -> Mat<f64> {
         2 => turns.to_owned(),
         _ => combine(turns, Mat::from_fn(3, 3, |i, j| view.axes[(i, j)]).as_ref()),
     };
+    // Shift the axes to the centre of mass, so that rotations are M-orthogonal to translations.
     let weighted = view.rows.weigh(shifts);
     let mass = gram(shifts, weighted.as_ref())[(0, 0)];
     let moments = gram(weighted.as_ref(), turns.as_ref());

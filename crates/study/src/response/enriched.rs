@@ -108,6 +108,7 @@ impl NodalModes<'_> {
         let symmetric =
             Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]));
         let eigen = symmetric_eigen(symmetric.as_ref())?;
+        // Coordinates of unit stiffness and diagonal mass; project loads, outputs and damping.
         let coordinates = solve_upper(&lower, &eigen.vectors);
         let seen = |columns: MatRef<'_, f64>| {
             combine(coordinates.transpose().to_owned().as_ref(), gram(span.as_ref(), columns).as_ref())

@@ -442,6 +442,7 @@ impl Curves {
             return None;
         }
         let of_block = |(_, _, block): &(&Place, &Place, Block)| {
+            // Frequencies that were solved for both models.
             let both = self.full.iter().zip(&self.deforming).enumerate();
             let both: Vec<_> = both
                 .filter_map(|(i, (coupled, deforming))| {

@@ -82,7 +82,7 @@ pub struct TurnedTorques {
 pub struct Start {
     /// sqrt(|q'|^2 + q'Lambda q).
     pub energy: f64,
-    /// sqrt(|q''|^2 + q''Lambda q'), with q'' without loads.
+    /// sqrt(|q''|^2 + |Lambda^(1/2) q'|^2), with q'' without loads.
     pub rate_energy: f64,
 }
 

@@ -116,6 +116,7 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     let mut trials = Vec::new();
     let only_w1 = TermGroups::NONE.with(TermGroup::W1);
     for kept in sets().filter(|set| *set != TermGroups::ALL) {
+        // Bounds of this set of groups in every case, at every tier.
         let by_tier = cases.iter().zip(&norms).map(|(case, norms)| -> Result<Vec<Trial>> {
             let runs = case.runs();
             let TrialRuns { body, scene, situation, .. } = runs;
@@ -132,6 +133,7 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             Ok(tiers.map(|norms| runs.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
         });
         let by_case: Vec<Vec<Trial>> = by_tier.collect::<Result<_>>()?;
+        // A tier counts if all cases have it; the worst case decides.
         let tiers = by_case.iter().map(Vec::len).min().unwrap_or(0);
         for tier in 0..tiers {
             let trial = worst(by_case.iter().map(|trials| trials[tier].clone()));

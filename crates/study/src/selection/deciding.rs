@@ -27,7 +27,7 @@ pub(super) struct Deciding<'s> {
 }
 
 impl<'s> Deciding<'s> {
-    /// Starts with all modes, and with the groups that bounds do not rule out in every load case.
+    /// Starts with all modes, and with the groups that bounds leave open in at least one load case.
     pub(super) fn new(demands: &'s [Demand<'s>]) -> Self {
         let mut diagnostics = Vec::new();
         let mut trials = Vec::new();

@@ -74,6 +74,7 @@ fn first_order(
     norms: &Norms,
 ) -> Option<FirstOrder> {
     let times: Vec<f64> = instants.iter().map(|instant| instant.time).collect();
+    // Response of the uncoupled modes, then the load of the coupling terms along it.
     let oscillators = Oscillators::new(body, &times)?;
     let (errors, mut first) = oscillators.respond(forces, scene.initial.settled);
     let along: Vec<Instant<'_>> =
@@ -189,6 +190,7 @@ fn by_norms(
     let mut found = Collected::default();
     let mut before: Option<(Scalars<'_>, f64)> = None;
     for instant in instants {
+        // Largest values at the instants; impulse and variation between them.
         let now = terms.scalars(instant);
         let (force, in_energy) = terms.load(&now);
         found.load.largest = larger(found.load.largest, in_energy);
@@ -285,6 +287,7 @@ fn by_terms(
     let mut found = Collected::default();
     let mut forces: Vec<Vec<f64>> = Vec::with_capacity(instants.len());
     for (at, instant) in instants.iter().enumerate() {
+        // Largest values at the instants; impulse and variation between them.
         let (torque, force) = balances.difference(instant);
         found.torque = larger(found.torque, norm(&torque));
         let in_energy: Vec<f64> = force.iter().zip(root).map(|(f, root)| f / root).collect();

@@ -32,6 +32,7 @@ pub fn participations(
     let eigenvalues = &body.modes().eigenvalue;
     let mut all = Vec::new();
     let mut add = |load: String, forces: Vec<f64>, recorded: &dyn Fn(&str) -> bool| {
+        // Elastic energy of the static response in each mode: f_p^2 / lambda_p.
         let part = |j: usize| forces[j] * forces[j] / eigenvalues[j];
         let whole: f64 = (0..eigenvalues.len()).map(part).sum();
         let kept: f64 = selected.iter().map(|&j| part(j)).sum();
@@ -57,6 +58,7 @@ pub fn participations(
             add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
         }
     }
+    // Steady spin: W1'w w / 2 along its axis.
     let axis = match scene.rotation() {
         Some(velocity) => velocity.main_direction(),
         None => scene.initial.angular_velocity.try_normalize(0.0),

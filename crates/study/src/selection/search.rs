@@ -111,6 +111,7 @@ impl SelectionSearch<'_> {
 
     /// Chooses the first set of groups whose motion is within `part` of the tolerances.
     fn cheapest(&self, part: f64, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+        // Proper subsets of the current groups that contain all fixed groups, cheapest first.
         let smaller = sets_in(self.carried)
             .filter(|set| *set != choice.groups && set.and(choice.groups) == *set)
             .filter(|set| set.and(self.fixed) == self.fixed);
@@ -203,6 +204,7 @@ impl SelectionSearch<'_> {
             }
             let mut modes = ranked[..fits].to_vec();
             modes.sort_unstable();
+            // Measure the set with these modes, and keep the most accurate.
             let trial = self.measured(&modes, groups, 1.0)?;
             if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst) {
                 best = Some((trial.worst, groups, modes));

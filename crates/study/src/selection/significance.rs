@@ -129,6 +129,7 @@ pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance
 pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
     let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
     let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
+    // Axis of rotation, or the principal axes.
     let axes = match driven {
         Some(axis) => vec![axis],
         None if body.dimension() == 2 => vec![Vector3::z()],
@@ -143,6 +144,7 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
             Some(std::array::from_fn(|i| most[i].max(own[i])))
         })
     };
+    // Largest value over the axes, at tier 0 and tier 1.
     let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
     let bound = bound.unwrap_or([f64::INFINITY; 8]);
     let own = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));

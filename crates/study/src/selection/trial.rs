@@ -130,9 +130,11 @@ impl TrialRuns<'_> {
         let roots = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt());
         let modes = roots.filter(|root| *root <= highest).fold(0.0, f64::max);
         let histories = self.scene.acting().chain(self.scene.driving());
+        // Frequencies of loads and driving motion.
         let tones = histories.map(|history| TAU * history.frequency_until(duration));
         // A smooth history may have half an oscillation between two rows.
         let rows = self.scene.driving().filter_map(|history| Some(0.5 * TAU / history.spacing()?));
+        // Half a period between two breaks of the spin.
         let mut breaks = self.scene.rotation().map_or(Vec::new(), |velocity| velocity.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);
@@ -324,6 +326,7 @@ impl TrialRuns<'_> {
 
     /// Returns the contribution of every mode to a motion of the body.
     pub fn shares(&self, trace: &Trace) -> Vec<ModeShare> {
+        // Largest displacement of each mode, then its shares of deflection and stress.
         let mut longest = vec![0.0f64; self.body.n_modes()];
         self.each_watched(|rows| {
             for (longest, column) in longest.iter_mut().zip(rows.column_iter()) {

@@ -176,6 +176,7 @@ pub(super) fn ladder(
     worst_of: impl Fn(TermGroups) -> f64,
 ) -> Vec<Candidate> {
     let body = sources[0].body();
+    // Sets of groups whose errors with all modes are acceptable.
     let mut sets = Vec::new();
     for groups in SETS {
         let worst = worst_of(groups.and(body.groups()));
@@ -187,6 +188,7 @@ pub(super) fn ladder(
     let whole = Candidate::whole(0, body.n_modes());
     let mut all = Vec::new();
     for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
+        // The lowest modes, and the modes of largest contribution.
         for modes in [(0..count).collect(), first_of(liveliest, count)] {
             let with =
                 |groups: &TermGroups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };

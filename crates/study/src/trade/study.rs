@@ -246,6 +246,7 @@ impl Job<'_> {
             let measured = row.outcome.as_ref().ok().filter(|measured| measured.holds())?;
             Some((measured.multiplications, &row.candidate))
         });
+        // Cheapest candidate that holds, and the order in which its modes were taken.
         let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
         let best = best.clone();
         let count = best.modes.len();
@@ -256,6 +257,7 @@ impl Job<'_> {
             return Ok(());
         }
         let with = |count: usize| Candidate { modes: first_of(order, count), ..best.clone() };
+        // Largest measured number of modes in this order that does not hold.
         let is_rung = |row: &&TradeRow| row.candidate == with(row.candidate.modes.len());
         let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
         let (mut too_few, mut enough) =

@@ -184,6 +184,7 @@ impl Halving<'_, '_> {
             let mut fine = self.staged.implicit(ORDER, step, refinement, self.end, context)?;
             // The instants are equal except for rounding.
             fine.trace.time.clone_from(&coarse.trace.time);
+            // Error of the coarser steps, relative to the finer ones.
             let scale = fine.largest_deflection(self.model);
             let own = |first: usize, count: usize| coarse.displacements().subcols(first, count).to_owned();
             let error = fine.errors(self.model, &coarse.trace, scale, own).largest().worst(tolerance);

@@ -110,6 +110,7 @@ impl Seen {
         let instants = self.trace.time.len();
         for first in (0..instants).step_by(BLOCK) {
             let count = BLOCK.min(instants - first);
+            // Elastic energy and largest displacement of the difference.
             let difference = of(first, count) - self.displacements().subcols(first, count);
             let mut forces = Mat::zeros(difference.nrows(), count);
             multiply(model.stiffness(), 1, difference.as_ref(), forces.as_mut());
