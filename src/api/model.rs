@@ -42,6 +42,7 @@ impl SparseMatrix {
             );
         }
         check_size(n as u64, n as u64, values.len() as u64)?;
+        // Rows must ascend in each column, which also excludes repeated positions.
         let mut triplets = Vec::with_capacity(values.len());
         for column in 0..n {
             let entries = col_ptr[column]..col_ptr[column + 1];

@@ -46,6 +46,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     diagnostics.extend(losses);
     diagnostics.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
     refuse_warnings(arguments.printing, &diagnostics)?;
+    // Files beside the output are known only now: they must not replace an input either.
     let place_and_size = |(ending, bytes): &(Cow<'_, str>, Vec<u8>)| {
         (Exported::place_beside(&arguments.output, ending), bytes.len())
     };
@@ -61,6 +62,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let file = |(path, size): &(PathBuf, usize)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
     let files: serde_json::Value = written.iter().map(file).collect();
     let json = serde_json::json!({ "format": format.name(), "files": files });
+    // One line per file, or a summary for many files.
     let told = if written.len() > MOST_LINES { 1 } else { written.len() };
     let (told, others) = written.split_at(told);
     let mut text: String = told.iter().map(line).collect();

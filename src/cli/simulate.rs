@@ -87,6 +87,7 @@ impl Job<'_> {
         let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
         let watch = |event: Event<'_>| watcher.hear(event);
         let left = || context(None, true, &watch);
+        // The motion and its diagnostics, which name the load case if there are several.
         let run = simulate(self.body, scene, &left()).and_then(|(recording, mut found)| {
             found.extend(unsettled_rate(self.body, scene, &recording, &left())?);
             Ok((recording, found))
@@ -106,6 +107,7 @@ impl Job<'_> {
         let run =
             RunData { phases: watcher.finish(), diagnostics, threads: self.threads, ..RunData::default() };
         refuse_warnings(self.printing, &run.diagnostics)?;
+        // Files are filled here and put in place by the caller, after all load cases.
         let facts = SimulationFacts::new(&recording, self.body.units(), &run);
         if let Some(slot) = &slots.motion {
             flexbody_file::fill_simulation(&recording, self.body.units(), slot)?;

@@ -184,6 +184,7 @@ fn products<S: Simd, const A: usize, const B: usize>(
 ) -> [[f64; B]; A] {
     let (a_vectors, a_rest) = vectors::<S, A>(a);
     let (b_vectors, b_rest) = vectors::<S, B>(b);
+    // One vector of partial sums for each pair of columns.
     let mut sums = [[simd.splat_f64s(0.0); B]; A];
     for i in 0..a_vectors[0].len() {
         for a in &a_vectors {
@@ -196,6 +197,7 @@ fn products<S: Simd, const A: usize, const B: usize>(
             }
         }
     }
+    // Sums over the lanes, and the rows that do not fill a vector.
     let mut totals = [[0.0; B]; A];
     for q in 0..A {
         for c in 0..B {

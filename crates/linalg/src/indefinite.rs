@@ -181,6 +181,7 @@ fn backward<T: Real, const K: usize>(
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
+        // Blocks of B: y <- B^-1 y, one column at a time.
         let mut y = own.to_vec();
         let mut column = vec![0.0; width];
         for k in 0..K {
@@ -188,6 +189,7 @@ fn backward<T: Real, const K: usize>(
             block.divide(&mut column);
             y.iter_mut().zip(&column).for_each(|(to, from)| to[k] = *from);
         }
+        // Rows below: y <- y - L_below' x_below. Parts of parallel tasks are added in the order of the rows.
         let piece = |l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]| {
             for_rows(l, width, below.chunks(TOGETHER), |l, below| subtract_transposed(l, below, y));
         };
@@ -207,6 +209,7 @@ fn backward<T: Real, const K: usize>(
                 }
             }
         }
+        // Unit triangle of the panel: L' x = y, then back from the order of the pivots.
         solve_transposed(T::all_wide(triangle, &mut Vec::new()), &mut y);
         for (&row, x) in block.order.iter().zip(&y) {
             own[row] = *x;

@@ -209,6 +209,7 @@ impl<T: Real> Blocks<T> {
     fn divide_below(&self, below: &mut [T], scaled: &mut [T], growth: &mut [f64]) {
         let width = self.order.len();
         let piece = |rows: &mut [T], scaled: &mut [T], growth: &mut [f64]| {
+            // Columns in the order of the pivots.
             let mut old = vec![T::default(); width];
             for row in rows.chunks_exact_mut(width) {
                 old.copy_from_slice(row);
@@ -216,9 +217,11 @@ impl<T: Real> Blocks<T> {
                     *new = old[from];
                 }
             }
+            // L B by substitution with the unit triangle.
             divide_rows(rows, self.l.as_ref(), true);
             drop_negligible(rows);
             scaled.copy_from_slice(rows);
+            // L, in double precision, and its growth.
             let mut wide = vec![0.0; width];
             for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
                 wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());

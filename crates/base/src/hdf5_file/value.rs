@@ -162,6 +162,7 @@ pub(super) fn storage(
         return Err("expected data inside the file, found references to other files".to_owned());
     }
     let bytes = dataset.storage_size();
+    // The values must be possible for the stored bytes, and fit into memory.
     let most = if layout == Layout::Chunked { bytes.saturating_mul(HIGHEST_COMPRESSION) } else { bytes };
     let unpacked = (elements as u64).saturating_mul(size as u64);
     if unpacked > most {
@@ -170,6 +171,7 @@ pub(super) fn storage(
     if left().is_some_and(|left| unpacked > left) {
         return Err(format!("expected an array that fits into memory, found {elements} values"));
     }
+    // All datasets together cannot be larger than the file.
     let Some(left) = stored.left.checked_sub(bytes) else {
         return Err(format!(
             "expected datasets that fit into the file, found {bytes} bytes more than it has"

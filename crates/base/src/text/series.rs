@@ -268,6 +268,7 @@ impl<'f> Layout<'f> {
             let message = format!("there is no column `{}`: the columns have no names", printable(name));
             return Err((message, format!("give its number, 1 to {}", self.fields)));
         }
+        // The whole name first, then the name without its unit: "Fx [N]" is found by "Fx".
         let whole = |own: &[u8]| own == name;
         let without_unit = |own: &[u8]| before_unit(own) == name;
         for matches in [&whole as &dyn Fn(&[u8]) -> bool, &without_unit] {

@@ -136,6 +136,7 @@ impl<'a, const B: usize> Work<'a, B> {
     /// Fills free slots with waiting columns.
     fn fill(&mut self, aims: &[Aim]) {
         let Self { columns, waiting, slots, r, t, p } = self;
+        // Assign one waiting column to each free slot.
         let mut fresh: Vec<(usize, &[f64])> = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| slot.is_none()) {
             let Some(column) = waiting.next() else { break };
@@ -154,6 +155,7 @@ impl<'a, const B: usize> Work<'a, B> {
         if fresh.is_empty() {
             return;
         }
+        // Start from t = 0: the residual is the force, in single precision.
         let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES);
         blocks.for_each(|(node, ((r, t), p))| {
             for &(w, force) in &fresh {

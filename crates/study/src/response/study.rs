@@ -307,6 +307,7 @@ fn nodal_modes<'m>(
     };
     let vectors = body.vectors_of(model).ok_or_else(|| foreign("it has other rows"))?;
     let pencil = model.pencil();
+    // Modes of this model have modal mass 1 and modal stiffness lambda.
     let (inertial, elastic) = (pencil.apply_mass(vectors.as_ref()), pencil.apply_stiffness(vectors.as_ref()));
     let mass = gram(vectors.as_ref(), inertial.as_ref());
     let eigenvalue = &body.modes().eigenvalue;

@@ -36,6 +36,7 @@ pub(super) fn by_case(
     if demands.len() == 1 {
         return Vec::new();
     }
+    // Failed trial with one mode fewer than the choice: its worst load case binds the number of modes.
     let one_fewer = trials
         .iter()
         .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && trial.modes + 1 == choice.modes.len());

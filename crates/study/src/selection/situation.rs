@@ -60,6 +60,7 @@ impl Situation {
         let (demands, eigenvalues) = (&scene.requirements, &body.modes().eigenvalue);
         let inertia = body.invariants().inertia() + demands.attachment.inertia;
         let softest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
+        // Duration and first frequency: stated by the scene, else derived from the softest mode.
         let duration = match scene.run.duration {
             Some(value) => Input { name: "duration", value, source: "[run] duration".to_owned() },
             None => Input {
@@ -72,6 +73,7 @@ impl Situation {
             Some(frequency) => (TAU * frequency, "[attachment] first_frequency"),
             None => (softest, "first mode of the free body"),
         };
+        // Largest spin, angular acceleration and modal amplitudes.
         let (spin, acceleration) = turning(body, scene, &inertia, duration.value, points);
         let mode_amplitudes = amplitudes(body, scene);
         let limits = &demands.limits;
@@ -298,6 +300,7 @@ fn modal_loads(
     let rows = PointRows::new(body);
     let modal_load = |psi: DMatrix<f64>, axes: Axes, history: &VectorHistory| {
         let duration = rotation.duration;
+        // A fixed direction needs one row of the modes. World axes turn relative to the body and vary the load.
         let (psi, factor) = match (axes, history) {
             (Axes::Model | Axes::Body, VectorHistory::Along { direction, factor }) => {
                 let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(direction));

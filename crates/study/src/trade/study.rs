@@ -132,6 +132,7 @@ pub fn trade(
         let name = cases.case_name(at).map(str::to_owned);
         StudyCase::new(sources, scene, name, nodal, reserved, context).map_err(|error| cases.about(at, error))
     };
+    // One body serves all load cases, so that the strictest limits apply.
     let allowed = cases.iter().filter_map(|scene| scene.requirements.multiplications).min();
     let (scene, tolerance) = (cases.name().to_owned(), cases.least_tolerance());
     let cases = cases.iter().enumerate().map(studied).collect::<Result<Vec<_>>>()?;

@@ -53,6 +53,7 @@ impl Seen {
         room: &mut [f64],
     ) -> Result<(), Failure> {
         let trace = &mut self.trace;
+        // Only reactions need the accelerations.
         match &mut trace.reactions {
             Some(reactions) => {
                 motion.accelerations(time, state, room)?;
@@ -69,6 +70,7 @@ impl Seen {
             path.push(to_frame * point.displacement(u));
         }
         let now = evaluation.configuration();
+        // Internal energy: total energy without that of the centre of mass, P^2 / (2m).
         let flight = 0.5 * evaluation.momenta().0.norm_squared() / trace.size.0;
         let energy = evaluation.equations().elastic_energy(u);
         self.spin.see(time, now.omega.norm());

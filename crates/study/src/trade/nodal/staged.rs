@@ -50,6 +50,7 @@ impl<'a> Staged<'a> {
         scene: &'a Scene,
         motion: &'a Trace,
     ) -> Result<Self> {
+        // The frame of a carried body is fixed to its carrier; that of a free body has mean axes.
         let conditions = match &scene.carried {
             Some(carried) => ReferenceConditions::AtRest(nodal_point(model, &carried.by)?),
             None => ReferenceConditions::MeanAxes,
@@ -71,6 +72,7 @@ impl<'a> Staged<'a> {
             scene,
             motion,
         };
+        // Initial state: that of the modal motion, or the static deformation of the model.
         let modes =
             NodalModes::new(&staged.equations, body).ok_or_else(|| refused("the body has other rows"))?;
         let mut start = modes.lift(&motion.start);
