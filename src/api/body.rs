@@ -1,4 +1,4 @@
-//! A flexible body.
+//! Flexible bodies.
 
 use super::matrix::shown;
 use super::progress::{Listener, NOBODY, heard};
@@ -18,23 +18,22 @@ use flexbody_study::selection::select;
 use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
-/// A flexible body: modes and the constant invariants that the equations of motion of its floating frame are
-/// made of (theory section 2). Vectors are along the axes of the body frame, about its origin, in the units
-/// of the model.
+/// Flexible body: modes, and the constant invariants of the equations of motion of its floating frame (theory section
+/// 2). Vectors are along the axes of the body frame, about its origin, in the units of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlexBody(pub(super) flex_body::FlexBody);
 
-/// Something that must hold of the numbers of a body (theory section 10).
+/// Relation that the numbers of every body satisfy (theory section 10).
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Identity {
-    /// Name.
+    /// Name of the identity.
     pub name: &'static str,
-    /// By how much it is missed, relative.
+    /// Relative violation.
     pub value: f64,
-    /// By how much it may be missed.
+    /// Largest allowed violation.
     pub limit: f64,
-    /// Whether it holds.
+    /// True if the identity holds.
     pub holds: bool,
 }
 
@@ -42,37 +41,36 @@ impl FlexBody {
     /// Reads a flex-body file.
     ///
     /// # Errors
-    /// FB101 and FB106 when it cannot be read; FB701 to FB703 when it is another file, of a newer format, or
-    /// breaks its schema; FB712 when it was changed since it was written.
+    /// FB101 and FB106 if the file cannot be read; FB701 to FB703 if it is another file, has a newer format, or
+    /// violates its schema; FB712 if it was changed since it was written.
     #[cfg(feature = "hdf5")]
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         flexbody_file::read(path).map(Self)
     }
 
-    /// Writes a flex-body file: it appears whole or not at all.
+    /// Writes a flex-body file, which appears whole or not at all.
     ///
     /// # Errors
-    /// FB104 and FB602 when it cannot be written.
+    /// FB104 and FB602 if the file cannot be written.
     #[cfg(feature = "hdf5")]
     pub fn write(&self, path: impl AsRef<Path>) -> Result<()> {
         flexbody_file::write(&self.0, path)
     }
 
-    /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the
-    /// file, and others that belong beside it. What the format cannot hold comes back as warnings.
+    /// Writes the body in a format of another program, given by its name on the command line (docs/export.md): the
+    /// file, and further files beside it. Returns warnings about parts of the body that the format cannot hold.
     ///
     /// # Errors
-    /// FB801 for a format that is not known; FB720 when no file of this format can be made of the body; FB104
-    /// and FB602 when it cannot be written.
+    /// FB801 for an unknown format; FB720 if no file of this format can be made of the body; FB104 and FB602 if it
+    /// cannot be written.
     pub fn export(&self, format: &str, path: impl AsRef<Path>) -> Result<Vec<Diagnostic>> {
         self.export_as(format, path.as_ref(), ExportOptions::default())
     }
 
-    /// Writes a picture of the body in motion (`vtk`, `gltf`), in the same way.
+    /// Writes a picture of the body in motion (`vtk`, `gltf`).
     ///
     /// # Errors
-    /// Those of [`FlexBody::export`]; FB801 for a format that shows no motion, FB735 for the motion of another
-    /// body.
+    /// The errors of [`FlexBody::export`]; FB801 for a format without motion, FB735 for the motion of another body.
     pub fn export_motion(
         &self,
         format: &str,
@@ -92,125 +90,126 @@ impl FlexBody {
         Ok(told)
     }
 
-    /// Formats that [`FlexBody::export`] writes: the name of each, and the programs that read it.
+    /// Returns the formats of [`FlexBody::export`]: the name of each, and the programs that read it.
     pub fn export_formats() -> Vec<(&'static str, &'static str)> {
         FORMATS.iter().map(|format| (format.name(), format.reader())).collect()
     }
 
-    /// Number of modes nf.
+    /// Returns the number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.0.n_modes()
     }
 
-    /// Node numbers (n).
+    /// Returns the node numbers (n).
     pub fn node_ids(&self) -> &[i64] {
         &self.0.nodes().ids
     }
 
-    /// Positions of the nodes (n x 3), body frame. Unit: length.
+    /// Returns the positions of the nodes (n x 3), body frame. Unit: length.
     pub fn positions(&self) -> &[[f64; 3]] {
         &self.0.nodes().positions
     }
 
-    /// Triangles of the surface by indices of their nodes, counterclockwise seen from outside; empty where no
-    /// surface is known.
+    /// Returns the triangles of the surface as node indices, counterclockwise seen from outside; empty if no surface is
+    /// known.
     pub fn mesh_triangles(&self) -> &[[u32; 3]] {
         self.0.mesh().map_or(&[], |mesh| mesh.triangles())
     }
 
-    /// Edges of the surface and beams by indices of their nodes; empty where none are known.
+    /// Returns the edges of the surface and beams as node indices; empty if none are known.
     pub fn mesh_edges(&self) -> &[[u32; 2]] {
         self.0.mesh().map_or(&[], |mesh| mesh.edges())
     }
 
-    /// Origin of the body frame in model coordinates, and its axes as columns.
+    /// Returns the origin of the body frame in model coordinates, and its axes as columns.
     pub fn frame(&self) -> (Vector3<f64>, Matrix3<f64>) {
         (self.0.frame().origin, self.0.frame().axes)
     }
 
-    /// Frequencies of the modes, ascending. Unit: Hz.
+    /// Returns the frequencies of the modes, ascending. Unit: Hz.
     pub fn frequencies_hz(&self) -> Vec<f64> {
         self.0.frequencies_hz()
     }
 
-    /// Eigenvalues of the modes, omega^2 (nf). Unit: 1/time^2.
+    /// Returns the eigenvalues of the modes, omega^2 (nf). Unit: 1/time^2.
     pub fn eigenvalues(&self) -> &[f64] {
         &self.0.modes().eigenvalue
     }
 
-    /// Damping ratios of the modes (nf).
+    /// Returns the damping ratios of the modes (nf).
     pub fn damping_ratios(&self) -> &[f64] {
         &self.0.modes().damping_ratio
     }
 
-    /// Psi (3n x nf): displacements of the nodes, three rows each. Unit: 1/sqrt(mass).
+    /// Returns the displacements of the nodes in the modes, Psi (3n x nf), three rows per node. Unit: 1/sqrt(mass).
     pub fn shapes(&self) -> Matrix {
         shown(self.0.modes().shape.as_ref())
     }
 
-    /// How many of the lowest modes are proved to be all that there are; `None` without a proof.
+    /// Returns the number of lowest modes that are proved complete; `None` without a proof.
     pub fn proved_complete(&self) -> Option<usize> {
         self.0.certificate().proved_modes
     }
 
-    /// m. Unit: mass.
+    /// Returns the mass m. Unit: mass.
     pub fn mass(&self) -> f64 {
         self.0.invariants().mass()
     }
 
-    /// First moment c = sum m x. Unit: mass length.
+    /// Returns the first moment c = sum m x. Unit: mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
         self.0.invariants().first_moment()
     }
 
-    /// I0 (3 x 3). Unit: mass length^2.
+    /// Returns the inertia tensor I0 (3 x 3). Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         self.0.invariants().inertia()
     }
 
-    /// W1 (3 x 3nf): inertia linear in the modal coordinates; `None` when the body was made for a scene that
+    /// Returns W1 (3 x 3nf), the inertia linear in the modal coordinates; `None` if the body was made for a scene that
     /// does not need it.
     pub fn w1(&self) -> Option<Matrix> {
         self.0.invariants().w1().map(|w1| shown(w1.as_ref()))
     }
 
-    /// W2 (3nf x 3nf): inertia quadratic in the modal coordinates; `None` as for [`FlexBody::w1`].
+    /// Returns W2 (3nf x 3nf), the inertia quadratic in the modal coordinates; `None` if the body was made for a scene
+    /// that does not need it.
     pub fn w2(&self) -> Option<Matrix> {
         self.0.invariants().w2().map(|w2| shown(w2.as_ref()))
     }
 
-    /// W3 (3nf x nf): coupling of rotation and modes through the modal coordinates; `None` as for
-    /// [`FlexBody::w1`].
+    /// Returns W3 (3nf x nf), the coupling of rotation and modes through the modal coordinates; `None` if the body was
+    /// made for a scene that does not need it.
     pub fn w3(&self) -> Option<Matrix> {
         self.0.invariants().w3().map(|w3| shown(w3.as_ref()))
     }
 
-    /// C1 (3 x nf): coupling of translation and modes; zero for free modes.
+    /// Returns C1 (3 x nf), the coupling of translation and modes; zero for free modes.
     pub fn c1(&self) -> Matrix {
         shown(self.0.invariants().c1().as_ref())
     }
 
-    /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes.
+    /// Returns C2 (3 x nf), the coupling of rotation and modes in the undeformed body; zero for free modes.
     pub fn c2(&self) -> Matrix {
         shown(self.0.invariants().c2().as_ref())
     }
 
-    /// m_ff (nf x nf) = Psi' M Psi.
+    /// Returns the modal mass m_ff (nf x nf) = Psi' M Psi.
     pub fn modal_mass(&self) -> Matrix {
         shown(self.0.invariants().modal_mass().as_ref())
     }
 
-    /// K_ff (nf x nf) = Psi' K Psi.
+    /// Returns the modal stiffness K_ff (nf x nf) = Psi' K Psi.
     pub fn modal_stiffness(&self) -> Matrix {
         shown(self.0.invariants().modal_stiffness().as_ref())
     }
 
-    /// What lumped masses would have given: scheme, and how far each invariant is off, relative.
+    /// Returns the errors of lumped masses: name of the scheme, and the relative error of each invariant.
     pub fn lumped_errors(&self) -> Vec<(&str, &[(String, f64)])> {
         self.0.lumped().iter().map(|lumped| (lumped.scheme.as_str(), lumped.comparison.as_slice())).collect()
     }
 
-    /// Everything that must hold of the numbers of the body, checked anew.
+    /// Checks and returns all identities of the body.
     pub fn identities(&self) -> Vec<Identity> {
         let checks = own_identities(&self.0).into_iter();
         checks
@@ -223,31 +222,30 @@ impl FlexBody {
             .collect()
     }
 
-    /// Decides which terms and modes the body needs in a scene: those with which every load case is within its
-    /// tolerances.
+    /// Selects the terms and modes that the body needs in a scene, so that every load case is within its tolerances.
     ///
     /// # Errors
-    /// FB212 where the scene does not fit the body; FB540 when its motion cannot be integrated.
+    /// FB212 if the scene does not match the body; FB540 if its motion cannot be integrated.
     pub fn select(&self, scene: &Scene) -> Result<Selection> {
         self.select_heard(scene, NOBODY)
     }
 
-    /// Selects as [`FlexBody::select`] does, heard and perhaps stopped by a listener.
+    /// Does the work of [`FlexBody::select`] with a listener, which may stop it.
     ///
     /// # Errors
-    /// As [`FlexBody::select`]; FB605 where the listener stops it.
+    /// The errors of [`FlexBody::select`]; FB605 if the listener stops it.
     pub fn select_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Selection> {
         heard(listener, |context| select(&self.0, &[], &scene.0, context)).map(Selection)
     }
 
-    /// The equations of motion of the body, with all terms that it holds.
+    /// Returns the equations of motion of the body, with all terms that it holds.
     pub fn equations_of_motion(&self) -> EquationsOfMotion {
         EquationsOfMotion::new(&self.0, Terms::ALL)
     }
 
-    /// Node `number`, where forces act and motion is read. With the Jacobian J of its velocity, J nu = v
-    /// ([`BodyPoint::velocity`]), a force of a joint is J'lambda ([`BodyPoint::add_force`]; \[ZG19\] (57) to
-    /// (60)). `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies so.
+    /// Returns node `number` as a point for forces and measured motion. With the Jacobian J of its velocity, J nu = v
+    /// ([`BodyPoint::velocity`]), the force of a joint is J'lambda ([`BodyPoint::add_force`]; \[ZG19\] (57) to (60)).
+    /// `examples/pendulum.rs` and `examples/slider_crank.rs` join bodies in this way.
     ///
     /// ```
     /// use flexbody::dynamics::Evaluation;
@@ -275,7 +273,7 @@ impl FlexBody {
         self.point(&Point::Node(number))
     }
 
-    /// The reference point of an interface, which moves as its nodes do on average (theory 5.3).
+    /// Returns the reference point of an interface, which moves with the mean motion of its nodes (theory 5.3).
     ///
     /// # Errors
     /// FB212 for an interface that the body does not have, or one without a reference point.
@@ -291,16 +289,16 @@ impl FlexBody {
     /// Simulates the body in a scene of one load case.
     ///
     /// # Errors
-    /// FB219 where the scene has several load cases; FB212 where it does not fit the body; FB540 when the
-    /// integration cannot go on; FB550 when it takes more steps than it may.
+    /// FB219 if the scene has several load cases; FB212 if it does not match the body; FB540 if the integration fails;
+    /// FB550 if it takes more steps than allowed.
     pub fn simulate(&self, scene: &Scene) -> Result<Motion> {
         self.simulate_heard(scene, NOBODY)
     }
 
-    /// The same, heard and perhaps stopped by a listener.
+    /// Does the work of [`FlexBody::simulate`] with a listener, which may stop it.
     ///
     /// # Errors
-    /// As [`FlexBody::simulate`]; FB605 where the listener stops it.
+    /// The errors of [`FlexBody::simulate`]; FB605 if the listener stops it.
     pub fn simulate_heard(&self, scene: &Scene, listener: Listener<'_>) -> Result<Motion> {
         let scene = scene.0.single()?;
         let (recording, diagnostics) = heard(listener, |context| {

@@ -1,4 +1,4 @@
-//! From a model to a body.
+//! Conversion of a model to a body.
 
 use super::progress::{Listener, NOBODY, heard};
 use super::{Basis, FlexBody, Model, Scene, Selection};
@@ -11,8 +11,8 @@ use flexbody_eigen::{Accuracy, Wanted};
 use flexbody_motion::scene::LoadCases;
 use flexbody_study::tailoring::{Tailoring, computed_basis, convert_for, loads_for};
 
-/// Settings of a conversion. The default: 20 free-surface modes, proved complete, about the centre of mass along the
-/// axes of the model.
+/// Settings of a conversion. By default 20 free-surface modes, proved complete, about the centre of mass along the axes
+/// of the model.
 #[derive(Debug, Clone, Default)]
 pub struct ConvertOptions {
     modes: Option<usize>,
@@ -25,49 +25,49 @@ pub struct ConvertOptions {
 }
 
 impl ConvertOptions {
-    /// The lowest modes, so many.
+    /// Requests the `count` lowest modes.
     pub fn modes(mut self, count: usize) -> Self {
         self.modes = Some(count);
         self
     }
 
-    /// All modes below a frequency. Unit: Hz.
+    /// Requests all modes below a frequency. Unit: Hz.
     pub fn below_hz(mut self, frequency: f64) -> Self {
         self.highest = Some(frequency);
         self
     }
 
-    /// Which shapes.
+    /// Sets the basis.
     pub fn basis(mut self, basis: Basis) -> Self {
         self.basis = basis;
         self
     }
 
-    /// How sure.
+    /// Sets the accuracy.
     pub fn accuracy(mut self, accuracy: Accuracy) -> Self {
         self.accuracy = accuracy;
         self
     }
 
-    /// Which body frame.
+    /// Sets the body frame.
     pub fn frame(mut self, frame: impl Into<FrameChoice>) -> Self {
         self.frame = frame.into();
         self
     }
 
-    /// Does not compute what lumped masses would have given.
+    /// Disables the comparison with lumped masses.
     pub fn without_comparators(mut self) -> Self {
         self.without_comparators = true;
         self
     }
 
-    /// Leaves the surface of the model out.
+    /// Leaves out the surface of the model.
     pub fn without_mesh(mut self) -> Self {
         self.mesh = MeshChoice::Without;
         self
     }
 
-    /// A surface of so many triangles at the most.
+    /// Limits the surface to `most` triangles.
     pub fn mesh_triangles(mut self, most: usize) -> Self {
         self.mesh = MeshChoice::AtMost(most);
         self
@@ -96,31 +96,31 @@ impl ConvertOptions {
     }
 }
 
-/// A body, and what there is to say about it.
+/// Result of a conversion.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Conversion {
-    /// The body.
+    /// Body that was made.
     pub body: FlexBody,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Model {
-    /// Computes modes and invariants: the body passes every check that `flexbody check` makes.
+    /// Computes modes and invariants. The body passes every check of `flexbody check`.
     ///
     /// # Errors
-    /// FB501 to FB506 where the modes cannot be trusted (not converged, not complete, a mechanism), FB512
-    /// where there are none, FB514 where the damping feeds energy to them, FB601 where the memory does not
-    /// suffice; FB714 where an identity does not hold.
+    /// FB501 to FB506 if the modes cannot be trusted (not converged, not complete, a mechanism), FB512 if there are
+    /// none, FB514 if the damping feeds energy into them, FB601 if the memory is insufficient; FB714 if an identity
+    /// does not hold.
     pub fn convert(&self, options: &ConvertOptions) -> Result<Conversion> {
         self.convert_heard(options, NOBODY)
     }
 
-    /// The same, heard and perhaps stopped by a listener.
+    /// Does the work of [`Model::convert`] with a listener, which may stop it.
     ///
     /// # Errors
-    /// As [`Model::convert`]; FB605 where the listener stops it.
+    /// The errors of [`Model::convert`]; FB605 if the listener stops it.
     pub fn convert_heard(&self, options: &ConvertOptions, listener: Listener<'_>) -> Result<Conversion> {
         if options.basis == Basis::Scene {
             let message = "a basis made for a scene needs one: `convert_for`";
@@ -131,18 +131,19 @@ impl Model {
         accepted(conversion)
     }
 
-    /// Converts with the terms and modes alone that the load cases of `scene` need, and the decision about each.
+    /// Converts with only the terms and modes that the load cases of `scene` need. Returns the decision about each as
+    /// well.
     ///
     /// # Errors
-    /// As [`Model::convert`]; FB212 where the scene does not fit the body.
+    /// The errors of [`Model::convert`]; FB212 if the scene does not match the body.
     pub fn convert_for(&self, scene: &Scene, options: &ConvertOptions) -> Result<(Conversion, Selection)> {
         self.convert_for_heard(scene, options, NOBODY)
     }
 
-    /// Converts as [`Model::convert_for`] does, heard and perhaps stopped by a listener.
+    /// Does the work of [`Model::convert_for`] with a listener, which may stop it.
     ///
     /// # Errors
-    /// As [`Model::convert_for`]; FB605 where the listener stops it.
+    /// The errors of [`Model::convert_for`]; FB605 if the listener stops it.
     pub fn convert_for_heard(
         &self,
         scene: &Scene,
@@ -158,7 +159,7 @@ impl Model {
     }
 }
 
-/// A finished conversion as users see it, once its body has passed every check.
+/// Returns a finished conversion in the types of this library, once its body has passed every check.
 fn accepted(conversion: convert::Conversion) -> Result<Conversion> {
     accept(&conversion.body)?;
     Ok(Conversion { body: FlexBody(conversion.body), diagnostics: conversion.diagnostics })

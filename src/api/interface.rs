@@ -4,42 +4,41 @@ use super::matrix::shown;
 use super::{FlexBody, Matrix};
 use flexbody_model::Coupling;
 
-/// An interface of a body, in body axes.
+/// Interface of a body, in body axes.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Interface {
-    /// Name.
+    /// Name of the interface.
     pub name: String,
     /// Numbers of its nodes.
     pub node_ids: Vec<i64>,
-    /// How it is coupled to its reference point, where that was stated.
+    /// Coupling to the reference point; `None` if none was stated.
     pub coupling: Option<Coupling>,
-    /// The reference point; none of a free interface. Unit: length.
+    /// Reference point; `None` for a free interface. Unit: length.
     pub reference: Option<[f64; 3]>,
-    /// What the modes do at the reference point: its displacement (3 x nf); none without such a point. Unit:
-    /// 1/sqrt(mass).
+    /// Displacement of the reference point by the modes (3 x nf); `None` without such a point. Unit: 1/sqrt(mass).
     pub translation: Option<Matrix>,
-    /// Its rotation (3 x nf); none where the nodes do not determine one. Unit: 1/(length sqrt(mass)).
+    /// Rotation of the reference point by the modes (3 x nf); `None` if the nodes do not determine one. Unit: 1/(length
+    /// sqrt(mass)).
     pub rotation: Option<Matrix>,
 }
 
-/// K and M in the coordinates that a Craig-Bampton body has at its interfaces, in body axes.
+/// K and M in the interface coordinates of a Craig-Bampton body, in body axes.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct InterfaceCoordinates {
-    /// What each of the nc coordinates is: motions of the interfaces, then amplitudes of the fixed-interface
-    /// modes.
+    /// Names of the nc coordinates: motions of the interfaces, then amplitudes of the fixed-interface modes.
     pub names: Vec<String>,
-    /// K (nc x nc).
+    /// Stiffness K (nc x nc).
     pub stiffness: Matrix,
-    /// M (nc x nc).
+    /// Mass M (nc x nc).
     pub mass: Matrix,
-    /// B (nc x nf): coordinates B q for the modal coordinates q.
+    /// Transformation B (nc x nf): coordinates B q for the modal coordinates q.
     pub of_modes: Matrix,
 }
 
 impl FlexBody {
-    /// The interfaces.
+    /// Returns the interfaces of the body.
     pub fn interfaces(&self) -> Vec<Interface> {
         let (nodes, modes) = (self.0.nodes(), self.0.modes());
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
@@ -57,7 +56,7 @@ impl FlexBody {
         self.0.interfaces().iter().map(show).collect()
     }
 
-    /// K and M in interface coordinates; `None` of a body that was not made by
+    /// Returns K and M in interface coordinates; `None` for a body that was not made by
     /// [`Basis::CraigBampton`](super::Basis::CraigBampton).
     pub fn interface_coordinates(&self) -> Option<InterfaceCoordinates> {
         let own = self.0.coordinates()?;

@@ -1,8 +1,8 @@
-//! Dense arrays as the library shows them.
+//! Dense arrays in the interface of the library.
 
 use faer::MatRef;
 
-/// A dense matrix, stored column by column.
+/// Dense matrix, stored column by column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Matrix {
     rows: usize,
@@ -11,25 +11,25 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// All entries, column by column.
+    /// Returns all entries, column by column.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// The entries of a column.
+    /// Returns the entries of column `j`.
     ///
     /// # Panics
-    /// When there is no such column.
+    /// If there is no such column.
     pub fn column(&self, j: usize) -> &[f64] {
         &self.values[j * self.rows..(j + 1) * self.rows]
     }
@@ -43,7 +43,8 @@ impl std::ops::Index<(usize, usize)> for Matrix {
     }
 }
 
-/// Not an implementation of `From`: its signature would show a type of the engine.
+/// Converts a matrix of the engine. It is not an implementation of `From`, whose signature would expose a type of the
+/// engine.
 pub(super) fn shown(matrix: MatRef<'_, f64>) -> Matrix {
     let mut values = Vec::with_capacity(matrix.nrows() * matrix.ncols());
     matrix.col_iter().for_each(|column| values.extend(column.iter().copied()));

@@ -1,5 +1,5 @@
-//! The front door: what a program that uses the library sees. It wraps the types of the other rooms, so that
-//! these can change, and shows arrays as slices.
+//! Public interface of the library. It wraps the types of the other crates, so that these can change, and shows arrays
+//! as slices.
 
 mod arrays;
 mod body;

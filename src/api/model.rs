@@ -1,4 +1,4 @@
-//! A finite element model, read from files or made of matrices in memory.
+//! Finite element model, read from files or made of matrices in memory.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -13,17 +13,17 @@ use flexbody_model::{
 };
 use std::path::{Path, PathBuf};
 
-/// A sparse matrix with both triangles of a symmetric one.
+/// Sparse matrix; a symmetric one has both triangles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseMatrix(pub(super) CscMatrix);
 
 impl SparseMatrix {
-    /// From compressed columns: column j has the entries `col_ptr[j]..col_ptr[j + 1]` of `row_idx` and
-    /// `values`, ascending by rows.
+    /// Creates a matrix from compressed columns: column j has the entries `col_ptr[j]..col_ptr[j + 1]` of `row_idx` and
+    /// `values`, with ascending rows.
     ///
     /// # Errors
-    /// FB303 and FB304 when the slices are no such matrix: pointers that descend or do not end at the number
-    /// of entries, rows that do not ascend or are not below `n`; FB313 for too many rows.
+    /// FB303 and FB304 if the slices do not describe such a matrix: pointers descend or do not end at the number of
+    /// entries, rows do not ascend or are not below `n`; FB313 for too many rows.
     pub fn from_csc(n: usize, col_ptr: &[usize], row_idx: &[usize], values: &[f64]) -> Result<Self> {
         let refuse = |code: Code, what: String| {
             Err(Diagnostic::new(code, format!("compressed columns: {what}")).into())
@@ -42,6 +42,7 @@ impl SparseMatrix {
             );
         }
         check_size(n as u64, n as u64, values.len() as u64)?;
+        // Rows must ascend in each column, which also excludes repeated positions.
         let mut triplets = Vec::with_capacity(values.len());
         for column in 0..n {
             let entries = col_ptr[column]..col_ptr[column + 1];
@@ -59,10 +60,10 @@ impl SparseMatrix {
         Ok(Self(CscMatrix::from_triplets(n, n, &triplets)))
     }
 
-    /// From triplets (row, column, value); those of the same place are added.
+    /// Creates a matrix from triplets (row, column, value). Values of equal positions are added.
     ///
     /// # Errors
-    /// FB303 when an index is not below `n`; FB313 for too many rows.
+    /// FB303 if an index is not below `n`; FB313 for too many rows.
     pub fn from_triplets(n: usize, triplets: &[(usize, usize, f64)]) -> Result<Self> {
         if let Some((row, column, _)) = triplets.iter().find(|(row, column, _)| *row >= n || *column >= n) {
             let message = format!("entry ({row}, {column}) lies outside a matrix of {n} rows");
@@ -73,14 +74,14 @@ impl SparseMatrix {
         Ok(Self(CscMatrix::from_triplets(n, n, &narrow)))
     }
 
-    /// From a matrix of `sprs`, compressed by rows or columns.
+    /// Converts a matrix of `sprs`, compressed by rows or columns.
     pub fn from_sprs(matrix: &sprs::CsMat<f64>) -> Self {
         Self(CscMatrix::from_sprs(matrix))
     }
 }
 
-/// A finite element model that passed every check: K and M are symmetric, K has the rigid motions and no
-/// other, M is positive semidefinite and fits the nodes.
+/// Finite element model that has passed every check: K and M are symmetric, K has the rigid motions and no other
+/// zero-energy motion, M is positive semidefinite and matches the nodes.
 #[derive(Debug, Clone)]
 pub struct Model {
     pub(super) checked: FeModel,
@@ -92,22 +93,21 @@ impl Model {
     /// Reads the model of a manifest (`model.toml`, docs/input.md).
     ///
     /// # Errors
-    /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all of a
-    /// stage together.
+    /// FB101 to FB209 for the files, FB301 to FB321 for matrices, FB401 to FB439 for the model: all errors of a stage
+    /// together.
     pub fn read(manifest: impl AsRef<Path>) -> Result<Self> {
         let files = read_manifest(manifest)?;
         Self::checked(read_model(&files)?, files.residual_vectors)
     }
 
-    /// Reads what an FE program has written (docs/fe_programs.md): the deck or another main file of a job.
+    /// Reads the output of an FE program (docs/fe_programs.md): the deck or another main file of a job.
     ///
-    /// * `program`: name of the program as on the command line; `None`: by its files.
-    /// * `units`: of length, mass and time, as in a manifest; `None`: not stated.
-    /// * `interfaces`: names with the node sets of the deck that they are.
+    /// * `program`: name of the program as on the command line; `None` to detect it from the files.
+    /// * `units`: units of length, mass and time, as in a manifest; `None` if not stated.
+    /// * `interfaces`: names of interfaces, each with a node set of the deck and a coupling.
     ///
     /// # Errors
-    /// As [`Model::read`]; FB108 to FB112 for what is wrong with a job, FB220 for a set that it does not
-    /// have.
+    /// The errors of [`Model::read`]; FB108 to FB112 for errors of the job, FB220 for a set that the job does not have.
     pub fn read_job(
         path: impl AsRef<Path>,
         program: Option<&str>,
@@ -127,7 +127,7 @@ impl Model {
         Self::checked(read_model(&files)?, Vec::new())
     }
 
-    /// A model of matrices in memory: rows node by node, x, y, z in the order of the nodes.
+    /// Starts a model of matrices in memory. By default the rows are x, y, z of each node, in the order of the nodes.
     pub fn builder(name: impl Into<String>, stiffness: SparseMatrix, mass: SparseMatrix) -> ModelBuilder {
         let nodes = Nodes { ids: Vec::new(), positions: Vec::new() };
         let raw = RawModel::in_memory(name, stiffness.0, mass.0, nodes);
@@ -139,33 +139,33 @@ impl Model {
         Ok(Self { checked: model, residual_vectors, diagnostics })
     }
 
-    /// Name.
+    /// Returns the name of the model.
     pub fn name(&self) -> &str {
         self.checked.name()
     }
 
-    /// Number of degrees of freedom N.
+    /// Returns the number of degrees of freedom N.
     pub fn n_dofs(&self) -> usize {
         self.checked.stiffness().n()
     }
 
-    /// Node numbers.
+    /// Returns the node numbers.
     pub fn node_ids(&self) -> &[i64] {
         &self.checked.nodes().ids
     }
 
-    /// Node positions. Unit: length.
+    /// Returns the node positions. Unit: length.
     pub fn positions(&self) -> &[[f64; 3]] {
         &self.checked.nodes().positions
     }
 
-    /// Warnings and notes of reading and checking.
+    /// Returns the warnings and notes of reading and checking.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }
 }
 
-/// A model in the making.
+/// Builder of a model from matrices in memory.
 #[derive(Debug, Clone)]
 pub struct ModelBuilder {
     raw: RawModel,
@@ -173,37 +173,36 @@ pub struct ModelBuilder {
 }
 
 impl ModelBuilder {
-    /// Numbers and positions of the nodes. Interfaces, labels of rows, loads and scenes name nodes by these numbers;
-    /// [`ModelBuilder::mesh`] by positions from 0.
+    /// Sets numbers and positions of the nodes. Interfaces, labels of rows, loads and scenes refer to nodes by these
+    /// numbers; [`ModelBuilder::mesh`] by indices from 0.
     pub fn nodes(mut self, ids: Vec<i64>, positions: Vec<[f64; 3]>) -> Self {
         self.raw.nodes = Nodes { ids, positions };
         self
     }
 
-    /// The surface to draw the body by: triangles, counterclockwise seen from outside, and edges, both by
-    /// indices into the nodes, which are given before.
+    /// Sets the surface for drawing: triangles, counterclockwise seen from outside, and edges, both as node indices.
+    /// The nodes must be set before.
     ///
     /// # Errors
-    /// FB125 for an index that is no node's, a triangle or an edge that has a node twice, or neither triangles
-    /// nor edges.
+    /// FB125 for an invalid index, a triangle or an edge with a repeated node, or neither triangles nor edges.
     pub fn mesh(mut self, triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Result<Self> {
         let mesh = SurfaceMesh::new(triangles, edges, self.raw.nodes.len());
         self.raw.mesh = Some(mesh.map_err(|problem| Diagnostic::new(Code::MeshForeign, problem))?);
         Ok(self)
     }
 
-    /// Node number and direction of every row (1 to 3 displacements, 4 to 6 rotations), where rows are not x,
-    /// y, z of each node.
+    /// Sets node number and direction of every row (1 to 3 displacements, 4 to 6 rotations), if rows are not x, y, z of
+    /// each node.
     pub fn dofs(mut self, labels: impl IntoIterator<Item = (i64, u8)>) -> Self {
         let labels = labels.into_iter().map(|(node, direction)| DofLabel { node, direction });
         self.raw.dofs = Some(labels.collect());
         self
     }
 
-    /// Units of length, mass and time, as in a manifest: `"m"`, `"kg"`, `"s"`, or a factor to SI.
+    /// Sets the units of length, mass and time, as in a manifest: `"m"`, `"kg"`, `"s"`, or a factor to SI.
     ///
     /// # Errors
-    /// FB202 for a unit that is not known.
+    /// FB202 for an unknown unit.
     pub fn units(mut self, length: &str, mass: &str, time: &str) -> Result<Self> {
         let parsed = UnitSystem::parse(length, mass, time);
         self.raw.units =
@@ -211,22 +210,21 @@ impl ModelBuilder {
         Ok(self)
     }
 
-    /// Adds a set of nodes that joints and loads act on, coupled to its reference point by their mean motion. The point
-    /// is the mean of the nodes.
+    /// Adds a set of nodes that joints and loads act on. It is coupled to its reference point by the mean motion of the
+    /// nodes; the point is the mean of the nodes.
     pub fn interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
         self.raw.interfaces.push(NodeSet::new(name, nodes));
         self
     }
 
-    /// As [`ModelBuilder::interface`], with nodes that move as a rigid body.
+    /// Adds an interface whose nodes move as a rigid body. The reference point is the mean of the nodes.
     pub fn rigid_interface(mut self, name: impl Into<String>, nodes: Vec<i64>) -> Self {
         let coupling = Some(Coupling::Rigid);
         self.raw.interfaces.push(NodeSet { coupling, ..NodeSet::new(name, nodes) });
         self
     }
 
-    /// Adds an interface as [`ModelBuilder::interface`] does, with a coupling and a reference point in model axes; `None`:
-    /// the mean of the nodes.
+    /// Adds an interface with a coupling and a reference point in model axes; `None` for the mean of the nodes.
     pub fn coupled_interface(
         mut self,
         name: impl Into<String>,
@@ -240,14 +238,14 @@ impl ModelBuilder {
         self
     }
 
-    /// A plane model: nodes lie in z = 0 and have rows x and y (directions 1, 2 and the rotation 6).
+    /// Declares a plane model: nodes lie in z = 0 and have rows x and y (directions 1, 2 and the rotation 6).
     pub fn plane(mut self) -> Self {
         self.raw.dimension = 2;
         self
     }
 
-    /// Unit forces and torques at every interface, centrifugal loads, or both, whose static responses join
-    /// free modes as residual vectors.
+    /// Sets the loads whose static responses join free modes as residual vectors: unit forces and torques at every
+    /// interface, centrifugal loads, or both.
     pub fn residual_vectors(mut self, interfaces: bool, centrifugal: bool) -> Self {
         let loads = [(centrifugal, LoadSource::Centrifugal), (interfaces, LoadSource::Interfaces)];
         self.residual_vectors =
@@ -255,36 +253,35 @@ impl ModelBuilder {
         self
     }
 
-    /// The same damping ratio for every mode.
+    /// Sets one damping ratio for all modes.
     pub fn damping_ratio(mut self, ratio: f64) -> Self {
         self.raw.damping = Some(Damping::Ratio(ratio));
         self
     }
 
-    /// Damping ratios of modes by their frequencies: (end in hertz, ratio), ends ascending, the last
-    /// [`f64::INFINITY`]. A mode belongs to the first band whose end its frequency does not exceed. What is wrong with
-    /// them is refused by [`ModelBuilder::build`].
+    /// Sets damping ratios of modes by frequency: (end in hertz, ratio), with ascending ends, the last
+    /// [`f64::INFINITY`]. A mode belongs to the first band whose end its frequency does not exceed. Invalid bands are
+    /// refused by [`ModelBuilder::build`].
     pub fn damping_bands(mut self, bands: &[(f64, f64)]) -> Self {
         let band = |&(to_hz, ratio): &(f64, f64)| DampingBand { to_hz, ratio };
         self.raw.damping = Some(Damping::Bands(bands.iter().map(band).collect()));
         self
     }
 
-    /// Rayleigh damping D = alpha M + beta K. Units: 1/time, time.
+    /// Sets Rayleigh damping D = alpha M + beta K. Units: 1/time, time.
     pub fn rayleigh_damping(mut self, alpha: f64, beta: f64) -> Self {
         self.raw.damping = Some(Damping::Rayleigh { alpha, beta });
         self
     }
 
-    /// A damping matrix with the rows of K. Unit: mass/time.
+    /// Sets a damping matrix with the rows of K. Unit: mass/time.
     pub fn damping_matrix(mut self, damping: SparseMatrix) -> Self {
         let matrix = RawMatrix { matrix: damping.0, digits: 17, path: PathBuf::new() };
         self.raw.damping = Some(Damping::Matrix(matrix));
         self
     }
 
-    /// Takes what a person has looked at as warnings: densities that no matter has, mass between nodes that
-    /// no stiffness joins.
+    /// Treats implausible densities, and mass coupling between nodes without stiffness, as warnings instead of errors.
     pub fn allow_implausible(mut self) -> Self {
         self.raw.allow_implausible = true;
         self
@@ -293,7 +290,7 @@ impl ModelBuilder {
     /// Checks the model.
     ///
     /// # Errors
-    /// FB305 to FB439: what is wrong with matrices, nodes and interfaces, all of a stage together.
+    /// FB305 to FB439 for errors of matrices, nodes and interfaces, all errors of a stage together.
     pub fn build(self) -> Result<Model> {
         Model::checked(self.raw, self.residual_vectors)
     }

@@ -1,15 +1,16 @@
-//! The motion of a body.
+//! Motion of a body.
 
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::units::UnitSystem;
 use flexbody_motion::scene::Recording;
 use nalgebra::Vector3;
 
-/// The motion of a body in a scene. Units are those of the model.
+/// Motion of a body in a scene, in the units of the model.
 ///
-/// The frame that it is told by has its origin at the centre of mass of the undeformed body, or at the
-/// reference point of what carries it, and the axes of the model, which turn with the body: modal coordinates
-/// are those of the body, positions and attitude not those of its own frame where that is another.
+/// The frame has its origin at the centre of mass of the undeformed body, or at the reference point that carries it,
+/// and the axes of the model, which turn with the body. Modal coordinates are those of the body; positions and attitude
+/// may differ from those of the body's own frame. The functions of an `instant` panic when the motion has no such
+/// instant.
 #[derive(Debug, Clone)]
 pub struct Motion {
     pub(super) recording: Recording,
@@ -19,13 +20,13 @@ pub struct Motion {
     pub(super) diagnostics: Vec<Diagnostic>,
 }
 
-/// The path of a watched point. All vectors are one for each instant.
+/// Path of a watched point. All vectors have one entry per instant.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PointPath {
     /// Name of the point: `node 17`, `interface tip`.
     pub name: String,
-    /// Places, world axes.
+    /// Positions, world axes.
     pub place: Vec<[f64; 3]>,
     /// Deflections from the undeformed body, along the axes of the frame.
     pub deflection: Vec<[f64; 3]>,
@@ -36,77 +37,77 @@ pub struct PointPath {
 }
 
 impl Motion {
-    /// Instants at which the motion is written.
+    /// Returns the instants of the output.
     pub fn times(&self) -> &[f64] {
         &self.recording.time
     }
 
-    /// Modal coordinates at an instant (nf).
+    /// Returns the modal coordinates at an instant (nf).
     ///
     /// # Panics
-    /// Here and below, when there is no such instant.
+    /// If there is no such instant.
     pub fn modal_coordinates(&self, instant: usize) -> &[f64] {
         &self.recording.states[instant].q
     }
 
-    /// Their rates at an instant (nf).
+    /// Returns the rates of the modal coordinates at an instant (nf).
     pub fn modal_velocities(&self, instant: usize) -> &[f64] {
         &self.recording.states[instant].qd
     }
 
-    /// Place of the origin of the frame at an instant, world axes.
+    /// Returns the position of the origin of the frame at an instant, world axes.
     pub fn origin(&self, instant: usize) -> Vector3<f64> {
         self.recording.states[instant].origin
     }
 
-    /// Its velocity, world axes.
+    /// Returns the velocity of the origin of the frame, world axes.
     pub fn velocity(&self, instant: usize) -> Vector3<f64> {
         self.recording.states[instant].velocity
     }
 
-    /// Attitude of the frame: Euler parameters (p0, p1, p2, p3) of unit length, p0 the cosine of half the
-    /// angle.
+    /// Returns the attitude of the frame as Euler parameters (p0, p1, p2, p3) of unit length, where p0 is the cosine of
+    /// half the angle.
     pub fn attitude(&self, instant: usize) -> [f64; 4] {
         self.recording.states[instant].attitude.0
     }
 
-    /// Angular velocity of the frame, along its axes.
+    /// Returns the angular velocity of the frame, along its axes.
     pub fn angular_velocity(&self, instant: usize) -> Vector3<f64> {
         self.recording.states[instant].omega
     }
 
-    /// Kinetic energy.
+    /// Returns the kinetic energy.
     pub fn kinetic_energy(&self, instant: usize) -> f64 {
         self.recording.balances[instant].kinetic
     }
 
-    /// Elastic energy.
+    /// Returns the elastic energy.
     pub fn elastic_energy(&self, instant: usize) -> f64 {
         self.recording.balances[instant].elastic
     }
 
-    /// Work of forces, damping and prescribed motion since the start.
+    /// Returns the work of forces, damping and prescribed motion since the start.
     pub fn work(&self, instant: usize) -> f64 {
         self.recording.balances[instant].work
     }
 
-    /// Linear momentum, world axes.
+    /// Returns the linear momentum, world axes.
     pub fn linear_momentum(&self, instant: usize) -> Vector3<f64> {
         self.recording.balances[instant].linear
     }
 
-    /// Angular momentum about where the origin of the frame was at the start, world axes.
+    /// Returns the angular momentum about the initial position of the frame's origin, world axes.
     pub fn angular_momentum(&self, instant: usize) -> Vector3<f64> {
         self.recording.balances[instant].angular
     }
 
-    /// Force and torque about the origin that the prescribed motion takes, along the axes of the frame;
-    /// `None` where nothing is prescribed.
+    /// Returns the force and the torque about the origin that the prescribed motion requires, along the axes of the
+    /// frame; `None` without prescribed motion.
     pub fn reaction(&self, instant: usize) -> Option<(Vector3<f64>, Vector3<f64>)> {
         self.recording.reactions.as_ref().map(|reactions| reactions[instant])
     }
 
-    /// Paths of the points that the scene watches.
+    /// Returns the paths of the points that the scene watches.
     pub fn paths(&self) -> Vec<PointPath> {
         let all = |vectors: &[Vector3<f64>]| vectors.iter().map(|vector| (*vector).into()).collect();
         let paths = self.recording.paths.iter();
@@ -121,33 +122,33 @@ impl Motion {
             .collect()
     }
 
-    /// The largest deflection of any node, also between the instants. Unit: length.
+    /// Returns the largest deflection of any node, also between the instants. Unit: length.
     pub fn largest_deflection(&self) -> f64 {
         self.extent * self.recording.extremes.deflection.value
     }
 
-    /// How far energy less work, linear momentum and angular momentum less their impulses drifted, relative
-    /// to the largest of the motion.
+    /// Returns the drift of energy minus work, and of linear and angular momentum minus their impulses, each relative
+    /// to the largest value of the motion.
     pub fn drift(&self) -> [f64; 3] {
         let drift = self.recording.drift();
         [drift.energy, drift.linear, drift.angular]
     }
 
-    /// Steps of the integration.
+    /// Returns the number of integration steps.
     pub fn steps(&self) -> u64 {
         self.recording.work.steps
     }
 
-    /// Warnings and notes.
+    /// Returns warnings and notes.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }
 
-    /// Writes the motion to an HDF5 file as `flexbody simulate -o` does (docs/simulate.md): it appears whole
-    /// or not at all.
+    /// Writes the motion to an HDF5 file in the format of `flexbody simulate -o` (docs/simulate.md). The file appears
+    /// whole or not at all.
     ///
     /// # Errors
-    /// FB104, FB105, FB107 and FB602 when it cannot be written.
+    /// FB104, FB105, FB107 and FB602 if the file cannot be written.
     #[cfg(feature = "hdf5")]
     pub fn write(&self, path: impl AsRef<std::path::Path>) -> flexbody_base::error::Result<()> {
         use flexbody_file::{fill_simulation, prepare_output};

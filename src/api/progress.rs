@@ -1,4 +1,4 @@
-//! How a long computation is watched, and stopped.
+//! Progress and cancellation of long computations.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -6,34 +6,33 @@ use flexbody_linalg::context::{Context, Event};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-/// What a long computation is at.
+/// Progress report of a long computation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Progress<'a> {
-    /// A phase begins.
+    /// Start of a phase.
     Phase(&'a str),
-    /// What is going to be done and what it needs, known before the work.
+    /// Plan of the work and its needs, known before the work.
     Plan(&'a str),
-    /// Part of the current phase that is done, 0 to 1.
+    /// Completed part of the current phase, 0 to 1.
     Fraction(f64),
 }
 
-/// Hears what a computation is at, from whichever of its threads, and says whether it is to go on. Where it
-/// is not, the computation ends there and comes back with FB605; nothing is left of it. How soon depends on
-/// how often there is something to hear: at every step of an integration and of a search for modes, but not
-/// within the factorisation of a matrix.
+/// Callback that receives progress reports, from any thread of the computation, and returns whether it shall continue.
+/// On `Break` the computation ends with FB605 and without results. The delay depends on the reports: there is one at
+/// every step of an integration and of a search for modes, but none within the factorisation of a matrix.
 pub type Listener<'a> = &'a (dyn Fn(Progress<'_>) -> ControlFlow<()> + Sync);
 
-/// Hears nothing and lets everything go on.
+/// Ignores all reports and lets everything continue.
 pub(super) const NOBODY: Listener<'static> = &|_| ControlFlow::Continue(());
 
-/// What unwinds a computation that its listener stops.
+/// Panic payload that unwinds a computation stopped by its listener.
 struct Stopped;
 
-/// Does `work`, which `listener` hears of and may stop.
+/// Runs `work`, which reports to `listener` and may be stopped by it.
 ///
-/// A computation is stopped by unwinding, on whichever thread it told its progress, without a message of a
-/// panic: all that it works on is its own.
+/// A computation is stopped by unwinding on the thread that reports, without a panic message. This is safe since the
+/// computation owns all its data.
 pub(super) fn heard<T>(listener: Listener<'_>, work: impl FnOnce(&Context<'_>) -> Result<T>) -> Result<T> {
     let watch = |event: Event<'_>| {
         let progress = match event {

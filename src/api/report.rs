@@ -1,17 +1,17 @@
-//! Reports, as the commands write them.
+//! Reports in the formats of the commands.
 
 use super::{FlexBody, Motion, Selection};
 use flexbody_report::{Facts, RunData, SelectionFacts, SimulationFacts, simulation_csv};
 
-/// Formats of a report.
+/// Format of a report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum ReportFormat {
-    /// For programs; the schemas are in `schemas/`. Floats round-trip.
+    /// JSON for programs; the schemas are in `schemas/`. Floats round-trip.
     Json,
-    /// For a terminal: at most 80 columns.
+    /// Text for a terminal, at most 80 columns wide.
     Text,
-    /// For people: one page with its plots, which loads nothing from elsewhere.
+    /// HTML page with plots, which loads nothing from elsewhere.
     Html,
 }
 
@@ -25,33 +25,33 @@ impl ReportFormat {
     }
 }
 
-/// What a report says of the run: the `diagnostics`, and nothing about times and memory.
+/// Returns the run data of a report: the `diagnostics`, without times and memory.
 pub(super) fn run(diagnostics: &[flexbody_base::diagnostic::Diagnostic]) -> RunData {
     RunData { diagnostics: diagnostics.to_vec(), ..RunData::default() }
 }
 
 impl FlexBody {
-    /// The report of `flexbody inspect`.
+    /// Returns the report of `flexbody inspect`.
     pub fn report(&self, format: ReportFormat) -> String {
         flexbody_report::render(&Facts::new(&self.0, &RunData::default()), format.inner())
     }
 }
 
 impl Selection {
-    /// The report of `flexbody select`.
+    /// Returns the report of `flexbody select`.
     pub fn report(&self, format: ReportFormat) -> String {
         SelectionFacts::new(&self.0, &run(self.diagnostics())).render(format.inner())
     }
 }
 
 impl Motion {
-    /// The report of `flexbody simulate`.
+    /// Returns the report of `flexbody simulate`.
     pub fn report(&self, format: ReportFormat) -> String {
         let run = run(self.diagnostics());
         SimulationFacts::new(&self.recording, &self.units, &run).render(format.inner())
     }
 
-    /// The table of `flexbody simulate --csv`: a line for each instant.
+    /// Returns the table of `flexbody simulate --csv`: one line per instant.
     pub fn csv(&self) -> String {
         simulation_csv(&self.recording)
     }

@@ -1,4 +1,4 @@
-//! What a body is to do, and what it needs for that.
+//! Scenes, and the selection of terms and modes for them.
 
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_base::error::Result;
@@ -6,7 +6,7 @@ use flexbody_motion::scene::LoadCases;
 use flexbody_study::selection;
 use std::path::Path;
 
-/// What a body is to do (docs/simulate.md): one or more load cases, each with gravity, loads, prescribed motion, duration
+/// Scene for a body (docs/simulate.md): one or more load cases, each with gravity, loads, prescribed motion, duration
 /// and tolerances.
 #[derive(Debug, Clone)]
 pub struct Scene(pub(super) LoadCases);
@@ -15,58 +15,58 @@ impl Scene {
     /// Reads a scene file with all its load cases.
     ///
     /// # Errors
-    /// FB101, FB106 when it or a file of its histories cannot be read; FB211, FB213 for what is wrong in it
-    /// and FB215 to FB217 in these files, all of it.
+    /// FB101, FB106 if the scene file or a file of its histories cannot be read; FB211, FB213 for errors in the scene
+    /// and FB215 to FB217 in its history files, all together.
     pub fn read(path: impl AsRef<Path>) -> Result<Self> {
         LoadCases::read(path, None).map(Self)
     }
 
-    /// Reads the load case of a scene file that has this name, or with `None` a scene file without load cases.
+    /// Reads the load case `name` of a scene file, or with `None` a scene file without load cases.
     ///
     /// # Errors
-    /// As [`Scene::read`]; FB219 when there is no such case, or there are load cases and none is named.
+    /// The errors of [`Scene::read`]; FB219 if there is no such case, or if there are load cases and `name` is `None`.
     pub fn read_case(path: impl AsRef<Path>, name: Option<&str>) -> Result<Self> {
         LoadCases::read_single(path, name).map(|case| Self(case.into()))
     }
 
-    /// Joins the load cases of several scenes, in their order. Returns `None` without any.
+    /// Joins the load cases of several scenes, in order. Returns `None` if there are none.
     pub fn of_cases(scenes: impl IntoIterator<Item = Self>) -> Option<Self> {
         let cases = scenes.into_iter().flat_map(|scene| scene.0.to_vec()).collect();
         LoadCases::new(cases).map(Self)
     }
 
-    /// The load cases, one or more, each as a scene of its own.
+    /// Returns the load cases, at least one, each as a scene of its own.
     pub fn cases(&self) -> Vec<Self> {
         self.0.iter().map(|case| Self(case.clone().into())).collect()
     }
 
-    /// Name of the scene; of a single load case that of its scene, a colon and its own.
+    /// Returns the name of the scene; for a single load case, the name of its scene, a colon and its own name.
     pub fn name(&self) -> &str {
         self.0.name()
     }
 }
 
-/// Which terms and modes a body needs in a scene.
+/// Terms and modes that a body needs in a scene.
 #[derive(Debug, Clone)]
 pub struct Selection(pub(super) selection::Selection);
 
 impl Selection {
-    /// The modes that are kept (from 0).
+    /// Returns the indices of the kept modes (from 0).
     pub fn modes(&self) -> &[usize] {
         &self.0.modes
     }
 
-    /// Names of the groups of the kinetic energy with the reason why each is kept or not.
+    /// Returns the groups of the kinetic energy: name, whether it is kept, and the reason.
     pub fn groups(&self) -> Vec<(&'static str, bool, &str)> {
         self.0.terms.iter().map(|term| (term.group.name(), term.kept, term.reason.as_str())).collect()
     }
 
-    /// Whether the tolerances of the scene hold, as far as they were measured.
+    /// Returns true if the tolerances of the scene hold, as far as they were measured.
     pub fn holds(&self) -> bool {
         self.0.holds()
     }
 
-    /// Warnings and notes.
+    /// Returns warnings and notes.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.0.diagnostics
     }

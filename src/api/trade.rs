@@ -1,4 +1,4 @@
-//! What accuracy costs in a scene.
+//! Trade study of accuracy and cost in a scene.
 
 use super::progress::{Listener, heard};
 use super::{FlexBody, Model, ReportFormat, Scene, report};
@@ -11,8 +11,8 @@ use flexbody_study::trade::{
     self, ReferenceChoice, ReferenceKind, Source, TradeSettings, WantedBodies, conversions,
 };
 
-/// What is asked of a trade study. The default: 20 modes of a model, the reference being the body with
-/// everything that it has, the median time of 3 simulations of each candidate.
+/// Settings of a trade study. By default 20 modes of a model, the whole body as the reference, and the median time of 3
+/// simulations of each candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TradeOptions {
     modes: usize,
@@ -27,43 +27,43 @@ impl Default for TradeOptions {
 }
 
 impl TradeOptions {
-    /// Number of free modes of the conversions of a model.
+    /// Sets the number of free modes of the conversions of a model.
     pub fn modes(mut self, count: usize) -> Self {
         self.modes = count;
         self
     }
 
-    /// Simulations of a candidate whose median time counts.
+    /// Sets the number of simulations per candidate, of which the median time counts.
     pub fn repeat(mut self, times: usize) -> Self {
         self.repeat = times.max(1);
         self
     }
 
-    /// Measures errors against this motion; those other than [`ReferenceChoice::Full`] need a model.
+    /// Sets the reference motion of the errors. Choices other than [`ReferenceChoice::Full`] need a model.
     pub fn reference(mut self, reference: ReferenceChoice) -> Self {
         self.reference = reference;
         self
     }
 }
 
-/// Candidate bodies for a scene, measured against a reference, and the best of them.
+/// Result of a trade study: candidate bodies for a scene, measured against a reference, and the recommended one.
 #[derive(Debug, Clone)]
 pub struct Trade {
     study: trade::Trade,
     sources: Vec<Source>,
-    /// Of each load case.
+    /// Truncation errors of the reference in each load case.
     lacks: Vec<Vec<ReferenceError>>,
     diagnostics: Vec<Diagnostic>,
 }
 
 impl Model {
-    /// Measures what accuracy costs in `scene`: candidates of the conversions of the model, as
-    /// `flexbody trade model.toml` does. Every candidate is measured in each load case, and as good as it is in
-    /// the worst. All results but the times are the same at any number of threads.
+    /// Measures the cost of accuracy in `scene` for candidates from conversions of the model, like `flexbody trade
+    /// model.toml`. Every candidate is measured in each load case, and its worst case counts. All results except times
+    /// are independent of the number of threads.
     ///
     /// # Errors
-    /// As [`Model::convert`]; FB212 where the scene does not fit the body; FB540 when its motion cannot be
-    /// integrated; FB605 where the listener stops it.
+    /// The errors of [`Model::convert`]; FB212 if the scene does not match the body; FB540 if its motion cannot be
+    /// integrated; FB605 if the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
         heard(listener, |context| {
             let fine = options.reference == ReferenceChoice::Fine;
@@ -80,12 +80,12 @@ impl Model {
 }
 
 impl FlexBody {
-    /// Measures what accuracy costs in `scene` as [`Model::trade`] does, for parts of this body: fewer modes, fewer
-    /// groups of terms, 32-bit numbers, lumped couplings.
+    /// Measures the cost of accuracy in `scene` for parts of this body: fewer modes, fewer groups of terms, 32-bit
+    /// numbers, lumped couplings.
     ///
     /// # Errors
-    /// FB801 for errors against all nodes, of which a body knows nothing; FB212 and FB540 as there; FB605
-    /// where the listener stops it.
+    /// FB801 for another reference than the whole body, since a body does not contain the matrices; FB212 if the scene
+    /// does not match the body; FB540 if its motion cannot be integrated; FB605 if the listener stops it.
     pub fn trade(&self, scene: &Scene, options: &TradeOptions, listener: Listener<'_>) -> Result<Trade> {
         if options.reference != ReferenceChoice::Full {
             let message =
@@ -101,25 +101,27 @@ impl FlexBody {
 }
 
 impl Trade {
-    /// Number of candidates; the first is the whole body of the reference.
+    /// Returns the number of candidates; the first is the whole body of the reference.
     pub fn candidates(&self) -> usize {
         self.study.rows.len()
     }
 
-    /// The candidate to take (from 0); `None` where none holds the tolerances or is as cheap as allowed.
+    /// Returns the index of the recommended candidate (from 0); `None` if none is within the tolerances or as cheap as
+    /// allowed.
     pub fn recommended(&self) -> Option<usize> {
         self.study.recommended.row()
     }
 
-    /// The candidates that no other is cheaper than and as accurate as (from 0), ascending in cost.
+    /// Returns the candidates of the Pareto front (from 0), ascending in cost: no other one is both cheaper and as
+    /// accurate.
     pub fn front(&self) -> &[usize] {
         &self.study.front
     }
 
-    /// The body of a candidate.
+    /// Returns the body of a candidate.
     ///
     /// # Errors
-    /// FB801 when there is no such candidate; FB703 where lumped masses give no body.
+    /// FB801 if there is no such candidate; FB703 if lumped masses give no valid body.
     pub fn body(&self, candidate: usize) -> Result<FlexBody> {
         let Some(row) = self.study.rows.get(candidate) else {
             let message = format!("there is no candidate {candidate} of {}", self.candidates());
@@ -128,7 +130,7 @@ impl Trade {
         row.candidate.body(&self.sources[row.candidate.source]).map(FlexBody)
     }
 
-    /// Whether there is a candidate to take, and what it was measured against can be trusted.
+    /// Returns true if there is a recommended candidate, and the reference is accurate enough.
     pub fn holds(&self) -> bool {
         let nodal = self.study.reference == ReferenceKind::Nodal;
         let is_reference =
@@ -136,18 +138,18 @@ impl Trade {
         self.recommended().is_some() && (nodal || self.lacks.iter().all(is_reference))
     }
 
-    /// The report of `flexbody trade`.
+    /// Returns the report of `flexbody trade`.
     pub fn report(&self, format: ReportFormat) -> String {
         let run = report::run(&self.diagnostics);
         TradeFacts::new(&self.study, &self.lacks, &run).render(format.inner())
     }
 
-    /// The table of `flexbody trade --csv`: a line for each candidate.
+    /// Returns the table of `flexbody trade --csv`: one line per candidate.
     pub fn csv(&self) -> String {
         trade_csv(&self.study)
     }
 
-    /// Warnings and notes.
+    /// Returns warnings and notes.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }

@@ -1,4 +1,4 @@
-//! What can be said on the command line.
+//! Arguments of the command line.
 
 mod cluster;
 mod guidance;
@@ -29,12 +29,12 @@ use std::path::PathBuf;
     With 0 all outputs are in their places, with 2 to 130 and after signals none is, and no unfinished file is left. Codes of all messages: docs/codes.md."
 )]
 pub struct Arguments {
-    /// What to do.
+    /// Command to run.
     #[command(subcommand)]
     pub command: Command,
 }
 
-/// The commands.
+/// Commands of the program.
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Make a flexible body from the matrices of an FE model
@@ -43,25 +43,25 @@ pub enum Command {
         --mass M.mtx.gz --nodes nodes.csv --units mm,t,s --modes 40 -o rod.flex.h5 --report rod.html"
     )]
     Convert(Box<ConvertArguments>),
-    /// Write what a cluster needs to find the modes of a model by SLEPc over MPI, its driver included
+    /// Write the files that a cluster needs to find the modes of a model by SLEPc over MPI, including its driver
     #[command(
         after_help = "Example:\n  flexbody prepare model.toml --modes 40 -o job\n  mpiexec -n 64 python3 job/driver.py job\n  flexbody assemble job -o rod.flex.h5"
     )]
     Prepare(PrepareArguments),
     /// Make a body of the modes that a cluster has found in a folder of `prepare`
     Assemble(AssembleArguments),
-    /// Make the bodies of a list, as many at a time as fit the memory; those that are there are left
+    /// Make the bodies of a list, as many in parallel as fit into the memory; unchanged bodies are kept
     Batch(BatchArguments),
-    /// Show what a flex-body file holds
+    /// Show the content of a flex-body file
     Inspect(InspectArguments),
     /// Check a flex-body file: its schema and every identity that must hold
     Check(CheckArguments),
-    /// Compare two flex-body files, whatever the signs and bases of their modes
+    /// Compare two flex-body files, independent of the signs and bases of their modes
     #[command(
         after_help = "Example:\n  flexbody compare released.flex.h5 new.flex.h5 --frequency 1e-6 --report comparison.html --report comparison.xml"
     )]
     Compare(CompareArguments),
-    /// Decide which terms and modes a body needs in a scene, with the bound or the measurement behind each
+    /// Select the terms and modes that a body needs in a scene, with the bound or the measurement behind each
     #[command(
         after_help = "Example:\n  flexbody select rod.flex.h5 --scene crank.toml --report selection.html"
     )]
@@ -71,12 +71,12 @@ pub enum Command {
         after_help = "Example:\n  flexbody simulate rod.flex.h5 --scene tumble.toml -o tumble.h5 --csv tumble.csv --report tumble.html"
     )]
     Simulate(SimulateArguments),
-    /// Measure what accuracy costs in a scene: candidate bodies against a reference, and which to take
+    /// Measure the cost of accuracy in a scene: compare candidate bodies with a reference, and recommend one
     #[command(
         after_help = "Examples:\n  flexbody trade rod.flex.h5 --scene tumble.toml --report trade.html\n  flexbody trade model.toml --modes 20 --scene tumble.toml --reference nodal --csv trade.csv"
     )]
     Trade(TradeArguments),
-    /// Compute the frequency response of a body between places, and how far it is from that of all nodes of
+    /// Compute the frequency response of a body between places, and its difference from the response of all nodes of
     /// its model
     #[command(
         after_help = "Examples:\n  flexbody response model.toml --modes 20 --band 0..2000 --from big_end --to small_end --damping 0.01 --report response.html\n  flexbody response model.toml rod.flex.h5 --scene crank.toml --csv response.csv\n  flexbody response rod.flex.h5 --band 10..2000 --from big_end:z --to 17:x,z"
@@ -92,14 +92,13 @@ pub enum Command {
         after_help = "Examples:\n  flexbody export rod.flex.h5 --to exudyn -o rod.hdf5\n  flexbody export rod.flex.h5 --to sid --dialect py-sid --points interfaces -o rod.SID_FEM\n  flexbody export rod.flex.h5 --to gltf -o rod.glb"
     )]
     Export(ExportArguments),
-    /// Say how an FE program is made to write its matrices: the lines of the deck, and the command that goes
-    /// on from there
+    /// Print how an FE program writes its matrices: the lines of the deck, and the command that continues from there
     #[command(after_help = "Example:\n  flexbody recipe calculix")]
     Recipe(RecipeArguments),
     /// Check a flexible-body file of another program: dialect, identities, digits, units, in plain words
     #[command(after_help = "Example:\n  flexbody audit rod.SID_FEM")]
     Audit(AuditArguments),
-    /// Tell what the program is made of and what it finds on this machine: threads, memory, instructions
+    /// Print the components of the program and the resources of this machine: threads, memory, instructions
     Doctor(DoctorArguments),
     /// Print the completions of a shell
     #[command(
@@ -120,13 +119,13 @@ pub struct ViewArguments {
     /// Page to write
     #[arg(short, long, value_name = "VIEW.html")]
     pub output: PathBuf,
-    /// Motion of the body to play instead of its modes: the file that `simulate -o` has written
+    /// Motion of the body to play instead of its modes: a file written by `simulate -o`
     #[arg(long, value_name = "MOTION.h5")]
     pub simulation: Option<PathBuf>,
-    /// Triangles of the surface at the most [default: as many as keep the page below 10 MB]
+    /// Largest number of triangles of the surface [default: as many as keep the page below 10 MB]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub triangles: Option<u32>,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -140,42 +139,41 @@ pub struct ExportArguments {
     /// Format to write
     #[arg(long, value_name = "FORMAT", value_parser = export_formats())]
     pub to: String,
-    /// Variant of the format, of those named above [default: the first]
+    /// Variant of the format, one of those listed above [default: the first]
     #[arg(long, value_name = "NAME")]
     pub dialect: Option<String>,
-    /// With --to mbdyn: the last record group that the reader knows; short for --dialect level13 or level19
+    /// With --to mbdyn: the last record group that the reader supports; short for --dialect level13 or level19
     #[arg(long, value_name = "LEVEL", value_parser = ["13", "19"], conflicts_with = "dialect")]
     pub mbdyn_level: Option<String>,
-    /// Places of the body to write: nodes, interfaces, node numbers with commas, or both as in
-    /// interfaces,17,23
-    /// [default: the interfaces where the format has frames and the body interfaces, else all nodes]
+    /// Places of the body to write: nodes, interfaces, node numbers with commas, or both as in interfaces,17,23
+    /// [default: the interfaces if the format has frames and the body has interfaces, else all nodes]
     #[arg(long, value_name = "POINTS")]
     pub points: Option<String>,
-    /// With --to vtk or gltf: modes to show, the first N [default: vtk all, gltf 8]
+    /// With --to vtk or gltf: number of modes to show, the first N [default: vtk all, gltf 8]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub modes: Option<u32>,
-    /// With --to vtk (.pvd) or gltf: the motion to show instead of modes, as `simulate -o` has written it
+    /// With --to vtk (.pvd) or gltf: the motion to show instead of modes, a file written by `simulate -o`
     #[arg(long, value_name = "MOTION.h5", conflicts_with = "to_units")]
     pub simulation: Option<PathBuf>,
-    /// Scene for which the part of the stiffness that inertia of turning nodes makes is told, where the format cannot
-    /// hold it; the largest over its load cases [default: the motion at which it reaches 1 %]
+    /// Scene for which the share of the stiffness of inertia of turning nodes is reported, if the format cannot hold
+    /// it; the largest over its load cases [default: the motion at which it reaches 1 %]
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: Option<PathBuf>,
     /// Units to write in [default: those of the body]
     #[arg(long, value_name = "L,M,T")]
     pub to_units: Option<String>,
-    /// Write the file although the format cannot hold all of the body
+    /// Write the file even if the format cannot hold all of the body
     #[arg(long)]
     pub allow_loss: bool,
-    /// File to write; files that belong beside it have its name and another extension
+    /// File to write; further files have its name and another extension
     #[arg(short, long, value_name = "FILE")]
     pub output: PathBuf,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
 
-/// Names of the formats, each with what reads it and its dialects.
+/// Returns the names of the formats, each with the programs that read it and its dialects.
 fn export_formats() -> clap::builder::PossibleValuesParser {
     let value = |format: &&dyn ExportFormat| {
         let dialects = match format.dialects() {
@@ -193,44 +191,46 @@ pub struct AuditArguments {
     /// SID_FEM, MBDyn .fem, MBSim or Exudyn file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
-    /// Format of the file [default: by its content]
+    /// Format of the file [default: detected from its content]
     #[arg(long, value_name = "FORMAT", value_parser = foreign_formats())]
     pub from: Option<String>,
-    /// Identities pass up to this, relative to the size of their terms
+    /// Tolerance of the identities, relative to the size of their terms
     #[arg(long, value_name = "REL", default_value_t = 1e-6, value_parser = positive)]
     pub tolerance: f64,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
 
-/// Names of the formats that are read.
+/// Returns the names of the formats that can be read.
 fn foreign_formats() -> clap::builder::PossibleValuesParser {
     IMPORT_FORMATS.iter().map(|format| PossibleValue::new(format.name())).collect::<Vec<_>>().into()
 }
 
-/// Names of the FE programs whose jobs are read.
+/// Returns the names of the FE programs whose jobs can be read.
 fn job_programs() -> clap::builder::PossibleValuesParser {
     flexbody_input::job_programs().map(PossibleValue::new).collect::<Vec<_>>().into()
 }
 
-/// What a manifest would say of the job of an FE program, for every command that takes a model.
+/// Properties of the job of an FE program that a manifest would state, for every command that takes a model.
 #[derive(Debug, Args)]
 pub struct JobArguments {
-    /// FE program that has written the job [default: by its files]
+    /// FE program that has written the job [default: detected from its files]
     #[arg(long, value_name = "PROGRAM", value_parser = job_programs())]
     pub format: Option<String>,
-    /// Names of the stiffness and the mass matrix of the job, where it has several pairs (Nastran)
+    /// Names of the stiffness and the mass matrix of the job, if it has several pairs (Nastran)
     #[arg(long, value_name = "K,M")]
     pub matrices: Option<String>,
-    /// Units of length, mass and time where no manifest states them [default: m,kg,s; refused where no matter has such a density]
+    /// Units of length, mass and time if no manifest states them [default: m,kg,s; refused if the density is
+    /// implausible]
     #[arg(long, value_name = "L,M,T")]
     pub units: Option<String>,
-    /// 2 for a plane model, with x and y only, where no manifest states it [default: 3]
+    /// 2 for a plane model, with x and y only, if no manifest states it [default: 3]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(2..=3))]
     pub dimension: Option<u8>,
-    /// Node set of the job as an interface: NAME=SET, SET for both, then a coupling and a reference point in model axes,
-    /// each after a comma, as in bore=SET_BORE,rigid,0/0/12.5 (repeatable) [default point: the centre of its faces]
+    /// Node set of the job as an interface: NAME=SET, SET for both, then a coupling and a reference point in model
+    /// axes, each after a comma, as in bore=SET_BORE,rigid,0/0/12.5 (repeatable) [default point: the centre of its
+    /// faces]
     #[arg(long, value_name = "NAME=SET[,COUPLING][,X/Y/Z]")]
     pub interface: Vec<String>,
 }
@@ -238,46 +238,47 @@ pub struct JobArguments {
 /// Arguments of `trade`.
 #[derive(Debug, Args)]
 pub struct TradeArguments {
-    /// Flex-body file, whose modes and groups of terms are candidates; or a model, its manifest or the job of
-    /// an FE program, of which settings of `convert` are too
+    /// Flex-body file, whose modes and groups of terms are candidates; or a model (its manifest or the job of an FE
+    /// program), for which settings of `convert` are candidates as well
     #[arg(value_name = "BODY.flex.h5|MODEL.toml|JOB.inp")]
     pub body: PathBuf,
-    /// The job of an FE program.
+    /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// What the body does, and the tolerances (see docs/simulate.md)
+    /// Scene with the motion and the tolerances (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Load case of the scene to take, by its name [default: all; a candidate is as good as in the worst]
+    /// Load case of the scene, by name [default: all; the worst case of a candidate counts]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
-    /// What errors are measured against: full, the body with all modes and groups, of a model twice the
-    /// modes and residual vectors; nodal, the unreduced equations (models only)
+    /// Reference of the errors: full, the body with all modes and groups, for a model with twice the modes and residual
+    /// vectors; nodal, the unreduced equations (models only)
     #[arg(long, value_parser = names::reference(), default_value = ReferenceChoice::default().name())]
     pub reference: ReferenceChoice,
-    /// Free modes that candidates of a model have at most
+    /// Largest number of free modes of the candidates of a model
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..100_000))]
     pub modes: Option<u32>,
-    /// Simulations per candidate whose median time is told
+    /// Timing runs per candidate (the median is reported)
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u16).range(1..))]
     pub repeat: u16,
-    /// Table to write the candidates to
+    /// Table of the candidates to write
     #[arg(long, value_name = "TRADE.csv")]
     pub csv: Option<PathBuf>,
-    /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: to time them
-    /// in a program of your own
+    /// Folder to write the body of every candidate to, as candidate_NNN.flex.h5 with its number: for timing in another
+    /// program
     #[arg(long, value_name = "FOLDER")]
     pub bodies: Option<PathBuf>,
-    /// Do work that is estimated to take more than half an hour: modes, or the motion of all nodes
+    /// Allow work that is estimated to take more than half an hour: modes, or the motion of all nodes
     #[arg(long)]
     pub allow_long: bool,
     /// Report to write, with the plot as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads, at most four for each processor or 64; all results but the times do not depend on it [default: all processors]
+    /// Number of threads, at most four for each processor or 64; all results except times are independent of it
+    /// [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -285,32 +286,32 @@ pub struct TradeArguments {
 /// Arguments of `select`.
 #[derive(Debug, Args)]
 pub struct SelectArguments {
-    /// Flex-body file with all that there is to select from, or a model: its manifest or the job of an FE
-    /// program
+    /// Flex-body file with all modes and terms to select from, or a model: its manifest or the job of an FE program
     #[arg(value_name = "BODY.flex.h5|MODEL.toml|JOB.inp")]
     pub body: PathBuf,
-    /// The job of an FE program.
+    /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// What the body does and how accurate it has to be (see docs/select.md)
+    /// Scene with the motion and the tolerances (see docs/select.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Load case of the scene to take, by its name [default: all, which one body has to serve]
+    /// Load case of the scene, by name [default: all, which one body must serve]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
-    /// Of a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
+    /// For a model: number of free modes to select from [default: up to twice the band of the scene, else 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub modes: Option<u32>,
-    /// Do work that is estimated to take more than half an hour for its number of modes
+    /// Allow work that is estimated to take more than half an hour for its number of modes
     #[arg(long)]
     pub allow_long: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads, at most four for each processor or 64; results do not depend on it [default: all processors]
+    /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
+    /// processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -321,11 +322,10 @@ pub struct SimulateArguments {
     /// Flex-body file
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
-    /// What the body does (see docs/simulate.md)
+    /// Scene with the motion (see docs/simulate.md)
     #[arg(long, value_name = "SCENE.toml")]
     pub scene: PathBuf,
-    /// Load case of the scene to take, by its name
-    /// [default: all, one after the other; files are named by them]
+    /// Load case of the scene, by name [default: all, one after the other; file names contain the case names]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
     /// HDF5 file to write the motion to
@@ -337,10 +337,11 @@ pub struct SimulateArguments {
     /// Report to write, with plots as .html; format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads, at most four for each processor or 64; results do not depend on it [default: all processors]
+    /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
+    /// processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -348,18 +349,18 @@ pub struct SimulateArguments {
 /// Arguments of `convert`.
 #[derive(Debug, Args)]
 pub struct ConvertArguments {
-    /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md); with
-    /// --from the body of another program
+    /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md); with --from the
+    /// body of another program
     #[arg(value_name = "MODEL.toml|JOB.inp", required_unless_present = "stiffness", conflicts_with_all = ["stiffness", "mass", "nodes", "dofs"])]
     pub model: Option<PathBuf>,
-    /// Take the body of a file of another program instead of making one
+    /// Convert the body in a file of another program instead of making one from a model
     #[arg(long, value_name = "FORMAT", value_parser = foreign_formats(), conflicts_with_all = ["modes", "max_frequency", "basis", "shapes", "residual_vectors", "accuracy", "factor", "memory_limit", "allow_long", "lumped", "lumped_modes", "scene", "case", "split", "format", "matrices", "dimension", "interface"])]
     pub from: Option<String>,
-    /// The job of an FE program.
+    /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group), SciPy (.npz), MATLAB (FILE.mat:/K), PETSc
-    /// or Nastran (FILE.op4:/KGG)
+    /// Stiffness matrix: Matrix Market (.mtx, .gz, .zst), HDF5 (FILE.h5:/group), SciPy (.npz), MATLAB (FILE.mat:/K),
+    /// PETSc or Nastran (FILE.op4:/KGG)
     #[arg(long, value_name = "FILE", requires_all = ["mass", "nodes"], conflicts_with_all = ["format", "matrices", "interface"])]
     pub stiffness: Option<PathBuf>,
     /// Mass matrix, consistent
@@ -371,93 +372,92 @@ pub struct ConvertArguments {
     /// Labels of the matrix rows: node,dir [default: node-major x, y, z]
     #[arg(long, value_name = "FILE", requires = "stiffness")]
     pub dofs: Option<PathBuf>,
-    /// Warn only of densities that no matter has, and of mass between nodes that no stiffness joins
+    /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
     #[arg(long, conflicts_with = "from")]
     pub allow_implausible: bool,
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
-    /// Number of flexible modes, up to all of them; static shapes of the basis come on top, and with --basis
-    /// craig-bampton may stand alone (0: static condensation) [default: 20; imported shapes: all]
+    /// Number of flexible modes, up to all of them; static shapes of the basis are added, and with --basis
+    /// craig-bampton may be the only ones (0: static condensation) [default: 20; imported shapes: all]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32), conflicts_with = "max_frequency")]
     pub modes: Option<u32>,
     /// All flexible modes up to this frequency instead
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub max_frequency: Option<f64>,
-    /// What the modes are made of
+    /// Basis of the body
     #[arg(long, value_parser = names::basis(), default_value = BasisKind::default().name())]
     pub basis: BasisKind,
     /// Shapes for --basis imported, by matrix rows: .npy, HDF5 (FILE.h5:/dataset) or a Matrix Market array;
     /// or modes by nodes: CalculiX (.frd), Nastran (.pch, .op2), lists of Ansys
     #[arg(long, value_name = "FILE", required_if_eq("basis", BasisKind::Imported.name()))]
     pub shapes: Option<PathBuf>,
-    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces,
-    /// loads=FILE (nodal forces by matrix rows), comma-separated; empty: none. With @HZ the responses at
-    /// that frequency. Replaces [basis] of the manifest
+    /// Static responses to add to free modes (--basis free or craig-chang): centrifugal, interfaces, loads=FILE (nodal
+    /// forces by matrix rows), comma-separated; empty for none. With @HZ the responses at that frequency. Replaces
+    /// [basis] of the manifest
     #[arg(long, value_name = "LOADS")]
     pub residual_vectors: Option<String>,
-    /// Promise about the modes
+    /// Accuracy of the modes
     #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name())]
     pub accuracy: Accuracy,
-    /// Precision of the factor: auto takes f32 where f64 does not fit the memory or is slower, none where the
+    /// Precision of the factor: auto uses f32 if f64 does not fit into the memory or is slower, and no factor if the
     /// body is large and compact
     #[arg(long, value_parser = names::factor(), default_value = FactorChoice::default().name())]
     pub factor: FactorChoice,
-    /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
+    /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the space and has 7 digits
     #[arg(long, value_parser = names::storage(), default_value = Storage::default().name())]
     pub storage: Storage,
-    /// Memory that the program may use: a number with K, M, G or T
-    /// [default: what the machine and its control groups leave]
+    /// Memory that the program may use: a number with K, M, G or T [default: all that the machine and its control
+    /// groups have free]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
-    /// Do work that is estimated to take more than half an hour for its number of modes
+    /// Allow work that is estimated to take more than half an hour for its number of modes
     #[arg(long)]
     pub allow_long: bool,
-    /// Frame of the body: com (centre of mass, axes of the model), principal (there, principal axes), model (that of the
-    /// model), or interface=NAME: on the reference point of an interface, which then rests in every mode
+    /// Frame of the body: com (centre of mass, axes of the model), principal (centre of mass, principal axes), model
+    /// (frame of the model), or interface=NAME (reference point of an interface, which is then at rest in every mode)
     /// [default: com; with --from: that of the file]
     #[arg(long, value_name = "FRAME")]
     pub frame: Option<FrameChoice>,
-    /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
+    /// Lumped masses for comparison: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,
-    /// Compute the modes of each lumped mass too, and compare after aligning the subspaces
+    /// Compute the modes of each lumped mass too, and compare them after aligning the subspaces
     #[arg(long)]
     pub lumped_modes: bool,
-    /// Triangles that the surface to draw the body by has at the most [default: all that the elements of the
-    /// model have]
+    /// Largest number of triangles of the surface for drawing [default: all of the elements of the model]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), conflicts_with = "from")]
     pub mesh_triangles: Option<u32>,
     /// Leave the surface out of the file
     #[arg(long, conflicts_with_all = ["from", "mesh_triangles"])]
     pub no_mesh: bool,
-    /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose
-    /// residual vectors and modes where nothing else does
+    /// Write only the terms and modes that this scene needs (see docs/select.md); its loads and band choose residual
+    /// vectors and modes unless these are stated
     #[arg(long, value_name = "SCENE.toml", conflicts_with = "split")]
     pub scene: Option<PathBuf>,
-    /// Load case of the scene to take, by its name [default: all, which one body has to serve]
+    /// Load case of the scene, by name [default: all, which one body must serve]
     #[arg(long, value_name = "NAME", requires = "scene")]
     pub case: Option<String>,
-    /// Write the body of a scene although its selection does not hold, or cannot be judged (FB557)
+    /// Write the body for a scene even if its selection does not hold, or cannot be judged (FB557)
     #[arg(long, requires = "scene")]
     pub allow_unjudged: bool,
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// The matrices hold several bodies: convert each, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports
-    /// likewise)
+    /// Convert each of several bodies in the matrices, to BODY-1.flex.h5, BODY-2.flex.h5, ... (reports likewise)
     #[arg(long, conflicts_with = "shapes")]
     pub split: bool,
-    /// Who finds the modes.
+    /// Solver for the modes.
     #[command(flatten)]
     pub engine: EngineArguments,
-    /// Threads, at most four for each processor or 64; results do not depend on it [default: all processors]
+    /// Number of threads, at most four for each processor or 64; results are independent of it [default: all
+    /// processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// Print all that is known of the body instead of a summary
+    /// Print all facts about the body instead of a summary
     #[arg(short, long)]
     pub verbose: bool,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -474,10 +474,10 @@ pub struct InspectArguments {
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE", conflicts_with = "structure")]
     pub report: Vec<PathBuf>,
-    /// Print all that is known of the body instead of a summary
+    /// Print all facts about the body instead of a summary
     #[arg(short, long)]
     pub verbose: bool,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -488,14 +488,13 @@ pub struct CheckArguments {
     /// Flex-body file
     #[arg(value_name = "BODY.flex.h5")]
     pub body: PathBuf,
-    /// Also recompute invariants and residuals from the matrices of this model, a manifest or the job of an
-    /// FE program
+    /// Also recompute invariants and residuals from the matrices of this model, a manifest or the job of an FE program
     #[arg(long, value_name = "MODEL.toml|JOB.inp")]
     pub against: Option<PathBuf>,
-    /// The job of an FE program.
+    /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -503,14 +502,14 @@ pub struct CheckArguments {
 /// Arguments of `compare`.
 #[derive(Debug, Args)]
 pub struct CompareArguments {
-    /// Reference
+    /// Reference body
     #[arg(value_name = "A.flex.h5")]
     pub a: PathBuf,
-    /// What is compared with it
+    /// Body to compare with the reference
     #[arg(value_name = "B.flex.h5")]
     pub b: PathBuf,
-    /// Of bodies with different numbers of modes, compare the modes that both have: those of the body with
-    /// fewer, each with the nearest of the other
+    /// For bodies with different numbers of modes, compare the common modes: those of the body with fewer, each with
+    /// the closest of the other
     #[arg(long)]
     pub common: bool,
     /// Largest relative difference of a frequency
@@ -528,22 +527,22 @@ pub struct CompareArguments {
     /// Largest difference of an invariant relative to its Cauchy-Schwarz bound
     #[arg(long, value_name = "REL", value_parser = positive)]
     pub invariants: Option<f64>,
-    /// Report to write, whether the bodies agree or not; format by extension: .html, .json, .txt, .md (Markdown)
-    /// or .xml (test cases as JUnit has them) (repeatable)
+    /// Report to write, whether the bodies agree or not; format by extension: .html, .json, .txt, .md (Markdown) or
+    /// .xml (JUnit test cases) (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
 
-/// How to print.
+/// Options of printing.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct Printing {
     /// Print one JSON object: results, diagnostics, whether all passed (schemas/output.schema.json)
     #[arg(long)]
     pub json: bool,
-    /// Take a warning as a failed check: exit code 1, and no file is written
+    /// Treat a warning as a failed check: exit code 1, and no file is written
     #[arg(long)]
     pub deny_warnings: bool,
     /// Print errors only
@@ -551,7 +550,7 @@ pub struct Printing {
     pub quiet: bool,
 }
 
-/// A number of bytes: `20G`, `512M`, `1.5GB`; powers of 1000.
+/// Parses a number of bytes: `20G`, `512M`, `1.5GB`; powers of 1000.
 fn memory_size(text: &str) -> Result<u64, String> {
     let text = text.trim_end_matches(['b', 'B']);
     let (number, factor) = match text.char_indices().last() {

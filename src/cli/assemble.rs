@@ -1,4 +1,4 @@
-//! `flexbody assemble`: a conversion whose modes a cluster has found.
+//! Command `flexbody assemble`: a conversion with modes that a cluster has found.
 
 use super::arguments::{AssembleArguments, ConvertArguments, EngineArguments, JobArguments};
 use super::convert::run_with;
@@ -17,7 +17,7 @@ pub(super) fn run(arguments: &AssembleArguments) -> Result<Outcome> {
     run_with(&converted, &Elsewhere::Cluster { folder, prepared: Box::new(prepared), prove })
 }
 
-/// What `convert` would be asked for.
+/// Returns the corresponding arguments of `convert`.
 fn as_conversion(arguments: &AssembleArguments, prepared: &Prepared) -> Result<ConvertArguments> {
     let model = arguments.model.clone().or_else(|| prepared.model.path.clone()).ok_or_else(|| {
         Diagnostic::new(Code::Usage, "the folder does not say where its model is").with_help("give --model")

@@ -1,4 +1,4 @@
-//! `flexbody audit`.
+//! Command `flexbody audit`.
 
 use super::arguments::AuditArguments;
 use super::outcome::Outcome;

@@ -1,4 +1,5 @@
-//! `flexbody batch`: the bodies of a list, each by a process of its own, as many at a time as fit the memory.
+//! Command `flexbody batch`: makes the bodies of a list, each by a process of its own, as many in parallel as fit into
+//! the memory.
 
 use super::arguments::BatchArguments;
 use super::arguments::{Arguments, Command, ConvertArguments};
@@ -26,20 +27,20 @@ use std::process::{Command as Process, Stdio};
 use std::sync::mpsc;
 use std::time::Instant;
 
-/// Threads of a conversion where the list says nothing.
+/// Number of threads of a conversion unless the list states it.
 const THREADS: u16 = 1;
 
-/// Most conversions at a time, whatever the list says: each takes a thread, a process and two pipes of this one.
+/// Largest number of parallel conversions, whatever the list states: each needs a thread, a process and two pipes.
 const MOST_PARALLEL: usize = 1024;
 
-/// Bytes that reading a body of another program takes: such files are small.
+/// Memory for reading a body of another program, in bytes: such files are small.
 const IMPORT: u64 = 500_000_000;
 
-/// A body that is to be made.
+/// Body to be made.
 struct Body {
     words: Vec<String>,
     output: PathBuf,
-    /// Fingerprint of what it is made of.
+    /// Fingerprint of its inputs.
     inputs: String,
     need: u64,
 }
@@ -60,6 +61,7 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
         memory: memory_left(arguments.memory_limit).unwrap_or(u64::MAX),
         parallel: parallel(&list).min(MOST_PARALLEL),
     };
+    // Skip unchanged bodies, and estimate the memory of the others.
     let mut rows: Vec<BatchRow> = Vec::new();
     let mut waiting: Vec<(usize, Body)> = Vec::new();
     for (index, (body, (words, converted))) in list.bodies.iter().zip(&parsed).enumerate() {
@@ -81,6 +83,7 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
         }
         rows.push(row);
     }
+    // Convert, then write the reports.
     refuse_replacing_inputs(arguments, &list, &parsed, &ledger)?;
     watcher.hear(Event::Phase("converting"));
     let finished = work(waiting, budget, &mut rows, &mut ledger);
@@ -99,13 +102,13 @@ pub(super) fn run(arguments: &BatchArguments) -> Result<Outcome> {
     Ok(Outcome { text, json, passed: failed.is_none(), diagnostics: failed.into_iter().collect() })
 }
 
-/// Conversions at a time: as the list says, or as many as there are processors for their threads.
+/// Returns the number of parallel conversions: as stated in the list, or as many as have processors for their threads.
 fn parallel(list: &BatchList) -> usize {
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     list.parallel.unwrap_or_else(|| (processors / usize::from(list.threads.unwrap_or(THREADS))).max(1))
 }
 
-/// No output of the list, and no report, may replace an input of any of its bodies or another output.
+/// Refuses outputs of the list and reports that would replace an input of any of its bodies or another output.
 fn refuse_replacing_inputs(
     arguments: &BatchArguments,
     list: &BatchList,
@@ -123,7 +126,7 @@ fn refuse_replacing_inputs(
     refuse_replacing_read(outputs())
 }
 
-/// The words of a conversion, and what they say.
+/// Returns the words of the command line of a conversion, and the parsed arguments.
 fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<ConvertArguments>)> {
     let (model, output) = (body.model.display().to_string(), body.output.display().to_string());
     let own = ["convert".to_owned(), model, "--output".to_owned(), output, "--json".to_owned()];
@@ -142,7 +145,7 @@ fn parse(list: &BatchList, body: &BatchBody) -> Result<(Vec<String>, Box<Convert
     }
 }
 
-/// A list is data: it names no program to start, unless the command line allows it.
+/// Refuses a list that names programs to start: a list is data, unless the command line allows programs.
 fn refuse_programs(body: &BatchBody, converted: &ConvertArguments) -> Result<()> {
     let named =
         [("--mpiexec", converted.engine.mpiexec.is_some()), ("--python", converted.engine.python.is_some())];
@@ -161,7 +164,7 @@ fn refused(body: &BatchBody, why: &str) -> Error {
     Diagnostic::new(Code::BatchSyntax, format!("{}: {why}", body.output.display())).into()
 }
 
-/// The fingerprint of the words of a conversion and of every file that they name or that the model names.
+/// Returns the fingerprint of the options of a conversion and of every file that they or the model name.
 fn inputs_of(words: &[String], converted: &ConvertArguments) -> String {
     let mut files = model_files(converted).map(|files| files.paths()).unwrap_or_default();
     let named = words.iter().skip(1).map(|word| word.rsplit('=').next().unwrap_or(word)).map(PathBuf::from);
@@ -169,7 +172,8 @@ fn inputs_of(words: &[String], converted: &ConvertArguments) -> String {
     inputs_fingerprint(words, &files)
 }
 
-/// Bytes that a conversion needs: as the list says, or as its plan says, for which the model is read.
+/// Returns the memory of a conversion in bytes: as stated in the list, or estimated from its plan, for which the model
+/// is read.
 fn need(body: &BatchBody, converted: &ConvertArguments, watcher: &Watcher) -> Result<u64> {
     if let Some(known) = body.memory {
         return Ok(known);
@@ -206,7 +210,7 @@ fn fail(row: &mut BatchRow, error: &Error) {
     row.error = Some(format!("{} {}", cause.code().id(), cause.message()));
 }
 
-/// A conversion that has ended.
+/// Result of a conversion that has ended.
 struct Ended {
     index: usize,
     need: u64,
@@ -217,7 +221,7 @@ struct Ended {
     seconds: f64,
 }
 
-/// Runs all that waits, as many at a time as fit; each that is done is written down at once.
+/// Runs all waiting conversions, as many in parallel as fit. Each success is recorded in the ledger at once.
 fn work(
     mut waiting: Vec<(usize, Body)>,
     budget: Budget,
@@ -238,7 +242,7 @@ fn work(
                 running.push(body.need);
                 let (program, ended) = (program.clone(), ended.clone());
                 let (need, limit) = (body.need, budget.limit(body.need));
-                // The loop hears of it: it waits for as many as run.
+                // The loop receives one message from every running conversion.
                 let work = move || drop(ended.send(convert(&program, index, body, limit)));
                 if let Err(error) = std::thread::Builder::new().spawn_scoped(scope, work) {
                     running.pop();
@@ -265,7 +269,7 @@ fn work(
     })
 }
 
-/// One conversion, by a process of its own: one that ends for lack of memory takes no other with it.
+/// Runs one conversion as a separate process, so that one that ends for lack of memory does not end the others.
 fn convert(program: &std::path::Path, index: usize, body: Body, limit: u64) -> Ended {
     let Body { words, output, inputs, need } = body;
     let begun = Instant::now();

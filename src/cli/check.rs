@@ -1,4 +1,4 @@
-//! `flexbody check`.
+//! Command `flexbody check`.
 
 use super::arguments::CheckArguments;
 use super::models::of_manifest_or_job;
@@ -32,7 +32,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<Outcome> {
     Ok(Outcome { text, json, diagnostics, passed })
 }
 
-/// The model that `body` was made of: all of `raw`, or one of the bodies in it.
+/// Returns the model that `body` was made of: all of `raw`, or one of the bodies in it.
 fn model_of(body: &FlexBody, raw: RawModel) -> Result<FeModel> {
     let Some(number) = body.source().number else { return Ok(FeModel::from_raw(raw)?.model) };
     let bodies = FeModel::bodies_from_raw(raw)?;

@@ -1,4 +1,4 @@
-//! `flexbody compare`.
+//! Command `flexbody compare`.
 
 use super::arguments::CompareArguments;
 use super::outcome::{Outcome, refuse_warnings};

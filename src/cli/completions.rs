@@ -1,5 +1,5 @@
-//! `flexbody completions` and `flexbody man`: what shells and `man` read, from the definition of the
-//! arguments.
+//! Commands `flexbody completions` and `flexbody man`: input for shells and for `man`, generated from the definition of
+//! the arguments.
 
 use super::arguments::{Arguments, CompletionsArguments, ManArguments};
 use super::outcome::Outcome;
@@ -16,7 +16,7 @@ pub(super) fn completions(arguments: &CompletionsArguments) -> Result<Outcome> {
 }
 
 pub(super) fn man(arguments: &ManArguments) -> Result<Outcome> {
-    // Gives the commands the options that all of them have.
+    // Adds the common options to the commands.
     let mut program = Arguments::command();
     program.build();
     let page = match &arguments.command {
@@ -34,7 +34,7 @@ pub(super) fn man(arguments: &ManArguments) -> Result<Outcome> {
     printed(text)
 }
 
-/// What is printed as it is.
+/// Returns the outcome of a text that is printed unchanged.
 fn printed(text: Vec<u8>) -> Result<Outcome> {
     let text = String::from_utf8_lossy(&text).into_owned();
     let json = serde_json::json!({ "text": text }).to_string();

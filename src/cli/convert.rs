@@ -1,4 +1,4 @@
-//! `flexbody convert`.
+//! Command `flexbody convert`.
 
 use super::arguments::{ConvertArguments, EngineName};
 use super::elsewhere::Elsewhere;
@@ -39,12 +39,12 @@ pub(super) fn run(arguments: &ConvertArguments) -> Result<Outcome> {
     Ok(outcome)
 }
 
-/// A conversion whose modes this program finds, or somebody else.
+/// Runs a conversion whose modes are found by this program or elsewhere.
 pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> Result<Outcome> {
     refuse_without_modes(arguments)?;
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let schemes = lumping_schemes(&arguments.lumped)?;
-    // What the command line says replaces what the manifest says.
+    // The command line takes precedence over the manifest.
     let asked = arguments.residual_vectors.as_deref().map(load_sources).transpose()?;
     let keep_in = elsewhere.keeps_in(&arguments.output);
     let files = ModelFiles { keep_in, ..model_files(arguments)? };
@@ -53,7 +53,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let cases = cases.as_ref();
     let loads = asked.unwrap_or_else(|| residual_vectors(arguments, &files, cases));
     refuse_contradictions(arguments, &loads)?;
-    // How many bodies there are is known after reading; that outputs can be written, before.
+    // Outputs are checked before reading, although the number of bodies is known only afterwards.
     let places = BodyOutputs::of(arguments, arguments.split.then_some(1));
     refuse_overwriting(arguments, std::slice::from_ref(&places), &files, &schemes, &loads, cases)?;
     let reserved = places.reserve()?;
@@ -62,7 +62,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     let watcher = watcher(arguments, "reading");
     let lumped = schemes.iter().map(Scheme::read).collect::<Result<Vec<_>>>()?;
     let raw = read_model(&files)?;
-    // Before the work: what a deck includes or assigns is known now.
+    // Check before the work: files that a deck includes or assigns are known now.
     refuse_replacing_read(places.all())?;
     watcher.hear(Event::Phase("checks"));
     let job = Job { arguments, lumped: &lumped, loads: &loads, formats: &formats, cases, elsewhere, threads };
@@ -71,6 +71,7 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
         OutputSlot::commit_all(done.slots)?;
         return Ok(done.outcome);
     }
+    // Several bodies: reserve the outputs of all before the first conversion.
     let bodies = FeModel::bodies_from_raw(raw)?;
     let mut all = vec![places];
     all.extend((2..=bodies.len()).map(|number| BodyOutputs::of(arguments, Some(number))));
@@ -84,12 +85,12 @@ pub(super) fn run_with(arguments: &ConvertArguments, elsewhere: &Elsewhere) -> R
     for ((checked, places), reserved) in bodies.into_iter().zip(&all).zip(slots) {
         let watcher = if finished.is_empty() { &watcher } else { &self::watcher(arguments, "start") };
         let done = job.convert(checked, places, reserved, watcher)?;
-        // What holds for all of the matrices is told once.
+        // Diagnostics of the common matrices are reported once.
         let new = done.outcome.diagnostics.iter().filter(|d| !told.contains(*d)).cloned().collect::<Vec<_>>();
         told.extend(new);
         finished.push(done);
     }
-    // Nothing appears before everything is done.
+    // No file appears before everything is done.
     let (slots, outcomes): (Vec<_>, Vec<_>) =
         finished.into_iter().map(|done| (done.slots, done.outcome)).unzip();
     OutputSlot::commit_all(slots.into_iter().flatten())?;
@@ -103,19 +104,19 @@ fn watcher(arguments: &ConvertArguments, first: &str) -> Watcher {
     Watcher::new(arguments.printing.quiet || arguments.printing.json, first)
 }
 
-/// What every body of a run has in common.
+/// Common data of all bodies of a run.
 struct Job<'a> {
     arguments: &'a ConvertArguments,
     lumped: &'a [Lumping],
     loads: &'a [LoadSource],
     formats: &'a [Format],
-    /// The load cases of the scene; none without one.
+    /// Load cases of the scene; `None` without a scene.
     cases: Option<&'a LoadCases>,
     elsewhere: &'a Elsewhere,
     threads: usize,
 }
 
-/// A body with its files written, but not yet in their places.
+/// Body with its files written, but not yet in their places.
 struct Done {
     slots: Vec<OutputSlot>,
     outcome: Outcome,
@@ -160,6 +161,7 @@ impl Job<'_> {
             None => basis(arguments, self.loads, model)?,
         };
         let (resident, peak) = (resident_bytes(), peak_memory_bytes());
+        // With a scene, the conversion also selects terms and modes.
         let (mut conversion, selection) = match arguments.scene.as_ref().zip(self.cases) {
             Some((path, cases)) => convert_for(model, &self.of_band(settings), cases, &context)
                 .map_err(|error| error.in_file(path))
@@ -173,6 +175,7 @@ impl Job<'_> {
             conversion.body = conversion.body.rounded_to_f32()?;
         }
         accept(&conversion.body)?;
+        // Write the body, then the reports, into their temporary files.
         watcher.hear(Event::Phase("writing"));
         flexbody_file::fill_slot(&conversion.body, &reserved.body)?;
         let size = std::fs::metadata(reserved.body.temporary()).map(|meta| meta.len()).unwrap_or(0);
@@ -185,14 +188,14 @@ impl Job<'_> {
         }));
         refuse_warnings(arguments.printing, &diagnostics)?;
         let mut run = run_data(output, &conversion, diagnostics.clone(), phases, self.threads);
-        // Reading may have taken more than the work will.
+        // Reading may have taken more memory than the work will.
         run.memory_estimate_bytes =
             conversion.plan.as_ref().map(|plan| peak.unwrap_or(0).max(resident + plan.bytes()));
         let facts = Facts::new(&conversion.body, &run);
         for (slot, format) in reserved.reports.iter().zip(self.formats) {
             slot.fill(render(&facts, *format).as_bytes())?;
         }
-        // What is to be said is said with the body.
+        // The diagnostics are part of the body's report.
         let nothing = RunData::default();
         let decided = selection.as_ref().map(|selection| SelectionFacts::new(selection, &nothing));
         let text = body_text(&facts, arguments.verbose, arguments.printing)
@@ -205,7 +208,8 @@ impl Job<'_> {
         Ok(Done { slots, outcome })
     }
 
-    /// Free modes by the band of the scene, unless their number or highest frequency is given.
+    /// Returns the settings with free modes by the band of the scene, unless their number or highest frequency is
+    /// stated.
     fn of_band(&self, settings: ConvertSettings) -> Tailoring {
         let ConvertArguments { modes, max_frequency, basis, .. } = self.arguments;
         let by_band = modes.is_none() && max_frequency.is_none() && basis.follows_scene();
@@ -235,8 +239,8 @@ impl Job<'_> {
     }
 }
 
-/// Loads of residual vectors where the command line names none: those of the manifest; without, those of the
-/// scene, of which free modes alone know nothing.
+/// Returns the loads of residual vectors if the command line names none: those of the manifest or, without these, those
+/// of the scene.
 fn residual_vectors(
     arguments: &ConvertArguments,
     files: &ModelFiles,
@@ -246,7 +250,7 @@ fn residual_vectors(
     loads_for(cases.filter(|_| free && !arguments.lumped_modes), &files.residual_vectors)
 }
 
-/// Loads of residual vectors as named on the command line.
+/// Parses the loads of residual vectors named on the command line.
 pub(super) fn load_sources(text: &str) -> Result<Vec<LoadSource>> {
     let mut sets = Vec::new();
     let mut names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
@@ -283,7 +287,7 @@ fn refuse_without_modes(arguments: &ConvertArguments) -> Result<()> {
     Ok(())
 }
 
-/// Options that say nothing together; `loads` are those of residual vectors.
+/// Refuses contradictory options. `loads` are the loads of residual vectors.
 fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> Result<()> {
     let basis = arguments.basis;
     let residual = !loads.is_empty();
@@ -329,7 +333,7 @@ fn refuse_contradictions(arguments: &ConvertArguments, loads: &[LoadSource]) -> 
     Err(Diagnostic::new(Code::Usage, message).into())
 }
 
-/// The basis, with the shapes read that it needs.
+/// Returns the basis, with the shapes that it needs.
 fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) -> Result<BasisChoice> {
     match (arguments.basis, &arguments.shapes) {
         (BasisKind::Imported, Some(shapes)) => {
@@ -344,7 +348,7 @@ fn basis(arguments: &ConvertArguments, loads: &[LoadSource], model: &FeModel) ->
     }
 }
 
-/// A lumping scheme as named on the command line.
+/// Lumping scheme named on the command line.
 enum Scheme {
     Ready(Lumping),
     User(std::path::PathBuf),
@@ -404,7 +408,7 @@ fn stated_files(arguments: &ConvertArguments) -> Result<ModelFiles> {
     }
 }
 
-/// No output may replace an input or another output.
+/// Refuses outputs that would replace an input or another output.
 fn refuse_overwriting(
     arguments: &ConvertArguments,
     outputs: &[BodyOutputs],

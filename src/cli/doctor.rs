@@ -1,4 +1,4 @@
-//! `flexbody doctor`: what the program is made of and what it finds here.
+//! Command `flexbody doctor`: components of the program and resources of the machine.
 
 use super::outcome::Outcome;
 use super::resources::{address_space_limit, memory_left, use_threads};
@@ -8,21 +8,21 @@ use flexbody_base::provenance::generator;
 use flexbody_linalg::instruction_set;
 use serde::Serialize;
 
-/// What the program finds.
+/// Findings of the command.
 #[derive(Debug, Serialize)]
 struct Findings {
     program: String,
-    /// System and processor family that it was built for.
+    /// Operating system and processor family that the program was built for.
     built_for: String,
     hdf5: String,
     hdf5_from: &'static str,
-    /// Instructions that sums and products use here; results do not depend on them.
+    /// Instructions of sums and products on this machine; results do not depend on them.
     instructions: &'static str,
     processors: usize,
     threads: usize,
-    /// `None`: the system does not tell.
+    /// Free memory; `None` if the system does not report it.
     memory_left_bytes: Option<u64>,
-    /// `None`: no limit, or the system does not tell.
+    /// Limit of the address space; `None` if there is no limit, or the system does not report it.
     address_space_limit_bytes: Option<u64>,
     temporary_folder: String,
     temporary_folder_is_writable: bool,

@@ -1,4 +1,4 @@
-//! Modes that are found elsewhere: by SLEPc over MPI in this run, or by a cluster before.
+//! Modes that are found outside this program: by SLEPc over MPI in this run, or by a cluster in advance.
 
 use super::arguments::{ConvertArguments, EngineName};
 use flexbody_base::diagnostic::Diagnostic;
@@ -10,18 +10,19 @@ use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use std::path::{Path, PathBuf};
 
-/// Who finds the modes of a conversion.
+/// Source of the modes of a conversion.
 pub(super) enum Elsewhere {
     /// This program.
     Nowhere,
-    /// SLEPc over MPI, in a folder that is removed after it where nobody named it.
+    /// SLEPc over MPI, in a folder that is removed afterwards unless the user named it.
     Slepc { engine: Engine, folder: PathBuf, kept: bool },
-    /// A cluster that has worked in this folder; whether the built-in count is made beside its own.
+    /// A cluster that has worked in this folder. `prove` requests the built-in count in addition to that of the
+    /// cluster.
     Cluster { folder: PathBuf, prepared: Box<Prepared>, prove: bool },
 }
 
 impl Elsewhere {
-    /// What the command line says.
+    /// Returns the source that the command line requests.
     pub(super) fn of(arguments: &ConvertArguments) -> Self {
         let asked = &arguments.engine;
         if asked.engine == EngineName::BuiltIn {
@@ -47,13 +48,13 @@ impl Elsewhere {
         }
     }
 
-    /// Where matrices may be kept instead of in memory: beside the output, for bodies that are taken elsewhere
-    /// because of their size.
+    /// Returns the folder in which matrices may be kept instead of in memory: beside the output, for bodies that are
+    /// solved elsewhere because of their size.
     pub(super) fn keeps_in(&self, output: &Path) -> Option<PathBuf> {
         (!matches!(self, Self::Nowhere)).then(|| folder_around(output))
     }
 
-    /// The modes of `model`; `None` where this program is to find them.
+    /// Returns the modes of `model`; `None` if this program must find them.
     pub(super) fn modes(
         &self,
         model: &FeModel,
@@ -84,22 +85,22 @@ impl Elsewhere {
         Ok(Some(BasisChoice::Solved(found.modes)))
     }
 
-    /// Removes the folder that nobody named, after the work.
+    /// Removes the folder after the work, unless the user named it.
     pub(super) fn tidy(&self) {
         if let Self::Slepc { folder, kept: false, .. } = self {
-            // A folder that stays does no harm.
+            // A folder that remains does no harm.
             let _ = std::fs::remove_dir_all(folder);
         }
     }
 }
 
-/// The path itself where it is a folder, or the first folder around it that is there.
+/// Returns the path itself if it is a folder, else its first existing parent folder.
 pub(super) fn folder_around(path: &Path) -> PathBuf {
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     whole.ancestors().find(|folder| folder.is_dir()).unwrap_or(Path::new(".")).to_owned()
 }
 
-/// Does work in a folder, which is made where it is not there, and removed again where the work fails.
+/// Runs work in a folder, which is created if it does not exist, and removed if the work fails.
 pub(super) fn in_made_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T>) -> Result<T> {
     let is_new = !folder.exists();
     std::fs::create_dir_all(folder).map_err(|e| {
@@ -108,7 +109,7 @@ pub(super) fn in_made_folder<T>(folder: &Path, work: impl FnOnce() -> Result<T>)
     })?;
     let done = work();
     if done.is_err() && is_new {
-        // Only an empty one goes: whatever else is in it is not of this run.
+        // Remove the folder only if it is empty: other content does not belong to this run.
         let _ = std::fs::remove_dir(folder);
     }
     done

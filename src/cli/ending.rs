@@ -1,4 +1,4 @@
-//! The end of the program before its work is done: by a signal, or at a contradiction of its own.
+//! Early end of the program: by a signal, or at an internal error.
 
 use super::arguments::Arguments;
 use super::exit::end;
@@ -11,7 +11,7 @@ use std::panic::PanicHookInfo;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Sees to it that the process, which runs this command and nothing else, leaves no unfinished file however it ends.
+/// Ensures that the process, which runs this command and nothing else, leaves no unfinished file however it ends.
 pub fn end_without_unfinished_files(arguments: &'static Arguments) {
     #[cfg(unix)]
     signals::handle();
@@ -21,12 +21,12 @@ pub fn end_without_unfinished_files(arguments: &'static Arguments) {
     std::panic::set_hook(Box::new(move |panic| panicked(panic, &print, arguments)));
 }
 
-/// Ends the program with exit code 70 at a panic on whatever thread. The program that is handed out has no tables for
-/// unwinding, and would end by SIGABRT after this.
+/// Ends the program with exit code 70 at a panic on any thread. The released program has no tables for unwinding, and
+/// would end by SIGABRT otherwise.
 fn panicked(panic: &PanicHookInfo<'_>, print: &dyn Fn(&PanicHookInfo<'_>), arguments: &Arguments) {
     static HAS_BEGUN: AtomicBool = AtomicBool::new(false);
     if HAS_BEGUN.swap(true, Ordering::SeqCst) {
-        // Another thread ends the program, or this one panics for the second time.
+        // Another thread ends the program, or this one panics again.
         std::thread::sleep(Duration::from_secs(10));
         end(ExitCode::Bug);
     }
@@ -35,7 +35,7 @@ fn panicked(panic: &PanicHookInfo<'_>, print: &dyn Fn(&PanicHookInfo<'_>), argum
     end(tell_bug(arguments))
 }
 
-/// Ends the process at Ctrl-C, whatever it is doing.
+/// Ends the process at Ctrl-C.
 #[cfg(not(unix))]
 fn interrupted() {
     use std::io::Write;

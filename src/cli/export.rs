@@ -1,4 +1,4 @@
-//! `flexbody export`.
+//! Command `flexbody export`.
 
 use super::arguments::ExportArguments;
 use super::outcome::{Outcome, refuse_warnings};
@@ -46,6 +46,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     diagnostics.extend(losses);
     diagnostics.extend(interface_compliance(&body).filter(|_| !format.is_picture()));
     refuse_warnings(arguments.printing, &diagnostics)?;
+    // Files beside the output are known only now: they must not replace an input either.
     let place_and_size = |(ending, bytes): &(Cow<'_, str>, Vec<u8>)| {
         (Exported::place_beside(&arguments.output, ending), bytes.len())
     };
@@ -61,6 +62,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     let file = |(path, size): &(PathBuf, usize)| serde_json::json!({ "path": path.display().to_string(), "bytes": size });
     let files: serde_json::Value = written.iter().map(file).collect();
     let json = serde_json::json!({ "format": format.name(), "files": files });
+    // One line per file, or a summary for many files.
     let told = if written.len() > MOST_LINES { 1 } else { written.len() };
     let (told, others) = written.split_at(told);
     let mut text: String = told.iter().map(line).collect();
@@ -71,7 +73,7 @@ pub(super) fn run(arguments: &ExportArguments) -> Result<Outcome> {
     Ok(Outcome { text, json: format!("{json:#}"), diagnostics, passed: true })
 }
 
-/// The largest share of the stiffness of inertia over the load cases of a scene; nothing of a body without.
+/// Returns the largest share of the stiffness of inertia over the load cases of a scene; `None` for a body without it.
 fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScene>> {
     let mut largest: Option<InertiaInScene> = None;
     for scene in LoadCases::read(path, None)?.iter() {
@@ -87,10 +89,10 @@ fn inertia_in_scene(body: &FlexBody, path: &Path) -> Result<Option<InertiaInScen
     Ok(largest)
 }
 
-/// Of more files than these the first is told, and what the others are together.
+/// Number of files up to which each is listed. Of more files the first is listed, with a summary of the others.
 const MOST_LINES: usize = 8;
 
-/// `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
+/// Parses the points: `nodes`, `interfaces`, node numbers with commas, or `interfaces` and node numbers.
 fn points(text: &str) -> Result<Points> {
     match text {
         "nodes" => return Ok(Points::Nodes),

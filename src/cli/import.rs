@@ -1,4 +1,4 @@
-//! `flexbody convert --from`: a body of another program's file.
+//! Command `flexbody convert --from`: converts a body in a file of another program.
 
 use super::arguments::ConvertArguments;
 use super::outcome::{Outcome, refuse_warnings};

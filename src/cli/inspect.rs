@@ -1,4 +1,4 @@
-//! `flexbody inspect`.
+//! Command `flexbody inspect`.
 
 use super::arguments::InspectArguments;
 use super::outcome::{Outcome, refuse_warnings};
@@ -25,7 +25,7 @@ pub(super) fn run(arguments: &InspectArguments) -> Result<Outcome> {
     let facts = Facts::new(&body, &RunData::default());
     if !reports.is_empty() {
         refuse_warnings(arguments.printing, &diagnostics)?;
-        // A report says what was found in the file as well.
+        // A report also contains the diagnostics of the file.
         let found = RunData { diagnostics: diagnostics.clone(), ..RunData::default() };
         let facts = Facts::new(&body, &found);
         for (slot, format) in reports.iter().zip(formats) {

@@ -1,4 +1,4 @@
-//! The command line: arguments, one file per command, progress. The only room that prints or exits; no
+//! Command line: arguments, one file per command, progress. Only this module prints or exits; it contains no
 //! arithmetic.
 
 mod arguments;

@@ -10,10 +10,10 @@ use flexbody_input::{
 use flexbody_model::{CheckedModel, Coupling, FeModel, Reference};
 use std::path::{Path, PathBuf};
 
-/// Whether `path`, of a model or of a flex-body file, is that of a model.
+/// Returns true if `path`, of a model or of a flex-body file, is that of a model.
 ///
 /// # Errors
-/// FB801 for a flex-body file with options that say something of a job.
+/// FB801 for a flex-body file with options of a job.
 pub(super) fn is_model(path: &Path, job: &JobArguments) -> Result<bool> {
     if is_manifest(path) || job.format.is_some() || is_job(path) {
         return Ok(true);
@@ -29,10 +29,10 @@ pub(super) fn is_model(path: &Path, job: &JobArguments) -> Result<bool> {
     }
 }
 
-/// The files of a model, told by its manifest or by the job of an FE program.
+/// Returns the files of a model that is given by its manifest or by the job of an FE program.
 ///
 /// # Errors
-/// Those of [`read_manifest`]; FB801 for options that the manifest says itself or that are not understood.
+/// The errors of [`read_manifest`]; FB801 for options that the manifest states itself, or that are invalid.
 pub(super) fn of_manifest_or_job(path: &Path, job: &JobArguments) -> Result<ModelFiles> {
     if is_manifest(path) {
         refuse_for_manifest(job)?;
@@ -47,7 +47,7 @@ pub(super) fn of_manifest_or_job(path: &Path, job: &JobArguments) -> Result<Mode
     Ok(files)
 }
 
-/// The files of a model and the model that they are, checked; none of `outputs` replaces one of them.
+/// Reads and checks a model. Refuses `outputs` that would replace one of its files.
 pub(super) fn read_checked<'p>(
     path: &Path,
     job: &JobArguments,
@@ -61,7 +61,7 @@ pub(super) fn read_checked<'p>(
 }
 
 impl JobArguments {
-    /// The first option that is given.
+    /// Returns the first option that is given.
     pub(super) fn first(&self) -> Option<&'static str> {
         let given = [
             (self.format.is_some(), "--format"),
@@ -74,12 +74,12 @@ impl JobArguments {
     }
 }
 
-/// Whether a path is that of a manifest.
+/// Returns true if a path is that of a manifest.
 fn is_manifest(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension == "toml")
 }
 
-/// Options that a manifest says itself.
+/// Refuses options that a manifest states itself.
 fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
     let message = match job {
         JobArguments { format: Some(_), .. } => "--format is for jobs: a manifest says `program` in [files]",
@@ -100,7 +100,7 @@ fn refuse_for_manifest(job: &JobArguments) -> Result<()> {
     Err(Diagnostic::new(Code::Usage, message).into())
 }
 
-/// The names of stiffness and mass matrix: `KGG,MGG`.
+/// Parses the names of stiffness and mass matrix: `KGG,MGG`.
 fn matrix_names(text: &str) -> Result<[String; 2]> {
     let names: Vec<&str> = text.split(',').map(str::trim).filter(|name| !name.is_empty()).collect();
     match names.as_slice() {
@@ -112,11 +112,11 @@ fn matrix_names(text: &str) -> Result<[String; 2]> {
     }
 }
 
-/// Returns the interface that `--interface` names: `NAME=SET` or `SET`, then a coupling, a reference point or both, each
-/// after a comma.
+/// Parses the interface of `--interface`: `NAME=SET` or `SET`, then a coupling, a reference point or both, each after a
+/// comma.
 ///
 /// # Errors
-/// FB801 for a coupling that is not known, a point that does not have three coordinates, or an empty name.
+/// FB801 for an unknown coupling, a point that does not have three coordinates, or an empty name.
 fn interface_source(text: &str) -> Result<InterfaceSource> {
     let refused = |why: String, help: String| {
         Error::from(Diagnostic::new(Code::Usage, format!("--interface {text}: {why}")).with_help(help))
@@ -148,7 +148,7 @@ fn interface_source(text: &str) -> Result<InterfaceSource> {
     Ok(InterfaceSource { name: name.to_owned(), nodes, coupling, reference })
 }
 
-/// Returns the point `X/Y/Z`.
+/// Parses the point `X/Y/Z`.
 fn point(text: &str) -> Option<[f64; 3]> {
     let numbers: Option<Vec<f64>> = text.split('/').map(|number| number.trim().parse().ok()).collect();
     numbers?.try_into().ok()

@@ -1,25 +1,24 @@
-//! What a command comes back with.
+//! Outcome of a command.
 
 use super::arguments::Printing;
 use flexbody_base::diagnostic::{Code, Diagnostic, Severity};
 use flexbody_base::error::{Error, Result};
 
-/// What a command found: text for stdout, the same as JSON, warnings and notes, and whether its checks
-/// passed.
+/// Outcome of a command: text for stdout, its content as JSON, warnings and notes, and whether its checks passed.
 pub(super) struct Outcome {
     pub text: String,
-    /// The `results` of the object that `--json` prints.
+    /// Member `results` of the object that `--json` prints.
     pub json: String,
     pub diagnostics: Vec<Diagnostic>,
     pub passed: bool,
 }
 
-/// The warnings among diagnostics.
+/// Returns the warnings among diagnostics.
 pub(super) fn warnings(diagnostics: &[Diagnostic]) -> impl Iterator<Item = &Diagnostic> {
     diagnostics.iter().filter(|diagnostic| diagnostic.severity() == Severity::Warning)
 }
 
-/// Ends a command that is about to write, where a warning is to count as an error.
+/// Ends a command before it writes, if `--deny-warnings` is set and there is a warning.
 ///
 /// # Errors
 /// All `diagnostics`, with [`WarningsDenied`](Code::WarningsDenied).

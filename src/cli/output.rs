@@ -1,4 +1,4 @@
-//! Running a command, printing of results and diagnostics, and the exit code.
+//! Execution of a command, output of results and diagnostics, and the exit code.
 
 use super::arguments::{Arguments, Command, Printing};
 use super::outcome::{Outcome, warnings};
@@ -18,12 +18,11 @@ use flexbody_report::output_json;
 use std::ffi::OsString;
 use std::io::Write;
 
-/// The arguments of a command line, the name of the program first; where there is nothing to run, help or
-/// what is wrong is printed, and the exit code given.
+/// Parses a command line, whose first word is the name of the program. If there is nothing to run, prints help or an
+/// error and returns the exit code.
 ///
 /// # Errors
-/// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for a command line that is not
-/// understood.
+/// [`ExitCode::Done`] after help or the version, [`ExitCode::BadInput`] for an invalid command line.
 pub fn parse(words: &[OsString]) -> std::result::Result<Arguments, ExitCode> {
     Arguments::try_parse_from(words).map_err(|error| {
         let words = || words.iter().skip(1).take_while(|word| *word != "--");
@@ -36,18 +35,18 @@ pub fn parse(words: &[OsString]) -> std::result::Result<Arguments, ExitCode> {
                 Err(Diagnostic::new(Code::Usage, first_paragraph(&error)).into()),
             );
         }
-        // Nobody is left to tell when the stream is closed.
+        // An error of a closed stream cannot be reported.
         let _ = error.print();
         if error.use_stderr() { ExitCode::BadInput } else { ExitCode::Done }
     })
 }
 
-/// The command of that name.
+/// Returns the command of that name.
 fn command_named(word: &str) -> Option<String> {
     Arguments::command().find_subcommand(word).map(|command| command.get_name().to_owned())
 }
 
-/// What clap says is wrong, in one line, without its tips and its usage.
+/// Returns the error message of clap in one line, without its tips and its usage.
 fn first_paragraph(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines: Vec<&str> = text.lines().map(str::trim).take_while(|line| !line.is_empty()).collect();
@@ -69,7 +68,8 @@ pub fn run(arguments: &Arguments) -> ExitCode {
     read_files::begin_run();
     begin_run();
     tell_left(|| memory_left(None));
-    // In a thread of the pool: from any other one every loop in parallel is handed over, and waited for asleep.
+    // Run inside the thread pool: from any other thread, every parallel loop would be handed over while this thread
+    // sleeps.
     let outcome = rayon::scope(|_| outcome_of(arguments));
     stand_by();
     let has_outcome = outcome.is_ok();
@@ -124,7 +124,7 @@ fn command_of(arguments: &Arguments) -> (&'static str, Printing) {
     }
 }
 
-/// Tells that the program stopped at a contradiction of its own.
+/// Reports an internal error.
 pub(super) fn tell_bug(arguments: &Arguments) -> ExitCode {
     let (name, printing) = command_of(arguments);
     let message = "the program stopped at a contradiction of its own";
@@ -152,13 +152,13 @@ fn finish(command: Option<&str>, printing: Printing, outcome: Result<Outcome>) -
             let message = format!("the results cannot be printed: {error}");
             let unprinted = Diagnostic::new(Code::OutputUnwritable, message);
             tell(Printing { json: false, ..printing }, &[unprinted]);
-            // A failure of the work itself is what its exit code tells.
+            // A failure of the work itself determines the exit code.
             if code == ExitCode::Done { ExitCode::Resources } else { code }
         }
     }
 }
 
-/// Prints diagnostics to stderr: all of them, or errors only when quiet; none with `--json`, whose output has
+/// Prints diagnostics to stderr: all of them, or errors only if quiet. Prints none with `--json`, whose output contains
 /// them.
 fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
     if printing.json {
@@ -169,12 +169,12 @@ fn tell(printing: Printing, diagnostics: &[Diagnostic]) {
     for diagnostic in diagnostics.iter().filter(|d| !printing.quiet || d.severity() == Severity::Error) {
         let told = diagnostic.to_string();
         let told = if coloured { painted(diagnostic.severity(), &told) } else { told };
-        // Nobody is left to tell when stderr is closed.
+        // An error of a closed stderr cannot be reported.
         let _ = writeln!(stderr, "{told}");
     }
 }
 
-/// A diagnostic with its severity and code in colour.
+/// Returns a diagnostic with its severity and code in colour.
 fn painted(severity: Severity, told: &str) -> String {
     let colour = match severity {
         Severity::Error => "1;31",
@@ -185,7 +185,7 @@ fn painted(severity: Severity, told: &str) -> String {
         .map_or_else(|| told.to_owned(), |(head, rest)| format!("\u{1b}[{colour}m{head}\u{1b}[0m: {rest}"))
 }
 
-/// Prints to stdout; a reader that went away (`| head`) is not an error.
+/// Prints to stdout. A closed pipe (`| head`) is not an error.
 fn print(text: &str) -> std::io::Result<()> {
     let mut stdout = std::io::stdout().lock();
     let newline = if text.ends_with('\n') { "" } else { "\n" };

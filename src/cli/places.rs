@@ -1,4 +1,4 @@
-//! Where outputs go: each is reserved before the work, and appears after it.
+//! Places of outputs: each is reserved before the work, and appears after it.
 
 use super::arguments::ConvertArguments;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -14,20 +14,20 @@ pub(super) struct BodyOutputs {
     pub reports: Vec<PathBuf>,
 }
 
-/// The same, reserved.
+/// Reserved output files of one body.
 pub(super) struct Reserved {
     pub body: OutputSlot,
     pub reports: Vec<OutputSlot>,
 }
 
 impl BodyOutputs {
-    /// What the command line names, with a number in every name for one of several bodies.
+    /// Returns the outputs that the command line names; for one of several bodies, with a number in every name.
     pub(super) fn of(arguments: &ConvertArguments, number: Option<usize>) -> Self {
         let place = |path: &PathBuf| number.map_or_else(|| path.clone(), |number| marked(path, number));
         Self { body: place(&arguments.output), reports: arguments.report.iter().map(place).collect() }
     }
 
-    /// Every file.
+    /// Returns all files.
     pub(super) fn all(&self) -> impl Iterator<Item = &PathBuf> {
         std::iter::once(&self.body).chain(&self.reports)
     }
@@ -40,7 +40,7 @@ impl BodyOutputs {
     }
 }
 
-/// The format of a report by its file name.
+/// Returns the format of a report by its file name.
 pub(super) fn format_of(path: &Path) -> Result<Format> {
     Format::from_path(path).ok_or_else(|| {
         let message = format!("report {} has no known extension", path.display());
@@ -48,7 +48,7 @@ pub(super) fn format_of(path: &Path) -> Result<Format> {
     })
 }
 
-/// No output may replace an input or another output.
+/// Refuses an output that would replace an input or another output.
 pub(super) fn refuse_replacing<'i, 'o>(
     inputs: impl Iterator<Item = &'i PathBuf>,
     outputs: impl Iterator<Item = &'o PathBuf>,
@@ -64,13 +64,13 @@ pub(super) fn refuse_replacing<'i, 'o>(
     Ok(())
 }
 
-/// No output may replace a file that was read, also those that no argument names: what a deck includes or assigns.
+/// Refuses an output that would replace a file that was read, including files that a deck includes or assigns.
 pub(super) fn refuse_replacing_read<'o>(mut outputs: impl Iterator<Item = &'o PathBuf>) -> Result<()> {
     outputs.try_for_each(|output| refuse_read(output))
 }
 
-/// `rotor-2.flex.h5` from `rotor.flex.h5`, `report-2.html` from `report.html`: with a number or a name before
-/// the extension.
+/// Returns the path with a number or a name before the extension: `rotor-2.flex.h5` from `rotor.flex.h5`,
+/// `report-2.html` from `report.html`.
 pub(super) fn marked(path: &Path, mark: impl std::fmt::Display) -> PathBuf {
     let (Some(stem), extension) = (path.file_stem(), path.extension()) else { return path.to_path_buf() };
     let inner = Path::new(stem);

@@ -1,4 +1,4 @@
-//! `flexbody prepare`.
+//! Command `flexbody prepare`.
 
 use super::arguments::PrepareArguments;
 use super::elsewhere::{folder_around, in_made_folder};

@@ -1,4 +1,4 @@
-//! `flexbody recipe`.
+//! Command `flexbody recipe`.
 
 use super::arguments::RecipeArguments;
 use super::outcome::Outcome;

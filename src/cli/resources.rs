@@ -1,4 +1,4 @@
-//! What the process has used so far, where the system tells (Linux).
+//! Resources of the process, as far as the system reports them (Linux).
 
 use flexbody_linalg::context::{Context, Watch};
 use std::sync::{Once, mpsc};
@@ -6,28 +6,29 @@ use std::sync::{Once, mpsc};
 /// Ticks per second of the CPU times in /proc: fixed for user space on Linux.
 const TICKS: f64 = 100.0;
 
-/// Threads for each processor, at the most. More of them make nothing faster, and each takes memory: 10 000 threads on
-/// two cores found eight modes of a cube in more than 100 s instead of 0.1 s, 16 000 left no maps of memory to go on with.
+/// Largest number of threads for each processor. More threads are not faster, and each takes memory: 10 000 threads on
+/// two cores found eight modes of a cube in more than 100 s instead of 0.1 s, 16 000 used up the memory maps of the
+/// process.
 const MOST_PER_PROCESSOR: usize = 4;
 
-/// Threads that are started where they are asked for, however few processors there are.
+/// Number of threads that is allowed however few processors there are.
 const ALWAYS_ALLOWED: usize = 64;
 
-/// Most threads on a machine of whatever size: each takes about four of the 65 530 maps of memory of a process.
+/// Largest number of threads on any machine: each takes about four of the 65 530 memory maps of a process.
 const MOST_THREADS: usize = 4096;
 
-/// Bytes of the stack of each thread; the command itself runs in one of them.
+/// Stack size of each thread in bytes; the command itself runs in one of them.
 const STACK: usize = 8 << 20;
 
-/// Starts the threads of the whole process: as many as `asked` for, otherwise one for each processor, or as
-/// many of them as make sense and the system lets it start; the number in force. Results do not depend on it.
+/// Starts the threads of the process: the number `asked` for, otherwise one for each processor, limited to a sensible
+/// number and to those that the system can start. Returns the number of threads. Results do not depend on it.
 pub fn use_threads(asked: Option<u16>) -> usize {
     start(sensible_threads(asked));
     rayon::current_num_threads()
 }
 
-/// Does work whose outcome goes by the number of threads, as an estimate of memory, for a process that may have more of
-/// them than this one.
+/// Runs work whose outcome depends on the number of threads, such as an estimate of memory, for a process that may have
+/// more threads than this one.
 pub(super) fn for_threads<T: Send>(asked: Option<u16>, work: impl FnOnce() -> T + Send) -> T {
     let wanted = sensible_threads(asked);
     if wanted <= rayon::current_num_threads() {
@@ -39,7 +40,7 @@ pub(super) fn for_threads<T: Send>(asked: Option<u16>, work: impl FnOnce() -> T 
     }
 }
 
-/// Threads that are worth starting where so many are asked for.
+/// Returns the number of threads to start if `asked` are requested.
 fn sensible_threads(asked: Option<u16>) -> usize {
     let environment = || std::env::var("RAYON_NUM_THREADS").ok()?.parse().ok().filter(|&threads| threads > 0);
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
@@ -47,9 +48,8 @@ fn sensible_threads(asked: Option<u16>) -> usize {
     wanted.min((MOST_PER_PROCESSOR * processors).clamp(ALWAYS_ALLOWED, MOST_THREADS))
 }
 
-/// Starts up to `wanted` threads and makes them the pool; without any, this thread is the pool. The pool
-/// itself cannot be tried twice: its threads are started before, and told their work when it is known how
-/// many there are.
+/// Starts up to `wanted` threads and makes them the pool; if none can be started, this thread is the pool. The pool
+/// cannot be built twice: its threads are started first, and receive their work once their number is known.
 fn start(wanted: usize) {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -70,31 +70,31 @@ fn start(wanted: usize) {
             };
             pool.spawn_handler(hand_out).build_global()
         };
-        // Fails only when a pool exists already, which then stays as it is.
+        // The build fails only if a pool exists already, which then remains.
         drop(made);
     });
 }
 
-/// Seconds that a search for modes may take by its estimate, unless the user says that it may be long.
+/// Largest estimated duration of a search for modes, in seconds, unless the user allows longer work.
 const LONGEST: f64 = 1800.0;
 
-/// Returns the context of work that `watch` listens to: the memory that is left, `memory_limit` at most, and the time that
-/// it may take.
+/// Returns the context of work that reports to `watch`, with limits of memory (the free memory, at most `memory_limit`)
+/// and of time.
 pub(super) fn context(memory_limit: Option<u64>, allow_long: bool, watch: Watch<'_>) -> Context<'_> {
     let longest = (!allow_long).then_some(LONGEST);
     Context { memory: memory_left(memory_limit), longest, ..Context::heard_by(watch) }
 }
 
-/// Whether another thread can be started.
+/// Returns true if another thread can be started.
 pub(super) fn has_thread() -> bool {
     std::thread::Builder::new().spawn(|| ()).is_ok_and(|thread| thread.join().is_ok())
 }
 
-/// User and system CPU seconds of this process; zero where the system does not tell.
+/// Returns the user and system CPU seconds of this process; zero if the system does not report them.
 pub(super) fn cpu_seconds() -> f64 {
     let read = || {
         let stat = std::fs::read_to_string("/proc/self/stat").ok()?;
-        // The command name, in parentheses, may hold blanks: fields count from behind it.
+        // The command name, in parentheses, may contain blanks: count fields from behind it.
         let fields: Vec<&str> = stat.rsplit(')').next()?.split_whitespace().collect();
         let ticks = fields.get(11)?.parse::<f64>().ok()? + fields.get(12)?.parse::<f64>().ok()?;
         Some(ticks / TICKS)
@@ -102,20 +102,21 @@ pub(super) fn cpu_seconds() -> f64 {
     read().unwrap_or(0.0)
 }
 
-/// Largest resident memory of this process so far, in bytes.
+/// Returns the largest resident memory of this process so far, in bytes.
 pub(super) fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     kibibytes(&status, "VmHWM:")
 }
 
-/// Memory in use by this process, in bytes; zero where the system does not tell.
+/// Returns the resident memory of this process, in bytes; zero if the system does not report it.
 pub(super) fn resident_bytes() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     kibibytes(&status, "VmRSS:").unwrap_or(0)
 }
 
-/// Bytes that may still be allocated: up to `limit` where the user gives one, otherwise what the machine has
-/// left, or what the control groups of this process leave of that. `None` where the system does not tell.
+/// Returns the number of bytes that may still be allocated: up to `limit` if the user states one, otherwise the free
+/// memory of the machine, limited by the control groups and limits of this process. Returns `None` if the system does
+/// not report it.
 pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
     if let Some(limit) = limit {
         return Some(limit.saturating_sub(resident_bytes()));
@@ -124,19 +125,19 @@ pub(super) fn memory_left(limit: Option<u64>) -> Option<u64> {
     machine.into_iter().chain(control_groups()).chain(process_limits()).min()
 }
 
-/// Bytes of address space that this process may have (`ulimit -v`); `None` without a limit.
+/// Returns the largest address space of this process in bytes (`ulimit -v`); `None` without a limit.
 pub(super) fn address_space_limit() -> Option<u64> {
     process_limit(&std::fs::read_to_string("/proc/self/limits").ok()?, "Max address space")
 }
 
-/// The limit of that name in a table of limits, in bytes.
+/// Returns the limit of that name in a table of limits, in bytes.
 fn process_limit(limits: &str, key: &str) -> Option<u64> {
     let line = limits.lines().find(|line| line.starts_with(key))?;
     line[key.len()..].split_whitespace().next()?.parse::<u64>().ok()
 }
 
-/// What the limits of this process leave (`ulimit -v` and `-d`). They count address space, of which more is
-/// reserved than is in use: who comes closer to a limit than that may still end at it.
+/// Returns the memory that the limits of this process leave, in bytes (`ulimit -v` and `-d`). The limits count address
+/// space, of which more is reserved than is in use: a process close to a limit may still reach it.
 fn process_limits() -> Vec<u64> {
     let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
     let given =
@@ -144,8 +145,8 @@ fn process_limits() -> Vec<u64> {
     given.map(|limit| limit.saturating_sub(resident_bytes())).collect()
 }
 
-/// What each memory control group of this process leaves (versions 1 and 2); files that are mapped count as
-/// free.
+/// Returns the memory that each control group of this process leaves, in bytes (versions 1 and 2). Pages of mapped
+/// files count as free.
 fn control_groups() -> Vec<u64> {
     let groups = std::fs::read_to_string("/proc/self/cgroup").unwrap_or_default();
     let mut left = Vec::new();
@@ -159,7 +160,7 @@ fn control_groups() -> Vec<u64> {
             }
             _ => continue,
         };
-        // A group is limited by those above it as well. Inside a container the own group is the root.
+        // A group is also limited by its parents. Inside a container the process's own group is the root.
         let own = std::path::Path::new(root).join(path.trim_start_matches('/'));
         for folder in own.ancestors().take_while(|folder| folder.starts_with(root)) {
             let number =
@@ -175,7 +176,7 @@ fn control_groups() -> Vec<u64> {
     left
 }
 
-/// A line of a table of /proc in bytes.
+/// Returns a line of a table of /proc in bytes.
 fn kibibytes(table: &str, key: &str) -> Option<u64> {
     let line = table.lines().find(|line| line.starts_with(key))?;
     line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)

@@ -1,4 +1,4 @@
-//! `flexbody response`.
+//! Command `flexbody response`.
 
 use super::arguments::ResponseArguments;
 use super::convert::load_sources;
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &ResponseArguments) -> Result<Outcome> {
     for (slot, format) in reports.iter().zip(formats) {
         slot.fill(facts.render(format).as_bytes())?;
     }
-    // Nothing appears before everything is done.
+    // No file appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports))?;
     Ok(Outcome {
         text: facts.render(Format::Text),
@@ -74,7 +74,7 @@ fn outputs(arguments: &ResponseArguments) -> impl Iterator<Item = &PathBuf> + Cl
     arguments.csv.iter().chain(&arguments.report)
 }
 
-/// Options that say nothing together.
+/// Refuses contradictory options.
 fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Result<()> {
     let converts =
         arguments.modes.is_some() || arguments.basis.is_some() || arguments.residual_vectors.is_some();
@@ -99,7 +99,7 @@ fn refuse_contradictions(arguments: &ResponseArguments, is_model: bool) -> Resul
     Err(Diagnostic::new(Code::Usage, message).into())
 }
 
-/// The model with the body that was made of it, or that is made of it now.
+/// Returns the model with the given body, or with a body that is converted now.
 fn model_and_body(
     arguments: &ResponseArguments,
     asked: Option<Vec<LoadSource>>,
@@ -130,7 +130,7 @@ fn model_and_body(
     Ok((model, made.body, diagnostics))
 }
 
-/// What the command line says, and what the scene says where it says nothing.
+/// Returns the settings of the command line, completed by those of the scene.
 fn settings(
     arguments: &ResponseArguments,
     scene: Option<&Scene>,
@@ -152,14 +152,14 @@ fn settings(
     })
 }
 
-/// Where forces act and where displacements are read.
+/// Returns the places of forces and of measured displacements.
 fn places(arguments: &ResponseArguments, scene: Option<&Scene>) -> Result<[Vec<Place>; 2]> {
     let chosen = |named: &[String], of_scene: Vec<&Point>, option: &str, key: &str| -> Result<Vec<Place>> {
         let mut places: Vec<Place> = named.iter().map(|text| Place::parse(text)).collect();
         if places.is_empty() {
             places.extend(of_scene.into_iter().cloned().map(Place::of));
         }
-        // Each once: a scene may load a point twice.
+        // Remove duplicates: a scene may load a point twice.
         let mut once: Vec<Place> = Vec::new();
         places.into_iter().for_each(|place| {
             if !once.contains(&place) {

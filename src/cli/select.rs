@@ -1,4 +1,4 @@
-//! `flexbody select`.
+//! Command `flexbody select`.
 
 use super::arguments::SelectArguments;
 use super::models::{is_model, read_checked};
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &SelectArguments) -> Result<Outcome> {
     })
 }
 
-/// The body of a model with everything that the load cases may need, and what it lacks of the model there.
+/// Returns the body of a model with everything that the load cases may need, and its truncation errors.
 fn converted(
     arguments: &SelectArguments,
     cases: &LoadCases,

@@ -1,8 +1,8 @@
-//! Signals that end a program which does not know them: the unfinished files are removed first.
+//! Signals that end the program: the unfinished files are removed first.
 //!
-//! SIGINT, SIGTERM and SIGHUP end the run with exit code 130, every other one as if the program did not know it
-//! (128 + its number in a shell). Signals that are not handled by default when the program starts, as `nohup` and jobs
-//! in the background have it, stay as they are. SIGPIPE and SIGXFSZ are errors of the write.
+//! SIGINT, SIGTERM and SIGHUP end the run with exit code 130, every other signal like its default action (128 + its
+//! number in a shell). Signals that are not handled by default when the program starts, as under `nohup` and in
+//! background jobs, are left unchanged. SIGPIPE and SIGXFSZ are errors of the write.
 #![allow(unsafe_code)] // calls of the C library that ask for, set and raise signals
 
 use super::exit::end;
@@ -15,7 +15,7 @@ use std::io::{IsTerminal, Write};
 use std::sync::{OnceLock, mpsc};
 use std::time::Duration;
 
-/// Seconds that programs which this one has started have to end themselves before they are killed.
+/// Time that child processes have to end before they are killed.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Signals of an interruption: exit code 130.
@@ -32,35 +32,35 @@ const OTHERS: [c_int; 7] = [
     libc::SIGUSR2,
 ];
 
-/// Signals of Linux alone.
+/// Signals that exist on Linux only.
 #[cfg(target_os = "linux")]
 const OF_LINUX: [c_int; 3] = [libc::SIGIO, libc::SIGPWR, libc::SIGSTKFLT];
 
-/// Signals that the processor or the program itself raises: the thread does not go on after them.
+/// Signals that the processor or the program itself raises; the thread does not continue after them.
 const CRASHES: [c_int; 7] =
     [libc::SIGSEGV, libc::SIGBUS, libc::SIGILL, libc::SIGFPE, libc::SIGABRT, libc::SIGTRAP, libc::SIGSYS];
 
-/// Handlers of [`CRASHES`] before those of this program.
+/// Handlers of [`CRASHES`] that were set before those of this program.
 static BEFORE: [OnceLock<sigaction>; CRASHES.len()] = [const { OnceLock::new() }; CRASHES.len()];
 
-/// Handles the signals from here on. Where no handler can be set the work is done all the same: what an interruption
-/// then leaves is removed by the next run.
+/// Handles the signals from now on. If no handler can be set, the work is done nevertheless: the next run removes files
+/// that an interruption leaves.
 pub(super) fn handle() {
     let (ready, is_ready) = mpsc::channel();
     let wait = move || wait_for_signal(&ready);
     if std::thread::Builder::new().name("signals".to_owned()).spawn(wait).is_ok() {
-        // The thread ends without a word where it cannot set its handlers.
+        // The thread ends without a message if it cannot set its handlers.
         let _ = is_ready.recv();
     }
     handle_crashes();
 }
 
-/// Sets the handlers, says so, and ends the program at the first signal.
+/// Sets the handlers, notifies the caller, and ends the program at the first signal.
 fn wait_for_signal(ready: &mpsc::Sender<()>) {
     let asked: Vec<c_int> = ending().into_iter().filter(|&signal| is_default(signal)).collect();
     match Signals::new(&asked) {
         Ok(mut signals) => {
-            // The caller waits for it.
+            // The caller waits for this message.
             let _ = ready.send(());
             if let Some(signal) = signals.forever().next() {
                 ended_by(signal);
@@ -71,7 +71,7 @@ fn wait_for_signal(ready: &mpsc::Sender<()>) {
     }
 }
 
-/// Every signal whose default is the end of the program, without [`CRASHES`].
+/// Returns every signal whose default action ends the program, except [`CRASHES`].
 fn ending() -> Vec<c_int> {
     let mut all = [&INTERRUPTIONS[..], &OTHERS].concat();
     #[cfg(target_os = "linux")]
@@ -82,7 +82,7 @@ fn ending() -> Vec<c_int> {
     all
 }
 
-/// True if the system does with a signal what it does by default.
+/// Returns true if the action of a signal is the default one.
 fn is_default(signal: c_int) -> bool {
     action(signal).is_some_and(|action| action.sa_sigaction == libc::SIG_DFL)
 }
@@ -91,7 +91,7 @@ fn is_ignored(signal: c_int) -> bool {
     action(signal).is_some_and(|action| action.sa_sigaction == libc::SIG_IGN)
 }
 
-/// Handling of a signal.
+/// Returns the action of a signal.
 fn action(signal: c_int) -> Option<sigaction> {
     // SAFETY: zeros are valid for the structure, which the call fills.
     unsafe {
@@ -100,15 +100,15 @@ fn action(signal: c_int) -> Option<sigaction> {
     }
 }
 
-/// Ends the process, whatever it is doing, and the programs that it waits for.
+/// Ends the process and its child processes at a signal.
 fn ended_by(signal: c_int) -> ! {
-    // The outputs are in their places: the run has ended with this code.
+    // The run has already ended with this code, and its outputs are in place.
     if let Some(code) = abandon_unfinished() {
         end(code);
     }
     let is_alone = end_children(signal);
     let mut stderr = std::io::stderr();
-    // A progress bar may stand on the line.
+    // A progress bar may occupy the line.
     let line_end = if stderr.is_terminal() { "\n" } else { "" };
     let left = if is_alone {
         "no unfinished file is left"
@@ -124,7 +124,7 @@ fn ended_by(signal: c_int) -> ! {
     as_by_default(signal)
 }
 
-/// Ends the programs that this one has started and waits for them; false if one of them had to be killed.
+/// Ends the child processes and waits for them. Returns false if one of them had to be killed.
 fn end_children(signal: c_int) -> bool {
     let known = if is_ignored(libc::SIGTERM) { signal } else { libc::SIGTERM };
     send(known, &children::close());
@@ -133,38 +133,38 @@ fn end_children(signal: c_int) -> bool {
     left.is_empty()
 }
 
-/// Sends a signal to other processes; one that has just ended gets none.
+/// Sends a signal to other processes. Errors for processes that have just ended are ignored.
 fn send(signal: c_int, processes: &[u32]) {
     for &process in processes {
-        // SAFETY: sends a signal to a program that this one has started.
+        // SAFETY: sends a signal to a child process.
         let _ = unsafe { libc::kill(process.cast_signed() as libc::pid_t, signal) };
     }
 }
 
-/// Leaves a signal to the system again.
+/// Restores the default action of a signal.
 fn by_default(signal: c_int) {
-    // SAFETY: sets how a signal is handled.
+    // SAFETY: sets the action of a signal.
     unsafe {
         libc::signal(signal, libc::SIG_DFL);
     }
 }
 
-/// Does what the system does with this signal by default, which is the end of the process.
+/// Performs the default action of this signal, which ends the process.
 fn as_by_default(signal: c_int) -> ! {
     by_default(signal);
-    // SAFETY: lets a signal through to this thread, and sends it to it.
+    // SAFETY: unblocks a signal for this thread, and raises it.
     unsafe {
         let mut this: libc::sigset_t = std::mem::zeroed();
         libc::sigemptyset(&mut this);
         libc::sigaddset(&mut this, signal);
         libc::pthread_sigmask(libc::SIG_UNBLOCK, &this, std::ptr::null_mut());
         libc::raise(signal);
-        // Only where the signal does not end the process after all.
+        // Reached only if the signal does not end the process.
         libc::_exit(128 + signal)
     }
 }
 
-/// Handles [`CRASHES`] in the thread that they happen in, on its stack for signals.
+/// Handles [`CRASHES`] on the thread in which they occur, on its signal stack.
 fn handle_crashes() {
     for (&signal, before) in CRASHES.iter().zip(&BEFORE) {
         let Some(found) = action(signal).filter(|found| found.sa_sigaction != libc::SIG_IGN) else {
@@ -173,7 +173,7 @@ fn handle_crashes() {
         if before.set(found).is_err() {
             continue;
         }
-        // SAFETY: zeros are valid for the structure; the handler has the type that SA_SIGINFO promises.
+        // SAFETY: zeros are valid for the structure; the handler has the type that SA_SIGINFO requires.
         unsafe {
             let mut action: sigaction = std::mem::zeroed();
             action.sa_sigaction = crashed as extern "C" fn(c_int, *mut siginfo_t, *mut libc::c_void) as usize;
@@ -183,12 +183,12 @@ fn handle_crashes() {
     }
 }
 
-/// Removes the unfinished files, then leaves the signal to the handler before this one: it is raised again by the
-/// instruction that caused it, or here. None of this allocates for paths of usual length.
+/// Removes the unfinished files, then passes the signal to the previous handler: the instruction that caused the signal
+/// raises it again, or this function does. Nothing is allocated for paths of usual length.
 extern "C" fn crashed(signal: c_int, info: *mut siginfo_t, _: *mut libc::c_void) {
     abandon_unfinished_soon();
     let before = CRASHES.iter().position(|&other| other == signal).and_then(|at| BEFORE[at].get());
-    // SAFETY: the system hands over information that is valid during the call; the handler that is set was there before.
+    // SAFETY: the information from the system is valid during the call; the handler that is set existed before.
     unsafe {
         let is_of_instruction = matches!(signal, libc::SIGSEGV | libc::SIGBUS | libc::SIGILL | libc::SIGFPE);
         let is_raised_again = is_of_instruction && (*info).si_code > 0;

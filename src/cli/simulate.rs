@@ -1,4 +1,4 @@
-//! `flexbody simulate`.
+//! Command `flexbody simulate`.
 
 use super::arguments::{Printing, SimulateArguments};
 use super::outcome::{Outcome, refuse_warnings};
@@ -18,7 +18,7 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let formats = arguments.report.iter().map(|path| format_of(path)).collect::<Result<Vec<_>>>()?;
     let places = SimulationOutputs::of(arguments, None);
     refuse_replacing([&arguments.body, &arguments.scene].into_iter(), places.all())?;
-    // Which load cases there are is known after reading; that outputs can be written, before.
+    // Outputs are checked before reading, although the load cases are known only afterwards.
     let reserved = places.reserve()?;
     let threads = use_threads(arguments.threads);
 
@@ -42,12 +42,12 @@ pub(super) fn run(arguments: &SimulateArguments) -> Result<Outcome> {
     let done =
         cases.iter().zip(&slots).map(|(scene, slots)| job.simulate(scene, several, &notes, slots, &watcher));
     let done = done.collect::<Result<Vec<_>>>()?;
-    // Nothing appears before everything is done.
+    // No file appears before everything is done.
     OutputSlot::commit_all(slots.into_iter().flat_map(Slots::into_all))?;
     Ok(together(done))
 }
 
-/// The outcome of all load cases; of one scene it is its own.
+/// Joins the outcomes of all load cases; a single one is returned unchanged.
 fn together(mut done: Vec<Outcome>) -> Outcome {
     if done.len() == 1 {
         return done.remove(0);
@@ -64,7 +64,7 @@ fn together(mut done: Vec<Outcome>) -> Outcome {
     Outcome { text: texts.join("\n"), json, diagnostics, passed: true }
 }
 
-/// What all load cases of a run have in common.
+/// Common data of all load cases of a run.
 struct Job<'a> {
     path: &'a Path,
     printing: Printing,
@@ -74,7 +74,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Simulates a scene, and writes the motion and its reports; `notes` are those about the body.
+    /// Simulates a scene, and writes the motion and its reports. `notes` are the diagnostics of the body.
     fn simulate(
         &self,
         scene: &Scene,
@@ -87,6 +87,7 @@ impl Job<'_> {
         let name = scene.case_name().filter(|_| several).map(|name| format!("case `{name}`"));
         let watch = |event: Event<'_>| watcher.hear(event);
         let left = || context(None, true, &watch);
+        // The motion and its diagnostics, which name the load case if there are several.
         let run = simulate(self.body, scene, &left()).and_then(|(recording, mut found)| {
             found.extend(unsettled_rate(self.body, scene, &recording, &left())?);
             Ok((recording, found))
@@ -106,6 +107,7 @@ impl Job<'_> {
         let run =
             RunData { phases: watcher.finish(), diagnostics, threads: self.threads, ..RunData::default() };
         refuse_warnings(self.printing, &run.diagnostics)?;
+        // Files are filled here and put in place by the caller, after all load cases.
         let facts = SimulationFacts::new(&recording, self.body.units(), &run);
         if let Some(slot) = &slots.motion {
             flexbody_file::fill_simulation(&recording, self.body.units(), slot)?;
@@ -128,7 +130,7 @@ struct SimulationOutputs {
     reports: Vec<PathBuf>,
 }
 
-/// The same, reserved.
+/// Reserved output files of one simulation.
 struct Slots {
     motion: Option<OutputSlot>,
     table: Option<OutputSlot>,
@@ -136,7 +138,8 @@ struct Slots {
 }
 
 impl SimulationOutputs {
-    /// What the command line names, with the name of the load case in every name for one of several.
+    /// Returns the outputs that the command line names; for one of several load cases, with its name in every file
+    /// name.
     fn of(arguments: &SimulateArguments, case: Option<&str>) -> Self {
         let place = |path: &PathBuf| case.map_or_else(|| path.clone(), |case| marked(path, case));
         Self {

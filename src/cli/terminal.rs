@@ -1,4 +1,4 @@
-//! What the terminal shows of a body, in how many columns, and whether in colours.
+//! Text about a body for the terminal: its width and colours.
 
 use super::arguments::Printing;
 use flexbody_base::diagnostic::printable;
@@ -6,12 +6,12 @@ use flexbody_report::{Facts, Format, Screen, render, summary};
 use std::borrow::Cow;
 use std::io::IsTerminal;
 
-/// The summary of a body, or with `verbose` all that is known of it.
+/// Returns the summary of a body, or with `verbose` all facts about it.
 pub(super) fn body_text(facts: &Facts, verbose: bool, printing: Printing) -> String {
     if verbose { render(facts, Format::Text) } else { summary(facts, stdout_screen(printing)) }
 }
 
-/// What stdout is shown on.
+/// Returns the properties of the screen of stdout.
 fn stdout_screen(printing: Printing) -> Screen {
     let stdout = std::io::stdout();
     if printing.json || !stdout.is_terminal() {
@@ -23,24 +23,24 @@ fn stdout_screen(printing: Printing) -> Screen {
     columns.map_or(screen, |columns| screen.with_columns(columns))
 }
 
-/// The columns of a terminal: what `COLUMNS` says, else what the terminal itself says.
+/// Returns the columns of a terminal: the value of `COLUMNS`, else the value that the terminal reports.
 fn columns(said: Option<&str>, own: Option<usize>) -> Option<usize> {
     said.and_then(|said| said.trim().parse().ok()).or(own).filter(|columns| *columns > 0)
 }
 
-/// Whether what is printed to stderr is to have colours.
+/// Returns true if output to stderr shall have colours.
 pub(super) fn colours_of_stderr() -> bool {
     std::io::stderr().is_terminal() && are_wanted()
 }
 
-/// `NO_COLOR`, set to anything, asks for none (no-color.org); a dumb terminal has none.
+/// Returns true if colours are allowed: not if `NO_COLOR` is set and not empty (no-color.org), or on a dumb terminal.
 fn are_wanted() -> bool {
     let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !is_set("NO_COLOR") && std::env::var_os("TERM").is_none_or(|term| term != "dumb")
 }
 
-/// A text for stdout: of what a terminal takes as commands only colours are left, which this program uses itself. Names
-/// come from files.
+/// Returns a text for stdout in which only colour commands, which this program uses, are left. Other terminal commands
+/// are escaped, since names come from files.
 pub(super) fn for_terminal(text: &str) -> Cow<'_, str> {
     const COLOUR: &str = "\u{1b}[";
     let Some(first) = text.find(COLOUR) else { return printable(text) };

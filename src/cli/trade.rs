@@ -1,4 +1,4 @@
-//! `flexbody trade`.
+//! Command `flexbody trade`.
 
 use super::arguments::TradeArguments;
 use super::models::{is_model, read_checked};
@@ -54,7 +54,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     let nodal = model.as_ref().filter(|_| arguments.reference == ReferenceChoice::Nodal);
     let reserved = reserved(&lacks, nodal.is_some());
     let settings = TradeSettings { repeat: arguments.repeat.into(), reserved: &reserved };
-    // What was converted takes memory too.
+    // The conversions take memory too: update the limit.
     let context = Context { memory: memory_left(None), ..context };
     let study = trade(&sources, &cases, nodal, &settings, &context)
         .map_err(|error| error.in_file(&arguments.scene))?;
@@ -76,7 +76,7 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
         }
         None => Vec::new(),
     };
-    // Nothing appears before everything is done.
+    // No file appears before everything is done.
     OutputSlot::commit_all(table.into_iter().chain(reports).chain(bodies))?;
     let holds = |rounds: &Vec<ReferenceError>| rounds.last().is_none_or(ReferenceError::is_reference);
     let is_reference = nodal.is_some() || lacks.iter().all(holds);
@@ -85,8 +85,8 @@ pub(super) fn run(arguments: &TradeArguments) -> Result<Outcome> {
     Ok(Outcome { text, json, diagnostics: run.diagnostics.clone(), passed })
 }
 
-/// The bodies of the candidates that were measured, each in a file of `folder` that is named by its number;
-/// none of `taken` is replaced.
+/// Writes the bodies of the measured candidates to files of `folder` that are named by their numbers. Refuses to
+/// replace a file in `taken`.
 fn candidate_bodies(
     folder: &Path,
     taken: &[&PathBuf],
@@ -105,7 +105,7 @@ fn candidate_bodies(
     written.collect()
 }
 
-/// What a flex-body file cannot be asked for.
+/// Refuses options that a flex-body file does not support.
 fn refuse_contradictions(arguments: &TradeArguments, is_model: bool) -> Result<()> {
     let message = match arguments {
         _ if is_model => return Ok(()),

@@ -6,8 +6,8 @@ use flexbody_base::error::{Error, Result};
 use flexbody_study::reference::ReferenceError;
 use flexbody_study::selection::Selection;
 
-/// Ends a conversion whose `selection` does not hold, without `--allow-unjudged`; `found` are the diagnostics of the
-/// conversion, which say why.
+/// Ends a conversion whose `selection` does not hold, unless `--allow-unjudged` is set. `found` are the diagnostics of
+/// the conversion, which state the reason.
 ///
 /// # Errors
 /// [`SelectionUnjudged`](Code::SelectionUnjudged) after `found`.

@@ -1,4 +1,4 @@
-//! `flexbody view`.
+//! Command `flexbody view`.
 
 use super::arguments::ViewArguments;
 use super::outcome::{Outcome, refuse_warnings};

@@ -1,4 +1,4 @@
-//! Progress on a terminal with the time that is left of each phase, and the time that each phase took.
+//! Progress on a terminal with the remaining time of each phase, and the duration of each phase.
 
 use super::resources::{cpu_seconds, has_thread};
 use flexbody_linalg::context::Event;
@@ -8,10 +8,10 @@ use std::fmt::Write;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Environment variable for tests of that end: the program panics when the phase begins that it names.
+/// Environment variable for tests: the program panics at the start of the phase that it names.
 const PANIC_AT: &str = "FLEXBODY_TEST_PANIC";
 
-/// Listens to a job: shows a bar for the current phase and adds up the time of each.
+/// Listener of a job: shows a bar for the current phase and adds up the time of each phase.
 pub(super) struct Watcher {
     bar: ProgressBar,
     state: Mutex<State>,
@@ -25,20 +25,20 @@ struct State {
 }
 
 impl Watcher {
-    /// Starts with the phase `first`. A hidden bar when `quiet`, or when stderr is not a terminal.
+    /// Starts with the phase `first`. The bar is hidden if `quiet` is set or stderr is not a terminal.
     pub(super) fn new(quiet: bool, first: &str) -> Self {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(1000) };
         let style = ProgressStyle::with_template("{spinner} {msg:<22} {bar:30} {elapsed} {left}")
             .unwrap_or_else(|_| ProgressStyle::default_bar())
             .with_key("left", |state: &ProgressState, out: &mut dyn Write| {
                 if let Some(left) = time_left(state.elapsed(), state.fraction().into()) {
-                    // A line of progress that cannot be written is no loss.
+                    // Errors of writing the progress are ignored.
                     let _ = write!(out, "{left}");
                 }
             });
         bar.set_style(style);
         bar.set_message(first.to_owned());
-        // The tick has a thread of its own.
+        // The tick needs a thread of its own.
         if !bar.is_hidden() && has_thread() {
             bar.enable_steady_tick(Duration::from_millis(200));
         }
@@ -47,7 +47,7 @@ impl Watcher {
         Self { bar, state: Mutex::new(state) }
     }
 
-    /// The listener to hand to a job.
+    /// Receives an event of a job.
     pub(super) fn hear(&self, event: Event<'_>) {
         match event {
             Event::Phase(name) => {
@@ -62,14 +62,14 @@ impl Watcher {
         }
     }
 
-    /// Ends the current phase and gives all of them, in the order of their first occurrence.
+    /// Ends the current phase and returns all phases, in the order of their first occurrence.
     pub(super) fn finish(&self) -> Vec<Phase> {
         self.close();
         self.bar.finish_and_clear();
         std::mem::take(&mut self.state.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).phases)
     }
 
-    /// Removes the bar, so that something can be printed.
+    /// Removes the bar, so that other text can be printed.
     pub(super) fn clear(&self) {
         self.bar.finish_and_clear();
     }
@@ -90,7 +90,8 @@ impl Watcher {
     }
 }
 
-/// What is left of a phase of which `fraction` took `elapsed`, in words; nothing when it cannot be told yet.
+/// Returns the remaining time of a phase in words, if `fraction` of it took `elapsed`; `None` if it is too early for an
+/// estimate.
 fn time_left(elapsed: Duration, fraction: f64) -> Option<String> {
     if !(0.02..1.0).contains(&fraction) || elapsed < Duration::from_secs(1) {
         return None;

@@ -1,24 +1,24 @@
-//! The one table of diagnostics: every message the tool can give has a code, a severity, an exit code, a
-//! title and a default help here. `docs/codes.md` is generated from it; `fixtures/cases/` triggers each.
+//! Table of diagnostics. Every message of the program has a code, a severity, an exit code, a title and a default help
+//! in this table. `docs/codes.md` is generated from the table; `fixtures/cases/` triggers each code.
 
 use crate::exit_code::ExitCode;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// How much a diagnostic weighs.
+/// Severity of a diagnostic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
-    /// A fact the user should know.
+    /// Fact that the user should know.
     Note,
-    /// The result stands, but something is unusual.
+    /// Valid result with an unusual property.
     Warning,
-    /// The operation cannot be done, or its result cannot be trusted.
+    /// Operation that cannot be done, or whose result cannot be trusted.
     Error,
 }
 
 impl Severity {
-    /// `note`, `warning`, `error`.
+    /// Returns the name of the severity: `note`, `warning` or `error`.
     pub fn name(self) -> &'static str {
         match self {
             Severity::Note => "note",
@@ -30,38 +30,39 @@ impl Severity {
 
 macro_rules! codes {
     ($($variant:ident = $id:literal, $severity:ident, $exit:ident, $title:literal, $help:literal;)*) => {
-        /// A diagnostic's identity. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model,
-        /// FB5xx numerics, FB6xx resources, FB7xx flex-body files, FB8xx usage.
+        /// Code of a diagnostic. FB1xx files, FB2xx tables and manifest, FB3xx matrices, FB4xx model, FB5xx numerics,
+        /// FB6xx resources, FB7xx flex-body files, FB8xx usage.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
         pub enum Code {
             $(#[doc = $title] $variant,)*
         }
 
         impl Code {
-            /// Every code, in the order of the table.
+            /// All codes, in the order of the table.
             pub const ALL: &'static [Code] = &[$(Code::$variant,)*];
 
-            /// The printed identity, `FB` and three digits.
+            /// Returns the printed code: `FB` and three digits.
             pub fn id(self) -> &'static str {
                 match self { $(Code::$variant => $id,)* }
             }
 
-            /// Severity of every diagnostic with this code.
+            /// Returns the severity of every diagnostic with this code.
             pub fn severity(self) -> Severity {
                 match self { $(Code::$variant => Severity::$severity,)* }
             }
 
-            /// Exit code of a process that ends because of it ([`ExitCode::Done`] for warnings and notes).
+            /// Returns the exit code of a process that ends because of this code ([`ExitCode::Done`] for warnings and
+            /// notes).
             pub fn exit_code(self) -> ExitCode {
                 match self { $(Code::$variant => ExitCode::$exit,)* }
             }
 
-            /// What is wrong, in general.
+            /// Returns the general description of the problem.
             pub fn title(self) -> &'static str {
                 match self { $(Code::$variant => $title,)* }
             }
 
-            /// What to do about it, in general; a diagnostic may say something more precise.
+            /// Returns the general advice. A diagnostic may have a more precise one.
             pub fn help(self) -> &'static str {
                 match self { $(Code::$variant => $help,)* }
             }
@@ -217,13 +218,13 @@ codes! {
     RateUnsettled = "FB554", Warning, Done, "a rate that still changes with the steps of the integration", "give a smaller `tolerance` (a shorter `step`) in [run], and take the rate for settled when it no longer changes";
     SelectionUnjudged = "FB557", Error, CheckFailed, "a body for a scene that it does not hold, or where nothing can be said of it", "convert more modes, or residual vectors for the loads of the scene; --allow-unjudged writes the body all the same";
     CouplingEffect = "FB558", Note, Done, "rigid interfaces that the body and the model it is compared with have in common", "nothing to do where a stiff part is mounted at the interface; else state coupling = \"averaging\", which lets it deform";
-    // FB6xx: resources; FB603 was that of checkpoints, and stays free
+    // FB6xx: resources; FB603 stays unused (checkpoints of earlier versions)
     MemoryShort = "FB601", Error, Resources, "not enough memory", "ask for fewer modes, or use a larger machine";
     DiskShort = "FB602", Error, Resources, "not enough disk space", "free some space";
     WorkLong = "FB604", Error, BadInput, "the work would take very long", "ask for less, or say --allow-long";
     Stopped = "FB605", Error, Interrupted, "computation was stopped", "nothing to do: it ended because it was told to";
     Forked = "FB606", Error, Resources, "process has none of the threads that it computes with", "start processes by `spawn` or `forkserver`, or fork before the first work";
-    // FB7xx: flex-body files; FB705 and FB708 to FB711 stay free: they were told by earlier versions
+    // FB7xx: flex-body files; FB705 and FB708 to FB711 stay unused (earlier versions)
     BodyUnreadable = "FB701", Error, BadInput, "not a flex-body file", "give a file written by flexbody convert";
     BodyVersion = "FB702", Error, BadInput, "flex-body file of a newer format", "read it with the flexbody version named in the file";
     BodySchema = "FB703", Error, CheckFailed, "flex-body file breaks its schema", "convert the model again";
@@ -272,7 +273,7 @@ codes! {
     Internal = "FB999", Error, Bug, "internal error", "this is a bug: please report it with the input";
 }
 
-/// `docs/codes.md`: the table of codes and the exit codes.
+/// Returns the content of `docs/codes.md`: the table of codes and the exit codes.
 pub fn codes_markdown() -> String {
     let mut out = String::from(
         "<!-- Generated from the table in crates/base/src/diagnostic.rs: FLEXBODY_BLESS=1 cargo test --test program docs_generated -->\n\n\
@@ -305,7 +306,7 @@ pub fn codes_markdown() -> String {
     out
 }
 
-/// One finding: what, where, and what to do.
+/// Diagnostic: its message, its location and its help.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Diagnostic {
     code: Code,
@@ -316,71 +317,71 @@ pub struct Diagnostic {
 }
 
 impl Diagnostic {
-    /// A finding with `message`: a lowercase fragment that says what is wrong, with the facts in it.
+    /// Creates a diagnostic with `message`, a lowercase text that says what is wrong, with the facts.
     pub fn new(code: Code, message: impl Into<String>) -> Self {
         Self { code, message: message.into(), file: None, line: None, help: None }
     }
 
-    /// Adds the file it is about.
+    /// Adds the file.
     pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
         self.file = Some(file.as_ref().to_path_buf());
         self
     }
 
-    /// Adds the line (from 1) of that file.
+    /// Adds the line (from 1) of the file.
     pub fn at_line(mut self, line: usize) -> Self {
         self.line = Some(line);
         self
     }
 
-    /// Replaces the table's help by a more precise one.
+    /// Replaces the help of the table by a more precise one.
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
     }
 
-    /// Puts what it is about in front of the message.
+    /// Prefixes the message with its subject.
     pub fn about(mut self, what: impl std::fmt::Display) -> Self {
         self.message = format!("{what}: {}", self.message);
         self
     }
 
-    /// Leaves out what the message quotes between backticks.
+    /// Replaces every quotation between backticks by dots.
     pub fn without_quotes(mut self) -> Self {
         let parts: Vec<&str> = self.message.split('`').collect();
-        // Every second part stands between backticks.
+        // Every second part is between backticks.
         let shown =
             |(k, part): (usize, &&str)| if k % 2 == 1 { "...".to_owned() } else { (*part).to_owned() };
         self.message = parts.iter().enumerate().map(shown).collect::<Vec<_>>().join("`");
         self
     }
 
-    /// Its code.
+    /// Returns the code.
     pub fn code(&self) -> Code {
         self.code
     }
 
-    /// Its severity, by the table.
+    /// Returns the severity, from the table.
     pub fn severity(&self) -> Severity {
         self.code.severity()
     }
 
-    /// What is wrong, with the facts.
+    /// Returns the message: what is wrong, with the facts.
     pub fn message(&self) -> &str {
         &self.message
     }
 
-    /// File it is about.
+    /// Returns the file of the problem.
     pub fn file(&self) -> Option<&Path> {
         self.file.as_deref()
     }
 
-    /// Line (from 1) of that file.
+    /// Returns the line (from 1) of the problem.
     pub fn line(&self) -> Option<usize> {
         self.line
     }
 
-    /// What to do.
+    /// Returns the advice.
     pub fn help(&self) -> &str {
         self.help.as_deref().unwrap_or(self.code.help())
     }
@@ -401,8 +402,8 @@ impl std::fmt::Display for Diagnostic {
     }
 }
 
-/// Returns a text without characters that a terminal takes as commands: control characters but line ends and tabs, and
-/// those that turn the direction of writing, are shown by their numbers, as `\u{1b}`.
+/// Returns the text with escaped terminal commands: control characters except line ends and tabs, and characters that
+/// change the direction of writing, are shown by their numbers, such as `\u{1b}`.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(is_command) {
         return Cow::Borrowed(text);

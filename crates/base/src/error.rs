@@ -1,10 +1,10 @@
-//! The error type: one or more diagnostics, at least one of them an error, and the exit code they lead to.
+//! Error type: one or more diagnostics, at least one of severity error, and their exit code.
 
 use crate::diagnostic::{Code, Diagnostic, Severity};
 
 pub use crate::exit_code::ExitCode;
 
-/// A failed operation: every diagnostic collected until it had to stop.
+/// Failed operation, with all diagnostics collected until it stopped.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Error {
     diagnostics: Vec<Diagnostic>,
@@ -14,10 +14,10 @@ pub struct Error {
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// An error of all `diagnostics` (warnings among them are kept, in order).
+    /// Creates an error from `diagnostics`. Warnings and notes among them are kept, in order.
     ///
     /// # Panics
-    /// When none of them is an error: that is a bug of the caller.
+    /// If none of the diagnostics is an error, which is a bug of the caller.
     pub fn new(diagnostics: Vec<Diagnostic>) -> Self {
         assert!(
             diagnostics.iter().any(|d| d.severity() == Severity::Error),
@@ -26,42 +26,42 @@ impl Error {
         Self { diagnostics }
     }
 
-    /// The diagnostics, in the order in which they were found.
+    /// Returns the diagnostics, in the order in which they were found.
     pub fn diagnostics(&self) -> &[Diagnostic] {
         &self.diagnostics
     }
 
-    /// Gives the diagnostics away.
+    /// Returns the diagnostics by value.
     pub fn into_diagnostics(self) -> Vec<Diagnostic> {
         self.diagnostics
     }
 
-    /// The same after what was found before it: warnings and notes that are told with it.
+    /// Prepends warnings and notes that were found earlier.
     pub fn after(self, earlier: Vec<Diagnostic>) -> Self {
         Self { diagnostics: earlier.into_iter().chain(self.diagnostics).collect() }
     }
 
-    /// Puts what it is about in front of every message.
+    /// Prefixes every message with its subject.
     pub fn about(self, what: impl std::fmt::Display) -> Self {
         Self { diagnostics: self.diagnostics.into_iter().map(|d| d.about(&what)).collect() }
     }
 
-    /// Adds the file that every message is about.
+    /// Adds the file to every diagnostic.
     pub fn in_file(self, file: impl AsRef<std::path::Path>) -> Self {
         Self { diagnostics: self.diagnostics.into_iter().map(|d| d.in_file(&file)).collect() }
     }
 
-    /// The exit code of the first error.
+    /// Returns the exit code of the first error.
     pub fn exit_code(&self) -> ExitCode {
         self.first_error().code().exit_code()
     }
 
-    /// Whether one of the diagnostics has this code.
+    /// Returns true if one of the diagnostics has this code.
     pub fn has(&self, code: Code) -> bool {
         self.diagnostics.iter().any(|d| d.code() == code)
     }
 
-    /// The first diagnostic of severity error: the cause of the failure, whatever was noted before it.
+    /// Returns the first diagnostic of severity error, which is the cause of the failure.
     pub fn first_error(&self) -> &Diagnostic {
         self.diagnostics.iter().find(|d| d.severity() == Severity::Error).expect("checked at construction")
     }
@@ -87,10 +87,10 @@ impl std::fmt::Display for Error {
 
 impl std::error::Error for Error {}
 
-/// Ends a stage of checks: an error of all that was found, when an error is among it.
+/// Ends a stage of checks: returns an error with all diagnostics in `found` if one of them is an error.
 ///
 /// # Errors
-/// All diagnostics, taken out of `found`.
+/// All diagnostics, which are removed from `found`.
 pub fn stop_on_error(found: &mut Vec<Diagnostic>) -> Result<()> {
     if found.iter().any(|d| d.severity() == Severity::Error) {
         return Err(Error::new(std::mem::take(found)));

@@ -2,13 +2,13 @@
 
 use std::fs::{File, Metadata};
 
-/// Mode of a temporary file whose output replaces a file: nobody else reads it before the mode of that is known.
+/// Mode of a temporary file that will replace a file: no other user may read it before the final mode is set.
 #[cfg(unix)]
 pub(crate) const WORKING_MODE: u32 = 0o600;
 
-/// Gives `file` the owner, the group and the mode of the file that it replaces, as far as this process may.
+/// Gives `file` the owner, group and mode of the file that it replaces, as far as this process may.
 ///
-/// A group that cannot be kept is another one: its members get no more than everybody else.
+/// If the group cannot be kept, the members of the new group get no more permissions than all other users.
 #[cfg(unix)]
 pub(crate) fn take_over(file: &File, replaced: &Metadata) {
     use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
@@ -20,10 +20,10 @@ pub(crate) fn take_over(file: &File, replaced: &Metadata) {
     if !is_taken && group.is_some() && fchown(file, None, group).is_err() {
         mode = (mode & 0o707) | (mode & ((mode & 0o007) << 3));
     }
-    // File systems without modes have the same for all files.
+    // File systems without modes ignore the call.
     let _ = file.set_permissions(PermissionsExt::from_mode(mode));
 }
 
-/// Elsewhere files take the permissions of their folder.
+/// Files take the permissions of their folder on other systems.
 #[cfg(not(unix))]
 pub fn take_over(_: &File, _: &Metadata) {}

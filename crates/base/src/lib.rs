@@ -1,5 +1,5 @@
-//! Foundations of all other crates: errors and the one table of diagnostic codes, units, provenance, memory, text files, and
-//! files that appear whole or not at all. Nothing here knows matrices, models or bodies.
+//! Foundations of all other crates: errors and the table of diagnostic codes, units, provenance, memory, text files,
+//! and files that appear whole or not at all. This crate does not depend on matrices, models or bodies.
 
 #![deny(
     clippy::exit,

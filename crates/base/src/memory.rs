@@ -1,7 +1,7 @@
-//! Memory that is not to be had: who asks for it may say that it does without.
+//! Allocations that may fail.
 //!
-//! The program ends with exit code 4 where an allocation fails (`main.rs`), since almost no code could go on.
-//! Code that can go on (a size that a damaged file declares) asks inside [`or_go_without`].
+//! The program ends with exit code 4 if an allocation fails (`main.rs`), since almost no code could continue. Code that
+//! can continue (for a size that a damaged file declares) allocates inside [`or_go_without`].
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -12,16 +12,16 @@ thread_local! {
     static GOES_WITHOUT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Tells the bytes that may still be allocated; set by the program.
+/// Function that returns the number of bytes that may still be allocated; set by the program.
 static LEFT: OnceLock<fn() -> Option<u64>> = OnceLock::new();
 
-/// Sets how the bytes that may still be allocated are found; the first call counts.
+/// Sets the function that finds the number of bytes that may still be allocated. Only the first call has an effect.
 pub fn tell_left(find: fn() -> Option<u64>) {
-    // A second run in the same process finds them in the same way.
+    // Another run in the same process uses an equivalent function.
     let _ = LEFT.set(find);
 }
 
-/// Bytes that may still be allocated; `None` where it is not known, as in the library.
+/// Returns the number of bytes that may still be allocated; `None` if unknown, as in the library.
 pub fn left() -> Option<u64> {
     LEFT.get().and_then(|find| find())
 }
@@ -34,14 +34,14 @@ pub fn or_go_without<T>(ask: impl FnOnce() -> T) -> T {
     answer
 }
 
-/// Refuses work whose data take more memory than there is, before it begins.
+/// Refuses work that needs more memory than is available, before it begins.
 ///
-/// * `what`: subject of the message, as in "recording 100 instants".
-/// * `needed`: bytes; `left`: bytes that there are, `None` where it is not known.
-/// * `help`: what the user can do.
+/// * `what`: subject of the message, such as "recording 100 instants".
+/// * `needed`: bytes needed; `left`: bytes available, `None` if unknown.
+/// * `help`: advice for the user.
 ///
 /// # Errors
-/// FB601.
+/// FB601 if the memory is insufficient.
 pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> Result<()> {
     match left.map(|left| left as f64) {
         Some(left) if needed > left => {
@@ -52,7 +52,7 @@ pub fn refuse_beyond(left: Option<u64>, needed: f64, what: &str, help: &str) -> 
     }
 }
 
-/// Whether the code that runs on this thread goes on without the memory that it asks for.
+/// Returns true if the current thread continues when an allocation fails.
 pub fn goes_without() -> bool {
     GOES_WITHOUT.get()
 }

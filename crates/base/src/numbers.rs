@@ -1,7 +1,7 @@
-//! Numbers as people read them. Files never use these: their floats round-trip.
+//! Numbers for human readers. Files do not use these functions: their floats round-trip.
 
-/// `value` with `digits` significant digits: plain between 1e-4 and 1e7, else with an exponent; no trailing
-/// zeros.
+/// Returns `value` with `digits` significant digits: plain between 1e-4 and 1e7, otherwise with an exponent; without
+/// trailing zeros.
 pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return "not finite".to_owned();
@@ -17,7 +17,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     if plain == "-0" { "0".to_owned() } else { plain }
 }
 
-/// A number with decimals without the zeros at its end.
+/// Removes the zeros at the end of a number with decimals.
 fn trimmed(number: &str) -> &str {
     if number.contains('.') { number.trim_end_matches('0').trim_end_matches('.') } else { number }
 }

@@ -1,12 +1,11 @@
-//! Output files that appear whole or not at all: a temporary file in the same folder, synced, then renamed.
+//! Output files that appear whole or not at all: a temporary file in the target folder is synced, then renamed.
 //!
-//! A temporary file is locked as long as its process lives. A later run removes those in its output folders
-//! that nobody holds: what a process left that was killed. Several outputs of one run appear together, see
-//! [`OutputSlot::commit_all`].
+//! A temporary file is locked as long as its process lives. A later run removes unlocked temporary files in its output
+//! folders, which killed processes left. Several outputs of one run appear together, see [`OutputSlot::commit_all`].
 //!
-//! In a run of the program ([`begin_run`]) outputs that have their names are still taken back where the run ends
-//! otherwise than with its results: the files that stood there before get their names again. [`end_run`] makes them
-//! final; from there on the exit code is known, and a signal no longer changes it.
+//! In a run of the program ([`begin_run`]), outputs in place are taken back if the run ends without results: the files
+//! that they replaced get their names again. [`end_run`] makes outputs final; from then on the exit code is fixed, and
+//! a signal no longer changes it.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::{Error, ExitCode, Result};
@@ -22,32 +21,32 @@ use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::time::Duration;
 use tempfile::TempPath;
 
-/// What the names of temporary files begin and end with.
+/// Prefix of the names of temporary files.
 const PREFIX: &str = ".flexbody-";
+/// Suffix of the names of temporary files.
 const SUFFIX: &str = ".tmp";
 
-/// A place for one output file, reserved before the work starts.
+/// Place for one output file, reserved before the work starts.
 ///
-/// Making a slot proves that the folder exists and can be written. The target is touched only by
-/// [`OutputSlot::commit`]; dropping the slot removes the temporary file and leaves an existing target as it
-/// is.
+/// Creating a slot proves that the folder exists and can be written. Only [`OutputSlot::commit`] changes the target;
+/// dropping the slot removes the temporary file and leaves an existing target unchanged.
 #[derive(Debug)]
 pub struct OutputSlot {
     asked: PathBuf,
     target: PathBuf,
     temporary: Temporary,
-    /// Properties of the file that stood there when the slot was made.
+    /// Properties of the file that existed when the slot was created.
     replaced: Option<Metadata>,
 }
 
-/// The temporary files and the outputs of this process, for the case that it is interrupted.
+/// Temporary files and outputs of this process, for cleanup after an interruption.
 #[derive(Debug)]
 struct Book {
     /// Temporary files that exist.
     unfinished: Vec<PathBuf>,
-    /// Folders that were searched for what killed processes left.
+    /// Folders that were searched for files of killed processes.
     swept: Vec<PathBuf>,
-    /// Outputs of the run that have their names and can still be taken back.
+    /// Outputs of the run that are in place and can still be taken back.
     placed: Vec<Placed>,
     run: Run,
 }
@@ -55,35 +54,35 @@ struct Book {
 /// State of the run of the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Run {
-    /// The library is used without the program: outputs are final at once.
+    /// No run, as in the library: outputs are final at once.
     None,
     Going,
-    /// The outputs are final, and the process ends with this code.
+    /// Ended run: its outputs are final, and the process ends with this code.
     Ended(ExitCode),
 }
 
 static BOOK: Mutex<Book> =
     Mutex::new(Book { unfinished: Vec::new(), swept: Vec::new(), placed: Vec::new(), run: Run::None });
 
-/// True from the moment on at which the unfinished files are removed; the book is then locked for ever.
+/// True once the unfinished files are being removed; the book then stays locked until the process ends.
 static IS_ABANDONED: AtomicBool = AtomicBool::new(false);
 
 fn book() -> MutexGuard<'static, Book> {
     BOOK.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Begins a run of the program: from here on outputs can be taken back until [`end_run`].
+/// Begins a run of the program: outputs can be taken back until [`end_run`].
 pub fn begin_run() {
     book().run = Run::Going;
 }
 
-/// Waits for ever in a process that an interruption is ending, so that nothing more is printed.
+/// Blocks forever in a process that an interruption is ending, so that nothing more is printed.
 pub fn stand_by() {
     drop(book());
 }
 
-/// Ends the run: the exit code of the process is `code`, and its outputs are final. Where the run `has_results` no
-/// more, they are taken back: what stood in their places before is there again.
+/// Ends the run with exit code `code` and makes its outputs final. If `has_results` is false, the outputs are taken
+/// back, and the files that they replaced are restored.
 pub fn end_run(code: ExitCode, has_results: bool) {
     let mut book = book();
     if has_results {
@@ -95,17 +94,17 @@ pub fn end_run(code: ExitCode, has_results: bool) {
     book.run = Run::Ended(code);
 }
 
-/// Removes the temporary file of every slot and takes outputs back, for a process that ends at once: from here on it
-/// can neither reserve nor finish an output file, and a thread that tries to waits for the end. Outputs that are
-/// being put in place together are waited for.
+/// Removes the temporary file of every slot and takes outputs back, for a process that ends at once. The process can
+/// then neither reserve nor finish an output file; a thread that tries blocks until the end. The function waits for
+/// outputs that are being put in place together.
 ///
-/// Returns the exit code of a run that has ended already: its outputs are final, and nothing is left to do.
+/// Returns the exit code of a run that has already ended: its outputs are final, and nothing remains to be done.
 pub fn abandon_unfinished() -> Option<ExitCode> {
     abandon(book())
 }
 
-/// Does the work of `abandon_unfinished` without memory: allocates nothing and does not wait for long, since the
-/// thread that is out of memory may hold the list itself. The next run removes the files that then stay.
+/// Does the work of `abandon_unfinished` without allocating and with a short timeout, since the thread that is out of
+/// memory may hold the list. The next run removes files that remain.
 pub fn abandon_unfinished_soon() {
     for _ in 0..100 {
         if IS_ABANDONED.load(Ordering::SeqCst) {
@@ -130,7 +129,7 @@ fn abandon(book: MutexGuard<'_, Book>) -> Option<ExitCode> {
     }
     book.take_back();
     for file in &book.unfinished {
-        // Nothing is left to do about a file that cannot be removed.
+        // A file that cannot be removed is left to the next run.
         let _ = std::fs::remove_file(file);
     }
     IS_ABANDONED.store(true, Ordering::SeqCst);
@@ -138,11 +137,10 @@ fn abandon(book: MutexGuard<'_, Book>) -> Option<ExitCode> {
     None
 }
 
-/// A temporary file that the [`Book`] knows as long as it exists, and that is locked as long as this process
-/// lives.
+/// Temporary file that is listed in the [`Book`] as long as it exists, and locked as long as this process lives.
 #[derive(Debug)]
 struct Temporary {
-    /// Both are there until it is finished.
+    /// Path and open file; `None` once the file is finished.
     parts: Option<(TempPath, File)>,
 }
 
@@ -150,7 +148,7 @@ impl Temporary {
     fn make(builder: &tempfile::Builder<'_, '_>, folder: &Path) -> std::io::Result<Self> {
         let mut book = book();
         book.sweep(folder);
-        // Between making and locking it, another process may take a file for abandoned.
+        // Another process may remove the file as abandoned before it is locked: try again.
         for _ in 0..8 {
             let (file, path) = builder.tempfile_in(folder)?.into_parts();
             if lock(&file) && is_at(&file, &path) {
@@ -185,8 +183,8 @@ impl Drop for Temporary {
 }
 
 impl Book {
-    /// Gives the files that stood there before their names again, the last one first: an output may have been put
-    /// in the place of another one of the same run.
+    /// Restores the files that outputs have replaced, in reverse order, since an output may have replaced another one
+    /// of this run.
     fn take_back(&self) {
         self.placed.iter().rev().for_each(Placed::put_back);
     }
@@ -195,7 +193,7 @@ impl Book {
         self.unfinished.retain(|other| other != path);
     }
 
-    /// Removes from `folder` the temporary files of processes that are gone; once for every folder.
+    /// Removes from `folder` the temporary files of processes that have ended; once per folder.
     fn sweep(&mut self, folder: &Path) {
         if self.swept.iter().any(|swept| swept == folder) {
             return;
@@ -212,14 +210,13 @@ impl Book {
     }
 }
 
-/// Locks the file of a slot; false where another process has it already. File systems without locks go
-/// without.
+/// Locks the file of a slot. Returns false if another process holds the lock; true on file systems without locks.
 #[cfg(unix)]
 fn lock(file: &File) -> bool {
     !matches!(file.try_lock(), Err(std::fs::TryLockError::WouldBlock))
 }
 
-/// Elsewhere a lock would keep others from writing, HDF5 among them.
+/// Returns true without a lock: on other systems a lock would prevent HDF5 and others from writing.
 #[cfg(not(unix))]
 fn lock(_: &File) -> bool {
     true
@@ -228,9 +225,9 @@ fn lock(_: &File) -> bool {
 #[cfg(unix)]
 fn remove_if_abandoned(path: &Path) {
     let Ok(file) = OpenOptions::new().read(true).write(true).open(path) else { return };
-    // A file system without locks says nothing about who holds a file.
+    // On a file system without locks it is unknown who holds a file.
     if file.try_lock().is_ok() && is_at(&file, path) {
-        // Somebody else's that cannot be removed does no harm.
+        // A file of another user that cannot be removed does no harm.
         let _ = std::fs::remove_file(path);
     }
 }
@@ -238,7 +235,7 @@ fn remove_if_abandoned(path: &Path) {
 #[cfg(not(unix))]
 fn remove_if_abandoned(_: &Path) {}
 
-/// Whether the open `file` is the one that has this name.
+/// Returns true if the open `file` is the one at `path`.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -252,14 +249,13 @@ fn is_at(_: &File, _: &Path) -> bool {
 }
 
 impl OutputSlot {
-    /// Reserves `path`. A symbolic link is followed, so that the file it points to is replaced or made, not
-    /// the link.
+    /// Reserves `path`. A symbolic link is followed: its target is replaced or created, not the link.
     ///
     /// # Errors
-    /// [`OutputNotFile`](Code::OutputNotFile) when `path` is a folder, a device, empty or a circle of links;
-    /// [`OutputFolderMissing`](Code::OutputFolderMissing) when the folder does not exist;
-    /// [`OutputForbidden`](Code::OutputForbidden) when `path` is a write-protected file, or no file may be made in
-    /// the folder; [`OutputUnwritable`](Code::OutputUnwritable) when none can be made there.
+    /// [`OutputNotFile`](Code::OutputNotFile) if `path` is a folder, a device, empty or a circle of links;
+    /// [`OutputFolderMissing`](Code::OutputFolderMissing) if the folder does not exist;
+    /// [`OutputForbidden`](Code::OutputForbidden) if `path` is a write-protected file, or the folder permits no new
+    /// file; [`OutputUnwritable`](Code::OutputUnwritable) if no file can be created for another reason.
     pub fn prepare(path: impl AsRef<Path>) -> Result<Self> {
         let asked = path.as_ref().to_path_buf();
         let target = target_of(&asked)?;
@@ -282,8 +278,8 @@ impl OutputSlot {
         }
         let mut builder = tempfile::Builder::new();
         builder.prefix(PREFIX).suffix(SUFFIX);
-        // Temporary files are private by default. A new output has mode 666 less the umask; one that replaces a file
-        // gets the mode of that at the end, and nobody else reads it before.
+        // Temporary files are private by default. A new output has mode 666 minus the umask. One that replaces a file
+        // gets its mode at the end, and is private until then.
         let replaced = std::fs::metadata(&target).ok();
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(match replaced {
@@ -294,17 +290,17 @@ impl OutputSlot {
         Ok(Self { asked, target, temporary, replaced })
     }
 
-    /// The path as the user gave it.
+    /// Returns the path as the user gave it.
     pub fn path(&self) -> &Path {
         &self.asked
     }
 
-    /// The temporary file, for writers that need a path of their own.
+    /// Returns the path of the temporary file, for writers that need a path.
     pub fn temporary(&self) -> &Path {
         self.temporary.path()
     }
 
-    /// The error for a write to [`OutputSlot::temporary`] that failed in somebody else's hands.
+    /// Returns the error for a failed write to [`OutputSlot::temporary`] by another writer.
     pub fn failure(&self, error: &std::io::Error) -> Error {
         io(&self.asked, error)
     }
@@ -312,16 +308,17 @@ impl OutputSlot {
     /// Writes `bytes` and commits.
     ///
     /// # Errors
-    /// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable).
+    /// [`DiskShort`](Code::DiskShort), [`OutputForbidden`](Code::OutputForbidden) or
+    /// [`OutputUnwritable`](Code::OutputUnwritable) if the file cannot be written.
     pub fn write(self, bytes: &[u8]) -> Result<()> {
         self.fill(bytes)?;
         self.commit()
     }
 
-    /// Writes `bytes` to the temporary file; they appear with [`OutputSlot::commit`].
+    /// Writes `bytes` to the temporary file. They appear at the target with [`OutputSlot::commit`].
     ///
     /// # Errors
-    /// As [`OutputSlot::write`].
+    /// The errors of [`OutputSlot::write`].
     pub fn fill(&self, bytes: &[u8]) -> Result<()> {
         let written = OpenOptions::new()
             .write(true)
@@ -331,30 +328,30 @@ impl OutputSlot {
         written.map_err(|e| self.failure(&e))
     }
 
-    /// Makes the temporary file the output: flushes it to the disk, then renames it over the target.
+    /// Flushes the temporary file to the disk and renames it to the target.
     ///
     /// # Errors
-    /// As [`OutputSlot::write`].
+    /// The errors of [`OutputSlot::commit_all`].
     pub fn commit(self) -> Result<()> {
         Self::commit_all([self])
     }
 
-    /// Does the work of [`OutputSlot::commit_all`] for files that stay however the run ends: the ledger
-    /// of a batch, the folder of a cluster.
+    /// Does the work of [`OutputSlot::commit_all`] for files that remain however the run ends: the ledger of a batch,
+    /// the folder of a cluster.
     ///
     /// # Errors
-    /// Every error of [`OutputSlot::commit_all`].
+    /// The errors of [`OutputSlot::commit_all`].
     pub fn keep_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
         Self::place(slots, Lasting::Final)
     }
 
-    /// Makes the temporary files the outputs, all of them or none: every file is on the disk before the first
-    /// gets its name, and a signal that ends the program waits until all have theirs. Where one cannot be put
-    /// in place, what stood in the places of the others before comes back, on file systems with hard links; so it does
-    /// where a run of the program ends without results after this.
+    /// Puts all files in place, or none. Every file is on the disk before the first is renamed, and a signal that ends
+    /// the program waits until all are renamed. If one cannot be put in place, the files that the others replaced are
+    /// restored, on file systems with hard links. They are also restored if the run later ends without results.
     ///
     /// # Errors
-    /// Every error of [`OutputSlot::write`]; [`Usage`](Code::Usage) where one would replace a file that the run read.
+    /// The errors of [`OutputSlot::write`]; [`Usage`](Code::Usage) if an output would replace a file that the run has
+    /// read.
     pub fn commit_all(slots: impl IntoIterator<Item = Self>) -> Result<()> {
         Self::place(slots, Lasting::UntilEndOfRun)
     }
@@ -371,8 +368,8 @@ impl OutputSlot {
             slot.temporary.file().sync_all().map_err(|e| slot.failure(&e))?;
         }
         let placed = place_all(&mut slots, lasting);
-        // The renames themselves are durable once the folders are synced; where folders cannot be opened they
-        // are so already or cannot be made so, and the files are in place either way.
+        // The renames are durable once the folders are synced. If a folder cannot be opened, syncing is unnecessary or
+        // impossible; the files are in place in any case.
         let mut folders: Vec<&Path> = slots.iter().map(|slot| folder_of(&slot.target)).collect();
         folders.dedup();
         for folder in folders {
@@ -383,45 +380,45 @@ impl OutputSlot {
         placed
     }
 
-    /// Another name for the file that stands in the place, for the case that it has to come back.
+    /// Creates another name for the file at the target, from which it can be restored.
     fn keep_old(&self) -> Option<Old> {
         let mut name = self.temporary.path().file_name()?.to_os_string();
         name.push(SUFFIX);
         let path = self.temporary.path().with_file_name(name);
         std::fs::hard_link(&self.target, &path).ok()?;
-        // A shared lock keeps other runs from removing it as abandoned, and no reader from the file.
+        // A shared lock keeps other runs from removing the file as abandoned, without blocking readers.
         let lock = File::open(&path).ok().filter(|file| file.try_lock_shared().is_ok());
         Some(Old { path, _lock: lock })
     }
 }
 
-/// Time during which an output that has its name can be taken back.
+/// Period in which an output that is in place can be taken back.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Lasting {
     Final,
     UntilEndOfRun,
 }
 
-/// Another name of a file that an output has replaced.
+/// Additional name of a file that an output has replaced.
 #[derive(Debug)]
 struct Old {
     path: PathBuf,
     _lock: Option<File>,
 }
 
-/// An output in its place, and what is needed to undo that.
+/// Output in its place, with the data for undoing it.
 #[derive(Debug)]
 struct Placed {
     target: PathBuf,
-    /// The output itself, locked: a file that another process has put there since is not touched.
+    /// Open, locked output: a file that another process has put in its place is not touched.
     file: File,
     old: Option<Old>,
     replaced: bool,
 }
 
-/// Renames all files, or puts back what stood there before.
+/// Renames all files, or restores the replaced files.
 fn place_all(slots: &mut [OutputSlot], lasting: Lasting) -> Result<()> {
-    // Held until the end: who abandons the unfinished waits for it.
+    // Held until the end, so that `abandon` waits.
     let mut book = book();
     let is_final = lasting == Lasting::Final || book.run != Run::Going;
     let is_undoable = slots.len() > 1 || !is_final;
@@ -450,11 +447,11 @@ fn place_all(slots: &mut [OutputSlot], lasting: Lasting) -> Result<()> {
 
 impl Placed {
     fn forget_old(&self) {
-        // One that stays is removed by the next run.
+        // A file that remains is removed by the next run.
         let _ = self.old.as_ref().map(|old| std::fs::remove_file(&old.path));
     }
 
-    /// Undoes the rename. What cannot be undone stays as it is; the error of the run is told all the same.
+    /// Undoes the rename as far as possible. Errors are ignored: the error of the run is reported.
     fn put_back(&self) {
         if !is_at(&self.file, &self.target) {
             return self.forget_old();
@@ -467,7 +464,7 @@ impl Placed {
     }
 }
 
-/// The file that `asked` stands for, which exists and can be replaced, or does not exist.
+/// Returns the file that `asked` refers to: one that exists and can be replaced, or one that does not exist.
 fn target_of(asked: &Path) -> Result<PathBuf> {
     let not_a_file = |why: &str| fail(Code::OutputNotFile, asked, why.to_owned());
     if asked.as_os_str().is_empty() {
@@ -489,7 +486,7 @@ fn target_of(asked: &Path) -> Result<PathBuf> {
             ErrorKind::NotFound => not_a_file("the file that it leads to has been removed"),
             _ => io(asked, &e),
         }),
-        // A name that is too long: the temporary file, whose own is short, would not show it.
+        // The name is too long: the temporary file, with its short name, would not reveal this.
         Err(e) if e.kind() == ErrorKind::InvalidFilename => Err(not_a_file(&e.to_string())),
         Err(_) => followed(asked).map_err(|e| not_a_file(&e.to_string())),
     }
@@ -507,7 +504,7 @@ fn io(path: &Path, error: &std::io::Error) -> Error {
     fail(code_of(error), path, error.to_string())
 }
 
-/// The code of an output that cannot be made or written for this reason.
+/// Returns the code for an output that cannot be created or written because of `error`.
 pub fn code_of(error: &std::io::Error) -> Code {
     match error.kind() {
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => Code::DiskShort,

@@ -1,4 +1,4 @@
-//! What a result was made from: fingerprints of the input files and the generator's name.
+//! Provenance of a result: fingerprints of the input files and the name of the generator.
 
 use crate::diagnostic::Diagnostic;
 use crate::read_files::open_regular;
@@ -7,42 +7,42 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::{Arc, LazyLock};
 
-/// One input file of a model.
+/// Input file of a model.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct SourceFile {
-    /// `manifest`, `stiffness`, `mass`, `nodes`, `dofs`, `interface`, `scene`, `history`.
+    /// Role: `manifest`, `stiffness`, `mass`, `nodes`, `dofs`, `interface`, `scene`, `history`, ...
     pub role: String,
-    /// File name without folders: results do not depend on where the model lies.
+    /// File name without folders, so that results do not depend on the location of the model.
     pub name: String,
     /// SHA-256 of the bytes on disk (compressed files: as stored), lowercase hex.
     pub sha256: String,
 }
 
 impl SourceFile {
-    /// A file at `path`, of which only the name is kept.
+    /// Creates the entry of the file at `path`, of which only the name is kept.
     pub fn new(role: &str, path: &Path, sha256: String) -> Self {
         let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
         Self { role: role.to_owned(), name, sha256 }
     }
 }
 
-/// The input files of a model. Their fingerprints are taken when somebody asks for them first: a file of gigabytes takes
-/// seconds, in which something else may have to wait for a single thread.
+/// Input files of a model. Their fingerprints are computed at the first access: a file of gigabytes takes seconds,
+/// which could delay other work on a single thread.
 #[derive(Clone)]
 pub struct Sources(Arc<LazyLock<Result<Vec<SourceFile>, Diagnostic>, Find>>);
 
 type Find = Box<dyn FnOnce() -> Result<Vec<SourceFile>, Diagnostic> + Send>;
 
 impl Sources {
-    /// Those that `find` finds.
+    /// Creates a list that `find` computes at the first access.
     pub fn later(find: impl FnOnce() -> Result<Vec<SourceFile>, Diagnostic> + Send + 'static) -> Self {
         Self(Arc::new(LazyLock::new(Box::new(find))))
     }
 
-    /// Takes the fingerprints that were not taken while reading.
+    /// Computes the fingerprints that were not taken while reading.
     ///
     /// # Errors
-    /// FB101, FB132 for a file that is no longer the one that was read.
+    /// FB101, FB132 for a file that has changed since it was read.
     pub fn find(&self) -> Result<(), Diagnostic> {
         LazyLock::force(&self.0).as_ref().map(|_| ()).map_err(Diagnostic::clone)
     }
@@ -57,7 +57,7 @@ impl Default for Sources {
 impl Deref for Sources {
     type Target = [SourceFile];
 
-    /// The files; none where [`Self::find`] fails.
+    /// Returns the files; empty if [`Self::find`] fails.
     fn deref(&self) -> &[SourceFile] {
         self.0.as_ref().as_ref().map_or(&[], Vec::as_slice)
     }
@@ -75,12 +75,12 @@ impl std::fmt::Debug for Sources {
     }
 }
 
-/// Name and version written into every output.
+/// Returns the name and version that are written into every output.
 pub fn generator() -> String {
     format!("flexbody {}", env!("CARGO_PKG_VERSION"))
 }
 
-/// SHA-256 of bytes that come piece by piece.
+/// SHA-256 of bytes that arrive piece by piece.
 #[derive(Debug, Clone, Default)]
 pub struct Fingerprint(sha2::Sha256);
 
@@ -91,7 +91,7 @@ impl Fingerprint {
         self.0.update(bytes);
     }
 
-    /// SHA-256 of all bytes so far, in lowercase hex.
+    /// Returns the SHA-256 of all bytes so far, in lowercase hex.
     pub fn hex(self) -> String {
         use sha2::Digest;
         use std::fmt::Write;
@@ -103,17 +103,17 @@ impl Fingerprint {
     }
 }
 
-/// SHA-256 of `bytes` in lowercase hex.
+/// Returns the SHA-256 of `bytes`, in lowercase hex.
 pub fn sha256_hex(bytes: &[u8]) -> String {
     let mut fingerprint = Fingerprint::default();
     fingerprint.update(bytes);
     fingerprint.hex()
 }
 
-/// SHA-256 of all that a file holds in lowercase hex; it is read piece by piece.
+/// Returns the SHA-256 of the content of a file, in lowercase hex. The file is read piece by piece.
 ///
 /// # Errors
-/// Those of reading it.
+/// The errors of reading the file.
 pub fn sha256_of_file(path: &Path) -> std::io::Result<String> {
     let (mut file, mut fingerprint) = (open_regular(path)?, Fingerprint::default());
     let mut piece = vec![0; 1 << 20];

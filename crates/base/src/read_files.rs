@@ -1,8 +1,7 @@
-//! Files that a run has read. An output must not replace one of them, under whatever name it is given.
+//! Record of the files that a run has read. An output must not replace one of them, under whatever name it is given.
 //!
-//! Whoever opens a file of an input notes it here ([`note_read`]); before the outputs of a run get their names, each is
-//! held to what was read. Files that a run keeps for itself and reads again (the ledger of a batch) are
-//! opened without a note.
+//! Code that opens an input file records it here ([`note_read`]). Before the outputs of a run are put in place, each is
+//! compared with the record. Files that a run itself writes and reads (the ledger of a batch) are not recorded.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::error::Result;
@@ -11,22 +10,22 @@ use std::io::{Error, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Most symbolic links that one path may lead through, as on Linux.
+/// Largest number of symbolic links in one path, as on Linux.
 const MOST_LINKS: usize = 40;
 
-/// Files read since the run began; `None` outside of a run of the program, where a file may be read and replaced.
+/// Files read since the run began; `None` outside a run of the program, where a file may be read and replaced.
 static READ: Mutex<Option<Vec<FileIdentity>>> = Mutex::new(None);
 
 fn read() -> MutexGuard<'static, Option<Vec<FileIdentity>>> {
     READ.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Begins a run of the program: from here on files that are read are noted.
+/// Begins a run of the program: files that are read are recorded from now on.
 pub fn begin_run() {
     *read() = Some(Vec::new());
 }
 
-/// Notes that a file of an input was opened.
+/// Records that an input file was opened.
 pub fn note_read(path: &Path) {
     if let Some(files) = read().as_mut() {
         let file = FileIdentity::of(path);
@@ -39,7 +38,7 @@ pub fn note_read(path: &Path) {
 /// Refuses an output that would replace a file that this run has read.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage).
+/// [`Usage`](Code::Usage) if the output is a recorded file.
 pub fn refuse_read(output: &Path) -> Result<()> {
     let of_run = read();
     let Some(files) = of_run.as_ref() else { return Ok(()) };
@@ -50,25 +49,25 @@ pub fn refuse_read(output: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The diagnostic for an output that is an input too.
+/// Returns the diagnostic for an output that is also an input.
 pub fn replaces(output: &Path) -> Diagnostic {
     let message = format!("output {} is an input or another output of this run", output.display());
     Diagnostic::new(Code::Usage, message).with_help("choose another output name")
 }
 
-/// File that a path names, however the path is spelt.
+/// Identity of the file that a path refers to, independent of the spelling of the path.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileIdentity {
     path: PathBuf,
-    /// Device and number of an existing file: the same for all of its names.
+    /// Device and inode of an existing file, which all its names share.
     file: Option<(u64, u64)>,
 }
 
 impl FileIdentity {
-    /// Of a file that exists or not.
+    /// Returns the identity of the file at `path`, which need not exist.
     pub fn of(path: &Path) -> Self {
         let followed = followed(path).unwrap_or_else(|_| path.to_path_buf());
-        // A file that does not exist yet has a folder that does.
+        // For a file that does not exist yet, resolve its folder.
         let in_folder = || {
             let folder = followed.parent().filter(|folder| !folder.as_os_str().is_empty());
             Some(std::fs::canonicalize(folder.unwrap_or(Path::new("."))).ok()?.join(followed.file_name()?))
@@ -78,17 +77,18 @@ impl FileIdentity {
         Self { file: file_number(&path), path }
     }
 
-    /// True if both are one file: the same place, or two names of the same file.
+    /// Returns true if both are one file: equal paths, or two names of one file.
     pub fn is_same(&self, other: &Self) -> bool {
         self.path == other.path || (self.file.is_some() && self.file == other.file)
     }
 }
 
-/// Opens a regular file. A pipe is refused at once, where opening it would wait for its writer, and so is a device,
-/// which may never end.
+/// Opens a regular file. A pipe is refused, since opening it would wait for its writer; so is a device, which may never
+/// end.
 ///
 /// # Errors
-/// Every error of opening the file, and [`ErrorKind::InvalidInput`] if it is something else.
+/// The errors of opening the file; [`ErrorKind::InvalidInput`] or [`ErrorKind::IsADirectory`] if it is not a regular
+/// file.
 pub fn open_regular(path: &Path) -> std::io::Result<File> {
     let meta = std::fs::metadata(path)?;
     if meta.is_dir() {
@@ -103,7 +103,7 @@ pub fn open_regular(path: &Path) -> std::io::Result<File> {
 /// Reads a regular file of at most `most` bytes as text.
 ///
 /// # Errors
-/// Every error of [`open_regular`] and of reading; [`ErrorKind::FileTooLarge`] if the file is longer.
+/// The errors of [`open_regular`] and of reading; [`ErrorKind::FileTooLarge`] if the file is longer.
 pub fn read_text(path: &Path, most: u64) -> std::io::Result<String> {
     let mut text = String::new();
     open_regular(path)?.take(most + 1).read_to_string(&mut text)?;
@@ -113,11 +113,10 @@ pub fn read_text(path: &Path, most: u64) -> std::io::Result<String> {
     Ok(text)
 }
 
-/// The file that an output path stands for: symbolic links are followed, to a file that does not exist yet as
-/// well.
+/// Returns the file that an output path refers to. Symbolic links are followed, also to a file that does not exist yet.
 ///
 /// # Errors
-/// Links that lead in a circle.
+/// Links that form a circle, and the errors of reading a link.
 pub fn followed(path: &Path) -> std::io::Result<PathBuf> {
     let mut at = path.to_path_buf();
     for _ in 0..MOST_LINKS {

@@ -1,6 +1,6 @@
-//! Unit systems: numbers stay in the model's own units; these name them and give their size in SI.
+//! Unit systems: numbers stay in the units of the model; unit systems name these and give their size in SI.
 
-/// A unit of length, mass or time: its name as the user wrote it and its size in SI.
+/// Unit of length, mass or time: its name as the user wrote it and its size in SI.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Unit {
     name: String,
@@ -8,12 +8,12 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// Name as the user wrote it (`mm`, `tonne`, or a number).
+    /// Returns the name as the user wrote it (`mm`, `tonne`, or a number).
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// Its size in m, kg or s.
+    /// Returns the size in m, kg or s.
     pub fn to_si(&self) -> f64 {
         self.to_si
     }
@@ -44,7 +44,7 @@ const MASS: &[(&str, f64)] = &[
 
 const TIME: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
-/// The units of a model. Force, stress and frequency units follow from these three.
+/// Units of a model. The units of force, stress and frequency follow from the three base units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnitSystem {
     /// Unit of length.
@@ -53,12 +53,12 @@ pub struct UnitSystem {
     pub mass: Unit,
     /// Unit of time.
     pub time: Unit,
-    /// True if the user stated them; else they are m, kg, s.
+    /// True if the user stated the units; otherwise they are m, kg and s.
     pub stated: bool,
 }
 
 impl UnitSystem {
-    /// Reads three unit names (or factors to SI); `Err` gives the name that is not known.
+    /// Parses three unit names (or factors to SI); `Err` names the unknown unit.
     pub fn parse(length: &str, mass: &str, time: &str) -> Result<Self, String> {
         Ok(Self {
             length: Unit::parse(length, LENGTH).ok_or_else(|| format!("length `{length}`"))?,
@@ -68,24 +68,24 @@ impl UnitSystem {
         })
     }
 
-    /// One frequency unit (cycles per time unit) in hertz.
+    /// Returns one frequency unit (cycles per time unit) in hertz.
     pub fn hertz(&self) -> f64 {
         1.0 / self.time.to_si()
     }
 
-    /// f = sqrt(lambda) / (2 pi) in hertz, for an eigenvalue lambda in 1/time^2.
+    /// Returns f = sqrt(lambda) / (2 pi) in hertz, for an eigenvalue lambda in 1/time^2.
     pub fn frequency_of(&self, eigenvalue: f64) -> f64 {
         eigenvalue.sqrt() / std::f64::consts::TAU * self.hertz()
     }
 
-    /// lambda = (2 pi f)^2 in 1/time^2, for a frequency f in hertz.
+    /// Returns lambda = (2 pi f)^2 in 1/time^2, for a frequency f in hertz.
     pub fn eigenvalue_of(&self, frequency_hz: f64) -> f64 {
         (std::f64::consts::TAU * frequency_hz / self.hertz()).powi(2)
     }
 }
 
 impl Default for UnitSystem {
-    /// m, kg, s, not stated.
+    /// Returns m, kg and s, not stated by the user.
     fn default() -> Self {
         let mut units = Self::parse("m", "kg", "s").expect("names of the tables");
         units.stated = false;

@@ -1,4 +1,4 @@
-//! The list of bodies of a batch: `LIST.toml`.
+//! List of the bodies of a batch: `LIST.toml`.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -6,21 +6,21 @@ use flexbody_base::read_files::{note_read, read_text};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
-/// Most bytes of a list: some hundred thousand bodies.
+/// Largest size of a list in bytes: some hundred thousand bodies.
 const MOST: u64 = 64 << 20;
 
-/// Bodies to make, and what the machine may give them.
+/// Bodies to make, and the resources for them.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BatchList {
-    /// Conversions that run at the same time, at the most.
+    /// Largest number of conversions that run in parallel.
     pub parallel: Option<usize>,
-    /// Threads of each.
+    /// Number of threads of each conversion.
     pub threads: Option<u16>,
-    /// Words that every conversion gets.
+    /// Command-line options of every conversion.
     #[serde(default)]
     pub options: Vec<String>,
-    /// The bodies.
+    /// Bodies of the list.
     #[serde(rename = "body", default)]
     pub bodies: Vec<BatchBody>,
 }
@@ -29,21 +29,21 @@ pub struct BatchList {
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BatchBody {
-    /// Manifest or job, from the folder of the list.
+    /// Manifest or job, relative to the folder of the list.
     pub model: PathBuf,
-    /// Flex-body file to write, from the folder of the list.
+    /// Flex-body file to write, relative to the folder of the list.
     pub output: PathBuf,
-    /// Words that its conversion gets beside those of all.
+    /// Command-line options of this conversion, in addition to the common ones.
     #[serde(default)]
     pub options: Vec<String>,
-    /// Bytes that it needs, where they are known better than by the estimate.
+    /// Memory of the conversion in bytes, if it is better known than by the estimate.
     pub memory: Option<u64>,
 }
 
-/// Reads a list; paths are those from its folder.
+/// Reads a list. Paths are resolved relative to its folder.
 ///
 /// # Errors
-/// [`BatchSyntax`](Code::BatchSyntax) for what is not as it should be.
+/// [`BatchSyntax`](Code::BatchSyntax) for a list that cannot be read or is invalid.
 pub fn read_batch_list(path: &Path) -> Result<BatchList> {
     let wrong = |message: String| Error::from(Diagnostic::new(Code::BatchSyntax, message).in_file(path));
     note_read(path);

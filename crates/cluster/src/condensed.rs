@@ -1,21 +1,22 @@
-//! The products of condensation that a cluster makes: G = X' M X of X = [Phi, T_b Psi for each axis b, Psi], with
-//! the rigid modes Phi, the modes Psi and the matrix T_b that turns displacements about the axis b. G holds every
-//! integral of positions and shapes that the invariants are made of. They are computed anew from M here; G is held
-//! to M, so that a cluster that multiplied wrongly does not go unnoticed.
+//! Condensation products of a cluster: G = X' M X of X = [Phi, T_b Psi for each axis b, Psi], with the rigid modes Phi,
+//! the modes Psi and the matrix T_b that turns displacements about the axis b. G holds every integral of positions and
+//! shapes that the invariants consist of. The invariants are computed from M on this machine; G is compared with M, so
+//! that wrong products of a cluster are detected.
 
 use super::row_order::{RowOrder, TurnedRows};
 use faer::{Mat, MatRef};
 use flexbody_linalg::{combine, gram, larger, uniform};
 use flexbody_model::FeModel;
 
-/// Columns of random numbers by which G is tried.
+/// Number of random columns for the check of G.
 const TRIALS: usize = 2;
+/// Seed of the random columns.
 const SEED: u64 = 21;
 
-/// Largest difference of G v and X' M X v that rounding explains, as [`Condensed::difference`] has it.
+/// Largest difference of G v and X' M X v that rounding explains, in the measure of [`Condensed::difference`].
 pub(super) const CONDENSED_ROUNDING: f64 = 1e-11;
 
-/// X, without its columns.
+/// Operator X, without stored columns.
 pub(super) struct Condensed<'a> {
     model: &'a FeModel,
     turns: Vec<TurnedRows<'a>>,
@@ -33,13 +34,13 @@ impl<'a> Condensed<'a> {
         Self { model, turns: TurnedRows::of(model, order), rigid, modes }
     }
 
-    /// Number of columns of X.
+    /// Returns the number of columns of X.
     pub(crate) fn columns(&self) -> usize {
         self.block(self.turns.len() + 1)
     }
 
-    /// Largest difference of G v and X' M X v for random columns v, relative to sqrt(max G_ii) sqrt(v' G v):
-    /// by Cauchy and Schwarz, the largest that an entry of G v can be.
+    /// Returns the largest difference of G v and X' M X v for random columns v, relative to sqrt(max G_ii) sqrt(v' G
+    /// v): by the Cauchy-Schwarz inequality, the largest possible entry of G v.
     pub(crate) fn difference(&self, g: MatRef<'_, f64>) -> f64 {
         let v = Mat::from_fn(self.columns(), TRIALS, |i, j| uniform(SEED, i as u64, j as u64));
         let momentum = self.model.pencil().apply_mass(self.combined(v.as_ref()).as_ref());
@@ -52,12 +53,12 @@ impl<'a> Condensed<'a> {
         (0..TRIALS).map(relative).fold(0.0, larger)
     }
 
-    /// Where a block of columns of X begins, after the rigid modes: turned modes for each axis, then the modes.
+    /// Returns the first column of a block of X: turned modes for each axis, then the modes, after the rigid modes.
     fn block(&self, of: usize) -> usize {
         self.rigid.ncols() + of * self.modes.ncols()
     }
 
-    /// X v.
+    /// Returns X v.
     fn combined(&self, v: MatRef<'_, f64>) -> Mat<f64> {
         let part = |of: usize| combine(self.modes, v.subrows(self.block(of), self.modes.ncols()));
         let mut sum = combine(self.rigid, v.subrows(0, self.rigid.ncols())) + part(self.turns.len());
@@ -71,7 +72,7 @@ impl<'a> Condensed<'a> {
         sum
     }
 
-    /// X' w.
+    /// Returns X' w.
     fn projected(&self, w: MatRef<'_, f64>) -> Mat<f64> {
         let count = self.modes.ncols();
         let mut all = Mat::zeros(self.columns(), w.ncols());

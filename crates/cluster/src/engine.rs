@@ -1,4 +1,4 @@
-//! The driver, run here: MPI and the Python packages of PETSc and SLEPc, where they are at hand.
+//! Local run of the driver, with MPI and the Python packages of PETSc and SLEPc.
 
 use super::prepare::DRIVER_SOURCE;
 use super::prepared::DRIVER;
@@ -9,25 +9,25 @@ use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-/// How the driver solves.
+/// Solver of the driver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Solver {
-    /// Shift-invert Krylov-Schur on a factor of MUMPS.
+    /// Shift-invert Krylov-Schur with a factor of MUMPS.
     #[default]
     Mumps,
     /// Spectrum slicing.
     Slices,
-    /// Krylov-Schur on conjugate gradients with algebraic multigrid.
+    /// Krylov-Schur with conjugate gradients and algebraic multigrid.
     Gamg,
     /// LOBPCG with algebraic multigrid.
     Lobpcg,
 }
 
 impl Solver {
-    /// Every solver, in the order of the documentation.
+    /// All solvers, in the order of the documentation.
     pub const ALL: [Self; 4] = [Self::Mumps, Self::Slices, Self::Gamg, Self::Lobpcg];
 
-    /// Name for the driver and on the command line.
+    /// Returns the name for the driver and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mumps => "mumps",
@@ -38,31 +38,31 @@ impl Solver {
     }
 }
 
-/// The programs that run the driver.
+/// Programs that run the driver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Engine {
-    /// Words that start MPI, as `mpiexec --oversubscribe`.
+    /// Command and options that start MPI, such as `mpiexec --oversubscribe`.
     pub mpiexec: Vec<String>,
-    /// Python with petsc4py and slepc4py; `None`: the first of the usual ones that has them.
+    /// Python with petsc4py and slepc4py; `None` for the first default one that has them.
     pub python: Option<String>,
-    /// Ranks.
+    /// Number of MPI ranks.
     pub ranks: u32,
-    /// How to solve.
+    /// Solver.
     pub solver: Solver,
 }
 
-/// Pythons that are tried where none is named.
+/// Python interpreters that are tested by default.
 const PYTHONS: [&str; 2] = ["python3", "/usr/bin/python3"];
 
-/// Options that keep Python from loading packages of the current folder, of the folder of the driver and of PYTHONPATH:
-/// data lie there. Since Python 3.11 it includes `-P`, which older ones do not know.
+/// Options that keep Python from loading packages of the current folder, of the folder of the driver and of PYTHONPATH,
+/// which may hold untrusted data. Since Python 3.11 `-I` includes `-P`, which older versions do not support.
 const ISOLATED: [&str; 1] = ["-I"];
 
 impl Engine {
-    /// The Python that has the packages.
+    /// Returns a Python that has the packages.
     ///
     /// # Errors
-    /// [`EngineMissing`](Code::EngineMissing) with what the last one that was tried said.
+    /// [`EngineMissing`](Code::EngineMissing) with the message of the last interpreter that was tested.
     pub fn find_python(&self) -> Result<String> {
         let candidates: Vec<&str> = match &self.python {
             Some(own) => vec![own],
@@ -80,10 +80,10 @@ impl Engine {
             .into())
     }
 
-    /// Makes sure, before anything is written, that the driver can be run; the Python for it.
+    /// Checks, before anything is written, that the driver can be run. Returns the Python for it.
     ///
     /// # Errors
-    /// [`EngineMissing`](Code::EngineMissing).
+    /// [`EngineMissing`](Code::EngineMissing) if MPI or the packages are missing.
     pub fn check(&self) -> Result<String> {
         let program = self.mpiexec.first().map_or("", String::as_str);
         let mut version = Command::new(program);
@@ -95,8 +95,8 @@ impl Engine {
     /// Runs the driver on a prepared folder and waits for it.
     ///
     /// # Errors
-    /// [`EngineMissing`](Code::EngineMissing) where MPI cannot be started;
-    /// [`EngineFailed`](Code::EngineFailed) where the driver ends without a result.
+    /// [`EngineMissing`](Code::EngineMissing) if MPI cannot be started; [`EngineFailed`](Code::EngineFailed) if the
+    /// driver ends without a result.
     pub fn run(&self, python: &str, folder: &Path) -> Result<()> {
         let Some((program, options)) = self.mpiexec.split_first() else {
             return Err(Diagnostic::new(Code::EngineMissing, "no program is named that starts MPI").into());
@@ -109,7 +109,7 @@ impl Engine {
             .arg(folder.join(DRIVER))
             .arg(folder)
             .args(["--solver", self.solver.name()]);
-        // Threads of BLAS beside the ranks would take their processors.
+        // Threads of BLAS would compete with the ranks for processors.
         command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1").stdin(Stdio::null());
         let output = children::output(&mut command).map_err(|e| missing(program, &e))?;
         if output.status.success() {
@@ -124,7 +124,7 @@ fn missing(program: &str, error: &std::io::Error) -> Diagnostic {
     Diagnostic::new(Code::EngineMissing, format!("`{program}` cannot be started: {error}"))
 }
 
-/// Hands the driver to a Python, to say which packages it finds.
+/// Runs the driver in a Python to test which packages it finds.
 fn probe(python: &str) -> std::io::Result<Output> {
     let mut command = Command::new(python);
     command
@@ -135,13 +135,13 @@ fn probe(python: &str) -> std::io::Result<Output> {
         .stderr(Stdio::piped());
     let mut child = children::start(&mut command)?;
     if let Some(mut input) = child.stdin.take() {
-        // A program that does not read it says itself what it is.
+        // A program that does not read its input reports its own error.
         let _ = input.write_all(DRIVER_SOURCE.as_bytes());
     }
     children::output_of(child)
 }
 
-/// What a program said about its failure: its own message where it has one, else its last line.
+/// Returns the reason of a failure: the error message of the program if there is one, else its last line.
 fn cause(output: &Output) -> String {
     let text = String::from_utf8_lossy(&output.stderr);
     let own = text.lines().find(|line| line.starts_with("error") || line.contains("exited on signal"));

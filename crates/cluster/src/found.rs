@@ -1,5 +1,5 @@
-//! What a cluster found: `result.jsonl`, `modes.petsc` and `condensed.petsc`, held to the model and to what was
-//! prepared.
+//! Result of a cluster: `result.jsonl`, `modes.petsc` and `condensed.petsc`, compared with the model and the prepared
+//! files.
 
 use super::condensed::{CONDENSED_ROUNDING, Condensed};
 use super::petsc::{IndexBytes, read_vector};
@@ -24,14 +24,14 @@ const CHECKPOINT: &str = "checkpoint.jsonl";
 const MODES: &str = "modes.petsc";
 const CONDENSED: &str = "condensed.petsc";
 
-/// What the driver writes.
+/// Content of the result file of the driver.
 #[derive(Debug, Clone, Deserialize)]
 struct ResultFile {
     matrices: String,
     modes: usize,
     index_bytes: u64,
     modes_sha256: String,
-    /// Not in the results of earlier programs.
+    /// Digest of the condensation products; missing in results of earlier versions.
     condensed_sha256: Option<String>,
     eigenvalues: Vec<f64>,
     next_eigenvalue: Option<f64>,
@@ -54,7 +54,7 @@ struct CountFile {
     by: String,
 }
 
-/// What it keeps on the way.
+/// Content of the checkpoint of the driver.
 #[derive(Debug, Clone, Deserialize)]
 struct CheckpointFile {
     matrices: String,
@@ -66,12 +66,12 @@ struct Part {
     vectors: usize,
 }
 
-/// Modes that a cluster found, and how.
+/// Modes that a cluster found, with information about the computation.
 #[derive(Debug, Clone)]
 pub struct ClusterModes {
-    /// The modes, in the rows of the model.
+    /// Modes, in the rows of the model.
     pub modes: SolvedModes,
-    /// How they were found, in words.
+    /// Description of the computation.
     pub told: String,
     /// Seconds of each phase on the cluster.
     pub seconds: BTreeMap<String, f64>,
@@ -79,13 +79,13 @@ pub struct ClusterModes {
     pub factor: BTreeMap<String, f64>,
 }
 
-/// Reads the result of a cluster for `model`; `prove`: the built-in count is to be made.
+/// Reads the result of a cluster for `model`. If `prove` is set, the built-in inertia count is made as well.
 ///
 /// # Errors
-/// [`ClusterForeign`](Code::ClusterForeign) where the matrices are others,
-/// [`ClusterUnfinished`](Code::ClusterUnfinished) where there is no result,
-/// [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable),
-/// [`ClusterInaccurate`](Code::ClusterInaccurate) where its products of condensation are not those of M.
+/// [`ClusterForeign`](Code::ClusterForeign) if the matrices differ, [`ClusterUnfinished`](Code::ClusterUnfinished) if
+/// there is no result, [`ClusterChanged`](Code::ClusterChanged) and [`ClusterUnreadable`](Code::ClusterUnreadable) for
+/// altered or damaged files, [`ClusterInaccurate`](Code::ClusterInaccurate) if the condensation products are not those
+/// of M.
 pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bool) -> Result<ClusterModes> {
     let order = RowOrder::of(model);
     let matrices = matrices_of(model, &order, index_bytes(prepared.index_bytes)?);
@@ -97,6 +97,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         );
         return Err(Diagnostic::new(Code::ClusterForeign, message).in_file(folder).into());
     }
+    // The result must belong to these matrices, and have one eigenvalue per mode.
     let path = folder.join(RESULT);
     if !path.exists() {
         return Err(unfinished(folder, prepared));
@@ -114,6 +115,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
         let by = format!("{by} ({} ranks)", result.ranks);
         CountElsewhere { negative, zero, shift, by }
     });
+    // Modes in the rows of the model, then the check of the condensation products.
     let n = model.stiffness().n();
     let file = Vectors { path: &folder.join(MODES), digest: &result.modes_sha256, of: "modes" };
     let index = index_bytes(result.index_bytes)?;
@@ -137,7 +139,7 @@ pub fn read_found(folder: &Path, prepared: &Prepared, model: &FeModel, prove: bo
     Ok(ClusterModes { modes, told, seconds: result.seconds, factor: result.factor })
 }
 
-/// Says how far the cluster came.
+/// Returns the error for a missing result, with the number of modes found so far.
 fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
     let kept = sealed::open::<CheckpointFile>(&folder.join(CHECKPOINT), "flexbody-kept").ok();
     let kept = kept.filter(|kept| kept.matrices == prepared.matrices);
@@ -149,7 +151,7 @@ fn unfinished(folder: &Path, prepared: &Prepared) -> Error {
     Diagnostic::new(Code::ClusterUnfinished, message).in_file(folder).into()
 }
 
-/// Refuses products of condensation that are not those of M.
+/// Refuses condensation products that are not those of M.
 fn hold_condensation(
     path: &Path,
     digest: &str,
@@ -172,16 +174,16 @@ fn hold_condensation(
     Err(Diagnostic::new(Code::ClusterInaccurate, message).in_file(path).into())
 }
 
-/// A file of vectors whose bytes have to be those that the driver wrote.
+/// File of vectors whose bytes must be those that the driver wrote.
 struct Vectors<'a> {
     path: &'a Path,
     digest: &'a str,
-    /// What the vectors are, in words.
+    /// Description of the vectors in messages.
     of: &'static str,
 }
 
 impl Vectors<'_> {
-    /// So many columns of so many rows, each row where `place` says.
+    /// Reads `count` columns of `n` rows. `place` returns the target row of each row.
     fn read(
         &self,
         (n, count): (usize, usize),

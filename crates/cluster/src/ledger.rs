@@ -1,4 +1,4 @@
-//! What a batch has done already, beside its list: a body is made again only where something has changed.
+//! Ledger of a batch, stored beside its list: a body is made again only if something has changed.
 
 use super::sealed;
 use flexbody_base::error::Result;
@@ -10,18 +10,18 @@ use std::path::{Path, PathBuf};
 
 const FORMAT: &str = "flexbody-batch";
 
-/// A body that was made.
+/// Body that was made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DoneBody {
     /// Fingerprint of the program, the options and the inputs.
     pub inputs: String,
     /// SHA-256 of the file that was written.
     pub output: String,
-    /// What is told of it.
+    /// Facts about the body for the report.
     pub told: serde_json::Value,
 }
 
-/// The bodies that were made, by the paths of their files.
+/// Bodies that were made, by the paths of their files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ledger {
     path: PathBuf,
@@ -29,7 +29,7 @@ pub struct Ledger {
 }
 
 impl Ledger {
-    /// The ledger of a list; empty where there is none, or none that can be used.
+    /// Reads the ledger of a list; empty if there is none, or if it is unusable.
     pub fn of(list: &Path) -> Self {
         let mut path = list.as_os_str().to_owned();
         path.push(".done");
@@ -38,30 +38,30 @@ impl Ledger {
         Self { path, done }
     }
 
-    /// The file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What was made of these inputs and still lies there.
+    /// Returns the entry of a body that was made of these inputs and whose file is unchanged.
     pub fn done(&self, output: &Path, inputs: &str) -> Option<&DoneBody> {
         let body = self.done.get(&output.display().to_string())?;
         let is_there = || sha256_of_file(output).ok().is_some_and(|sha| sha == body.output);
         (body.inputs == inputs && is_there()).then_some(body)
     }
 
-    /// Makes sure before the work that the ledger can be written.
+    /// Checks before the work that the ledger can be written.
     ///
     /// # Errors
-    /// Every error of [`OutputSlot::prepare`].
+    /// The errors of [`OutputSlot::prepare`].
     pub fn reserve(&self) -> Result<()> {
         OutputSlot::prepare(&self.path).map(drop)
     }
 
-    /// Writes down that a body was made.
+    /// Records that a body was made.
     ///
     /// # Errors
-    /// Those of [`OutputSlot`].
+    /// The errors of [`OutputSlot`].
     pub fn add(&mut self, output: &Path, inputs: String, told: serde_json::Value) -> Result<()> {
         let Ok(sha) = sha256_of_file(output) else { return Ok(()) };
         self.done.insert(output.display().to_string(), DoneBody { inputs, output: sha, told });
@@ -71,8 +71,8 @@ impl Ledger {
     }
 }
 
-/// The fingerprint of this program, the words of a conversion and the files that it reads; one that is not
-/// there counts as such.
+/// Returns the fingerprint of this program, the options of a conversion and the files that it reads. A missing file
+/// counts as empty.
 pub fn inputs_fingerprint(words: &[String], files: &[PathBuf]) -> String {
     let mut all = Fingerprint::default();
     let mut add = |text: &str| {

@@ -1,6 +1,6 @@
-//! Work that is done elsewhere: what a cluster needs to find the modes of a model (`prepare`), what it found
-//! (`found`, `condensed`), the program that runs there (`driver.py`) and how it is started here (`engine`), and
-//! lists of bodies (`batch`).
+//! Computations on a cluster and batches: the files that a cluster needs to find the modes of a model (`prepare`), its
+//! results (`found`, `condensed`), the program that runs there (`driver.py`), its local start (`engine`), and lists of
+//! bodies (`batch`).
 
 #![deny(
     clippy::exit,

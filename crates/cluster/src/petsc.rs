@@ -1,5 +1,5 @@
-//! Matrices and vectors in PETSc's binary form: written as `MatLoad` and `VecLoad` read them, vectors read as
-//! `VecView` writes them. All numbers are big-endian.
+//! Matrices and vectors in the binary form of PETSc: written for `MatLoad` and `VecLoad`, vectors read from `VecView`.
+//! All numbers are big-endian.
 
 use faer::MatRef;
 use flexbody_base::provenance::Fingerprint;
@@ -8,7 +8,7 @@ use std::io::{BufWriter, Read, Result, Write};
 const MATRIX: i64 = 1_211_216;
 const VECTOR: i64 = 1_211_214;
 
-/// Bytes of the whole numbers of a file, as PETSc was configured.
+/// Size of the integers of a file, which depends on the configuration of PETSc.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum IndexBytes {
     Four,
@@ -16,7 +16,7 @@ pub(crate) enum IndexBytes {
 }
 
 impl IndexBytes {
-    /// The one with so many bytes.
+    /// Returns the size with this number of bytes; `None` for other numbers than 4 and 8.
     pub(crate) fn of(bytes: u64) -> Option<Self> {
         match bytes {
             4 => Some(Self::Four),
@@ -25,7 +25,7 @@ impl IndexBytes {
         }
     }
 
-    /// How many.
+    /// Returns the number of bytes.
     pub(crate) fn bytes(self) -> u64 {
         match self {
             Self::Four => 4,
@@ -33,7 +33,7 @@ impl IndexBytes {
         }
     }
 
-    /// The largest number.
+    /// Returns the largest integer.
     pub(crate) fn largest(self) -> u64 {
         match self {
             Self::Four => i32::MAX as u64,
@@ -43,7 +43,7 @@ impl IndexBytes {
 
     fn put(self, to: &mut impl Write, number: i64) -> Result<()> {
         match self {
-            // What does not fit was refused before.
+            // Numbers that do not fit were refused earlier.
             Self::Four => to.write_all(&(number as i32).to_be_bytes()),
             Self::Eight => to.write_all(&number.to_be_bytes()),
         }
@@ -65,7 +65,7 @@ impl IndexBytes {
     }
 }
 
-/// A writer that knows the fingerprint of what went through it.
+/// Writer that computes the fingerprint of the bytes.
 struct Sealing<W> {
     out: W,
     fingerprint: Fingerprint,
@@ -83,7 +83,7 @@ impl<W: Write> Write for Sealing<W> {
     }
 }
 
-/// Bytes that are written at a time.
+/// Size of the write buffer in bytes.
 const PIECE: usize = 1 << 20;
 
 fn sealing<W: Write>(out: W, fill: impl FnOnce(&mut BufWriter<Sealing<W>>) -> Result<()>) -> Result<String> {
@@ -94,22 +94,23 @@ fn sealing<W: Write>(out: W, fill: impl FnOnce(&mut BufWriter<Sealing<W>>) -> Re
     Ok(sealing.fingerprint.hex())
 }
 
-/// A square matrix, told row by row.
+/// Square matrix, given row by row.
 pub(super) trait Rows {
-    /// Number of rows.
+    /// Returns the number of rows.
     fn n(&self) -> usize;
 
-    /// Number of entries of all rows.
+    /// Returns the number of entries of all rows.
     fn entries(&self) -> u64;
 
-    /// Columns, ascending, and values of a row, in place of what `entries` held.
+    /// Replaces `entries` by columns, ascending, and values of a row.
     fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>);
 }
 
-/// Writes a matrix, one row after the other, without a copy of it; the SHA-256 of the bytes.
+/// Writes a matrix row by row, without a copy of it. Returns the SHA-256 of the bytes.
 pub(super) fn write_matrix(out: impl Write, rows: &impl Rows, index: IndexBytes) -> Result<String> {
     let (n, mut entries) = (rows.n(), Vec::new());
     sealing(out, |to| {
+        // PETSc stores header, row lengths, column indices and values one after the other: pass over the rows for each.
         for number in [MATRIX, n as i64, n as i64, rows.entries() as i64] {
             index.put(to, number)?;
         }
@@ -129,7 +130,7 @@ pub(super) fn write_matrix(out: impl Write, rows: &impl Rows, index: IndexBytes)
     })
 }
 
-/// Writes columns as one vector after the other; the SHA-256 of the bytes.
+/// Writes columns as consecutive vectors. Returns the SHA-256 of the bytes.
 pub(super) fn write_vectors(out: impl Write, columns: MatRef<'_, f64>, index: IndexBytes) -> Result<String> {
     sealing(out, |to| {
         for j in 0..columns.ncols() {
@@ -141,7 +142,7 @@ pub(super) fn write_vectors(out: impl Write, columns: MatRef<'_, f64>, index: In
     })
 }
 
-/// Reads the next vector of `n` numbers; `None` where the file holds something else.
+/// Reads the next vector of `n` numbers; `None` if the file holds something else.
 pub(super) fn read_vector(from: &mut impl Read, n: usize, index: IndexBytes) -> Result<Option<Vec<f64>>> {
     if index.get(from)? != VECTOR || index.get(from)? != n as i64 {
         return Ok(None);

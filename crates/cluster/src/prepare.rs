@@ -1,5 +1,5 @@
-//! K, M, rigid modes, matrices that turn displacements, what is wanted and the driver, in a folder that is all a
-//! cluster needs.
+//! Preparation of a folder for a cluster: K, M, rigid modes, matrices that turn displacements, the requested modes and
+//! the driver.
 
 use super::petsc::{IndexBytes, Rows, write_matrix, write_vectors};
 use super::prepared::{
@@ -18,61 +18,62 @@ use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
 use std::path::Path;
 
-/// The program for the cluster.
+/// Source of the program for the cluster.
 pub(super) const DRIVER_SOURCE: &str = include_str!("driver.py");
 
-/// What is asked of a preparation.
+/// Settings of a preparation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrepareSettings {
-    /// Which modes.
+    /// Requested modes.
     pub wanted: Wanted,
-    /// How good.
+    /// Accuracy of the modes.
     pub accuracy: Accuracy,
-    /// Bytes of the whole numbers of the PETSc that will read the files: 4 or 8.
+    /// Bytes of the integers of the PETSc that will read the files: 4 or 8.
     pub index_bytes: u64,
-    /// Where the model is read from again.
+    /// Source from which the model is read again.
     pub model: ModelReference,
 }
 
 /// Files that are written, but not yet in their places.
 pub struct Preparation {
-    /// What they are.
+    /// Content of `prepared.jsonl`.
     pub prepared: Prepared,
-    /// Bytes of all of them.
+    /// Size of all files in bytes.
     pub bytes: u64,
     slots: Vec<OutputSlot>,
 }
 
 impl Preparation {
-    /// Gives all files their names.
+    /// Puts all files in place.
     ///
     /// # Errors
-    /// As [`OutputSlot::commit_all`].
+    /// The errors of [`OutputSlot::commit_all`].
     pub fn commit(self) -> Result<Prepared> {
         OutputSlot::commit_all(self.slots)?;
         Ok(self.prepared)
     }
 
-    /// Gives all files their names, for a folder that stays where the run fails: another one goes on from it.
+    /// Puts all files in place in a folder that remains if the run fails: another run continues from it.
     ///
     /// # Errors
-    /// Every error of [`OutputSlot::commit_all`].
+    /// The errors of [`OutputSlot::keep_all`].
     pub fn keep(self) -> Result<Prepared> {
         OutputSlot::keep_all(self.slots)?;
         Ok(self.prepared)
     }
 }
 
-/// Writes what a cluster needs to find the modes of `model` into `folder`, which exists. K and M are written
-/// row by row: beside the model, no memory of their size is needed.
+/// Writes the files that a cluster needs to find the modes of `model` into the existing `folder`. K and M are written
+/// row by row, so that no additional memory of their size is needed.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage) where the numbers of entries need whole numbers of 64 bits; those of
-/// [`rigid_modes`] and of [`OutputSlot`].
+/// [`Usage`](Code::Usage) if the numbers of entries need 64-bit integers; the errors of [`rigid_modes`] and of
+/// [`OutputSlot`].
 pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Result<Preparation> {
     let index = index_bytes(settings.index_bytes)?;
     let pencil = model.pencil();
     let order = RowOrder::of(model);
+    // Matrices in the row order of the files; their numbers of entries must fit the integers.
     let stiffness = WrittenRows { matrix: pencil.stiffness(), block: 1, order: &order };
     let mass = WrittenRows { matrix: pencil.mass(), block: pencil.block(), order: &order };
     let entries = [stiffness.entries(), mass.entries()];
@@ -84,6 +85,7 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
     }
     let rigid = rigid_modes(model, &pencil)?;
     let shift = FIRST_SHIFT * first_eigenvalue_estimate(model, rigid.as_ref());
+    // Write matrices, rigid modes, turning matrices and the driver, then the description with all digests.
     let mut writing = Writing { folder, slots: Vec::new(), files: BTreeMap::new(), bytes: 0 };
     writing.file(STIFFNESS, |file| write_matrix(file, &stiffness, index))?;
     writing.file(MASS, |file| write_matrix(file, &mass, index))?;
@@ -119,7 +121,7 @@ pub fn prepare(model: &FeModel, settings: &PrepareSettings, folder: &Path) -> Re
     Ok(Preparation { prepared, bytes: writing.bytes, slots: writing.slots })
 }
 
-/// The fingerprint of the matrices of a model, as [`prepare`] would write them; nothing is written.
+/// Returns the fingerprint of the matrices of a model, as [`prepare`] would write them. Nothing is written.
 pub(super) fn matrices_of(model: &FeModel, order: &RowOrder, index: IndexBytes) -> String {
     let pencil = model.pencil();
     let digest = |matrix, block| {
@@ -129,12 +131,12 @@ pub(super) fn matrices_of(model: &FeModel, order: &RowOrder, index: IndexBytes) 
     matrices(&digest(pencil.stiffness(), 1), &digest(pencil.mass(), pencil.block()))
 }
 
-/// The fingerprint of both matrices, from those of their files.
+/// Returns the fingerprint of both matrices, from the digests of their files.
 fn matrices(stiffness: &str, mass: &str) -> String {
     sha256_hex(format!("{stiffness}\n{mass}\n").as_bytes())
 }
 
-/// Whole numbers with so many bytes.
+/// Returns the integer size with this number of bytes.
 pub(super) fn index_bytes(bytes: u64) -> Result<IndexBytes> {
     IndexBytes::of(bytes).ok_or_else(|| {
         let message = format!("whole numbers of PETSc have 4 or 8 bytes, not {bytes}");
@@ -142,7 +144,7 @@ pub(super) fn index_bytes(bytes: u64) -> Result<IndexBytes> {
     })
 }
 
-/// Files on their way into a folder.
+/// Files that are being written to a folder.
 struct Writing<'a> {
     folder: &'a Path,
     slots: Vec<OutputSlot>,

@@ -1,4 +1,4 @@
-//! What `flexbody prepare` says of the files that it writes: `prepared.jsonl`.
+//! Description of the files that `flexbody prepare` writes: `prepared.jsonl`.
 
 use super::sealed;
 use flexbody_base::error::Result;
@@ -7,22 +7,22 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Format of the file.
+/// Format name of the file.
 pub(super) const FORMAT: &str = "flexbody-prepared";
 
-/// Names of the files of a folder.
+/// Names of the files in the folder.
 pub(super) const PREPARED: &str = "prepared.jsonl";
 pub(super) const STIFFNESS: &str = "stiffness.petsc";
 pub(super) const MASS: &str = "mass.petsc";
 pub(super) const RIGID: &str = "rigid.petsc";
 pub(super) const DRIVER: &str = "driver.py";
 
-/// Name of the file of the matrix that turns displacements about an axis.
+/// Returns the name of the file of the matrix that turns displacements about an axis.
 pub(super) fn turn_file(axis: usize) -> String {
     format!("turn-{}.petsc", ["x", "y", "z"][axis])
 }
 
-/// Where a model is read from again, when its body is made.
+/// Source from which a model is read again when its body is made.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ModelReference {
     /// Manifest or job; `None` for matrices that were named one by one.
@@ -39,16 +39,16 @@ pub struct ModelReference {
     pub dimension: Option<u8>,
     /// Interfaces of the job.
     pub interfaces: Vec<String>,
-    /// Whether implausible findings were taken as warnings.
+    /// True if implausible findings were treated as warnings.
     pub allow_implausible: bool,
 }
 
-/// Which modes are wanted: so many, or all below an eigenvalue.
+/// Requested modes: a number, or all below an eigenvalue.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WantedModes {
-    /// The lowest so many.
+    /// Number of the lowest modes.
     pub modes: Option<u64>,
-    /// All below. Unit: 1/time^2.
+    /// Eigenvalue below which all modes are requested. Unit: 1/time^2.
     pub below: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ impl From<Wanted> for WantedModes {
 }
 
 impl WantedModes {
-    /// As settings have it.
+    /// Returns the request in the form of the settings.
     pub fn wanted(self) -> Wanted {
         match (self.modes, self.below) {
             (_, Some(lambda)) => Wanted::Below(lambda),
@@ -71,42 +71,42 @@ impl WantedModes {
     }
 }
 
-/// The content of `prepared.jsonl`.
+/// Content of `prepared.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Prepared {
-    /// Program that wrote it.
+    /// Program that wrote the file.
     pub generator: String,
     /// Name of the model.
     pub name: String,
-    /// Where the model is read from again.
+    /// Source from which the model is read again.
     pub model: ModelReference,
     /// Names of the units of length, mass and time.
     pub units: [String; 3],
-    /// One cycle per unit of time in hertz.
+    /// One cycle per unit of time, in hertz.
     pub hertz: f64,
     /// Number of rows.
     pub rows: usize,
     /// Number of rigid modes.
     pub rigid: usize,
-    /// Rows of every node, where all have as many; else 1.
+    /// Number of rows of every node, if it is equal for all nodes; else 1.
     pub block_size: usize,
-    /// What the rows are.
+    /// Description of the row order.
     pub row_order: String,
-    /// Bytes of the whole numbers in PETSc's files.
+    /// Bytes of the integers in the files for PETSc.
     pub index_bytes: u64,
-    /// Entries of K and of M.
+    /// Numbers of entries of K and of M.
     pub entries: [u64; 2],
-    /// Which modes are wanted.
+    /// Requested modes.
     pub wanted: WantedModes,
     /// Name of the accuracy.
     pub accuracy: String,
-    /// K-residual that is promised.
+    /// Guaranteed K-residual.
     pub residual: f64,
     /// Relative distance of eigenvalues that belong to one cluster.
     pub cluster_gap: f64,
-    /// tau of K + tau M, positive.
+    /// Shift tau of K + tau M, positive.
     pub shift: f64,
-    /// Files of the matrices T_b that turn displacements about the axes b; none in folders of earlier programs.
+    /// Files of the matrices T_b that turn displacements about the axes b; empty in folders of earlier versions.
     #[serde(default)]
     pub turns: Vec<String>,
     /// SHA-256 of each file.
@@ -116,17 +116,16 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// The accuracy that was asked for; standard where its name is not known.
+    /// Returns the requested accuracy; standard if its name is unknown.
     pub fn accuracy(&self) -> Accuracy {
         Accuracy::from_name(&self.accuracy).unwrap_or_default()
     }
 }
 
-/// Reads what a folder was prepared for.
+/// Reads the description of a prepared folder.
 ///
-/// # Errors
-/// [`ClusterUnreadable`](flexbody_base::diagnostic::Code::ClusterUnreadable) or
-/// [`ClusterChanged`](flexbody_base::diagnostic::Code::ClusterChanged).
+/// [`ClusterUnreadable`](flexbody_base::diagnostic::Code::ClusterUnreadable) if the file cannot be read, or
+/// [`ClusterChanged`](flexbody_base::diagnostic::Code::ClusterChanged) if it was altered.
 pub fn read_prepared(folder: &Path) -> Result<Prepared> {
     sealed::open(&folder.join(PREPARED), FORMAT)
 }

@@ -1,18 +1,18 @@
-//! The order of rows in files for other solvers: node by node, with the rotations of a node behind its
-//! displacements. Rows of one node then lie on one rank, and multigrid sees blocks.
+//! Row order in files for other solvers: node by node, with the rotations of a node after its displacements. The rows
+//! of one node are then on one rank, and multigrid finds blocks.
 
 use super::petsc::Rows;
 use faer::{Mat, MatRef};
 use flexbody_linalg::SymmetricMatrix;
 use flexbody_model::FeModel;
 
-/// Which internal row each row of the files is, and back.
+/// Permutation between rows of the files and internal rows.
 pub(super) struct RowOrder {
     /// Internal row of each row of the files.
     internal: Vec<u32>,
     /// Row of the files of each internal row.
     written: Vec<u32>,
-    /// Rows of every node, where all nodes have as many and no other rows are there; else 1.
+    /// Number of rows of every node, if it is equal for all nodes and there are no other rows; else 1.
     pub block_size: usize,
 }
 
@@ -20,7 +20,7 @@ impl RowOrder {
     pub(crate) fn of(model: &FeModel) -> Self {
         let rows = model.rows();
         let (d, n, displacements) = (model.dimension(), rows.len(), rows.displacements());
-        // Vertex and place within it: displacements, then rotations; rows without a place come last.
+        // Vertex and component: displacements, then rotations; rows without a position come last.
         let key = |row: usize| match row.checked_sub(displacements) {
             None => (row / d, row % d),
             Some(after) => match rows.rotations().get(after) {
@@ -41,20 +41,20 @@ impl RowOrder {
         Self { internal, written, block_size }
     }
 
-    /// Columns by internal rows in the order of the files.
+    /// Returns columns, given in internal rows, in the order of the files.
     pub(crate) fn to_written(&self, columns: MatRef<'_, f64>) -> Mat<f64> {
         Mat::from_fn(columns.nrows(), columns.ncols(), |i, j| columns[(self.internal[i] as usize, j)])
     }
 
-    /// The internal row of a row of the files.
+    /// Returns the internal row of a row of the files.
     pub(crate) fn internal(&self, row: usize) -> usize {
         self.internal[row] as usize
     }
 }
 
-/// The matrix that turns displacements by one radian about an axis b: psi becomes e_b x psi at every node, and
-/// other rows become zero. The turned shapes T_b Psi carry what the invariants have beside M and the moments of
-/// the rigid modes: their products with M are the integrals of psi_k psi_l that W2 and W3 are made of.
+/// Matrix that turns displacements by one radian about an axis b: psi becomes e_b x psi at every node, and other rows
+/// become zero. The products of the turned shapes T_b Psi with M are the integrals of psi_k psi_l from which W2 and W3
+/// are made, in addition to M and the moments of the rigid modes.
 pub(super) struct TurnedRows<'a> {
     order: &'a RowOrder,
     pub axis: usize,
@@ -63,20 +63,20 @@ pub(super) struct TurnedRows<'a> {
 }
 
 impl<'a> TurnedRows<'a> {
-    /// About every axis about which a body of this model turns: about the third alone in the plane.
+    /// Returns the matrices of all axes of rotation of the model: the third axis only in the plane.
     pub(crate) fn of(model: &FeModel, order: &'a RowOrder) -> Vec<Self> {
         let (dimension, displacements) = (model.dimension(), model.rows().displacements());
         let axes = if dimension == 2 { 2..3 } else { 0..3 };
         axes.map(|axis| Self { order, axis, dimension, displacements }).collect()
     }
 
-    /// Which internal row a row takes its value from, and with which sign; `None` for rows of zeros.
+    /// Returns the internal row from which a row takes its value, and the sign; `None` for zero rows.
     pub(crate) fn source(&self, internal: usize) -> Option<(usize, f64)> {
         let (vertex, to) = (internal / self.dimension, internal % self.dimension);
         if internal >= self.displacements || to == self.axis {
             return None;
         }
-        // (e_b x psi)_k = psi_l where (k, b, l) is cyclic, and -psi_l where it is not.
+        // (e_b x psi)_k = psi_l if (k, b, l) is cyclic, and -psi_l otherwise.
         let sign = if self.axis == (to + 1) % 3 { 1.0 } else { -1.0 };
         Some((vertex * self.dimension + 3 - self.axis - to, sign))
     }
@@ -98,7 +98,7 @@ impl Rows for TurnedRows<'_> {
     }
 }
 
-/// A matrix A kron I_block as its rows are written.
+/// Matrix A kron I_block in the row order of the files.
 pub(super) struct WrittenRows<'a> {
     pub matrix: &'a SymmetricMatrix,
     pub block: usize,
@@ -110,7 +110,7 @@ impl Rows for WrittenRows<'_> {
         self.matrix.n() * self.block
     }
 
-    /// The diagonal is there even where it is zero, since solvers need its place.
+    /// The diagonal is always written, even if it is zero, since solvers need its position.
     fn row(&self, row: usize, entries: &mut Vec<(u32, f64)>) {
         entries.clear();
         let internal = self.order.internal(row);

@@ -1,40 +1,41 @@
-//! Which body of a batch begins next: the first of the list that fits what is free, so that a large one at the
-//! front does not hold up small ones; none passes it for ever, since only so many run beside it.
+//! Order of the bodies of a batch: the next one is the first of the list that fits into the free memory, so that a
+//! large body at the front does not block small ones. No body is overtaken forever, since the number of parallel
+//! conversions is limited.
 
 use flexbody_base::error::Result;
 use flexbody_body::basis::{ModeSettings, search_plan};
 use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 
-/// Bytes of a process before it has read anything.
+/// Memory of a process before it has read anything, in bytes.
 const PROCESS: u64 = 60_000_000;
 
-/// Bytes of an entry of a matrix while it is read: what is stored, and what it is made of.
+/// Bytes per entry of a matrix while it is read: the stored entry and its source.
 const ENTRY: u64 = 40;
 
-/// Bytes that a conversion of a model needs at the most: those of the search by its plan, and those of the
+/// Returns the largest memory of a conversion of a model in bytes: that of the search by its plan, and that of the
 /// matrices.
 ///
 /// # Errors
-/// Those of the analysis of a model that has no factor.
+/// The errors of the analysis of a model without a factor.
 pub fn conversion_bytes(model: &FeModel, settings: &ModeSettings) -> Result<u64> {
     let pencil = model.pencil();
     let entries = pencil.stiffness().as_csc().nnz() + pencil.mass().as_csc().nnz();
     Ok(PROCESS + ENTRY * entries as u64 + search_plan(model, settings, &Context::QUIET)?.bytes())
 }
 
-/// What may be given out at the same time.
+/// Resources for parallel conversions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Budget {
-    /// Bytes.
+    /// Memory in bytes.
     pub memory: u64,
-    /// Conversions.
+    /// Number of conversions.
     pub parallel: usize,
 }
 
 impl Budget {
-    /// The index of the body that begins next, of those that wait with these needs, beside those that run.
-    /// One that needs more than there is runs alone: its conversion says itself what does not fit.
+    /// Returns the index of the next body to start, given the memory of the `waiting` and the `running` ones in bytes.
+    /// A body that needs more than the whole memory runs alone: its conversion reports the shortage.
     pub fn next(&self, waiting: &[u64], running: &[u64]) -> Option<usize> {
         if running.len() >= self.parallel {
             return None;
@@ -44,9 +45,9 @@ impl Budget {
         fits.or_else(|| (running.is_empty() && !waiting.is_empty()).then_some(0))
     }
 
-    /// Bytes that a conversion with this need may use.
+    /// Returns the memory limit in bytes of a conversion with this need.
     pub fn limit(&self, need: u64) -> u64 {
-        // A quarter more: estimates of a search are bounds, what reading leaves behind is not.
+        // A quarter more: the estimate bounds the search, but not the memory that reading retains.
         (need + need / 4).min(self.memory)
     }
 }

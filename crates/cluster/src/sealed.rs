@@ -1,5 +1,5 @@
-//! Small files of two lines of JSON: what the file is, with the digest of the second line, and the content.
-//! A file that was cut off, mixed up or edited is found out; that of another version is told apart.
+//! Small files of two lines of JSON: a head with the format and the digest of the second line, and the content.
+//! Truncated, mixed up or edited files are detected; files of another version are distinguished.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
@@ -12,7 +12,7 @@ use std::path::Path;
 /// Version of the files that this program and its driver write.
 const VERSION: u32 = 1;
 
-/// Most bytes of such a file: ledgers of some hundred thousand bodies.
+/// Largest size of such a file in bytes: ledgers of some hundred thousand bodies.
 const MOST: u64 = 1 << 30;
 
 #[derive(Serialize, Deserialize)]
@@ -22,7 +22,7 @@ struct Head {
     sha256: String,
 }
 
-/// The text of a file.
+/// Returns the text of a file with this content.
 pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
     let body = serde_json::to_string(content).expect("texts and finite numbers");
     let head = Head { format: format.to_owned(), version: VERSION, sha256: sha256_hex(body.as_bytes()) };
@@ -30,20 +30,20 @@ pub(super) fn seal(format: &str, content: &impl Serialize) -> String {
     format!("{head}\n{body}\n")
 }
 
-/// Reads the value that a file of an input holds.
+/// Reads the content of an input file.
 ///
 /// # Errors
-/// Every error of [`open_kept`].
+/// The errors of [`open_kept`].
 pub(super) fn open<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     note_read(path);
     open_kept(path, format)
 }
 
-/// Reads the value of a file that the run keeps for itself and replaces.
+/// Reads the content of a file that the run itself writes and replaces.
 ///
 /// # Errors
-/// [`ClusterUnreadable`](Code::ClusterUnreadable) where it cannot be read or is no file of `format`;
-/// [`ClusterChanged`](Code::ClusterChanged) where its digest is another.
+/// [`ClusterUnreadable`](Code::ClusterUnreadable) if the file cannot be read or does not have this format;
+/// [`ClusterChanged`](Code::ClusterChanged) if its digest differs.
 pub(super) fn open_kept<T: DeserializeOwned>(path: &Path, format: &str) -> Result<T> {
     let unreadable = |why: String| Error::from(Diagnostic::new(Code::ClusterUnreadable, why).in_file(path));
     let text = read_text(path, MOST).map_err(|e| unreadable(format!("file cannot be read: {e}")))?;

@@ -1,27 +1,27 @@
-//! Elimination order and structure of the factor: supernodes on the graph with one vertex per node of the
-//! model, found once for every shift. Positions are places in the elimination order, counted in vertices.
+//! Elimination order and structure of the factor: supernodes on the graph with one vertex per node of the model. They
+//! are computed once for all shifts. Positions are indices in the elimination order, counted in vertices.
 //!
-//! The structure of column j is that of the matrix below the diagonal, united with those of its children in
-//! the elimination tree without j (Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134). Columns of equal structure
-//! form supernodes; small ones are amalgamated with their parents, where few explicit zeros buy larger dense
+//! The structure of column j is the structure of the matrix below the diagonal, united with the structures of its
+//! children in the elimination tree, without j (Liu, SIAM J. Matrix Anal. Appl. 11 (1990) 134). Columns of equal
+//! structure form supernodes. Small supernodes are merged with their parents if few explicit zeros give larger dense
 //! blocks (Ashcraft and Grimes, ACM TOMS 15 (1989) 291, with the thresholds of CHOLMOD).
 
 use std::ops::Range;
 
-/// No parent: the root of a tree.
+/// Marks a root of a tree: no parent.
 const NONE: u32 = u32::MAX;
 
 /// Adjacency lists of a graph without self loops.
 #[derive(Debug)]
 pub(crate) struct Graph {
-    /// Begin of each vertex's neighbours; one more at the end.
+    /// Start of each vertex's neighbours, with one more entry at the end.
     pub pointers: Vec<i32>,
-    /// Neighbours.
+    /// Neighbours of all vertices.
     pub neighbours: Vec<i32>,
 }
 
 impl Graph {
-    /// Number of vertices.
+    /// Returns the number of vertices.
     pub(crate) fn len(&self) -> usize {
         self.pointers.len() - 1
     }
@@ -31,20 +31,20 @@ impl Graph {
     }
 }
 
-/// The supernodes in elimination order: children before parents, every subtree contiguous.
+/// Supernodes in elimination order: children before parents, every subtree contiguous.
 #[derive(Debug)]
 pub(crate) struct AssemblyTree {
     /// Vertex at each position.
     order: Vec<u32>,
     /// Position of each vertex.
     position: Vec<u32>,
-    /// First position of each supernode; one more at the end.
+    /// First position of each supernode, with one more entry at the end.
     begin: Vec<u32>,
-    /// Begin of each supernode's rows; one more at the end.
+    /// Start of each supernode's rows, with one more entry at the end.
     rows_at: Vec<usize>,
     /// Positions below the columns of each supernode, ascending.
     rows: Vec<u32>,
-    /// For each of them, its place in the front of the parent.
+    /// Index of each of these rows in the front of the parent.
     places: Vec<u32>,
     parent: Vec<u32>,
     children_at: Vec<u32>,
@@ -52,17 +52,19 @@ pub(crate) struct AssemblyTree {
 }
 
 impl AssemblyTree {
-    /// Structure of the factor of a matrix with this graph, eliminated in `order` up to postordering.
+    /// Computes the structure of the factor of a matrix with this graph. The elimination order is `order` up to
+    /// postordering; a vertex has `block` rows.
     pub(crate) fn new(graph: &Graph, order: &[u32], block: usize) -> Self {
         let columns = EliminationTree::new(graph, order);
         let fundamental = Supernode::fundamental(graph, &columns);
         Self::assemble(&columns, amalgamate(fundamental, block))
     }
 
-    /// Numbers the supernodes in postorder and their columns with them.
+    /// Numbers the supernodes in postorder, and their columns accordingly.
     fn assemble(columns: &EliminationTree, supernodes: Vec<Supernode>) -> Self {
         let count = supernodes.len();
         let vertices = columns.order.len();
+        // Children lists, in the order that needs the least memory.
         let mut children: Vec<Vec<u32>> = vec![Vec::new(); count];
         let mut roots = Vec::new();
         for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| !s.columns.is_empty()) {
@@ -77,6 +79,7 @@ impl AssemblyTree {
         for (new, &old) in sequence.iter().enumerate() {
             number[old as usize] = new as u32;
         }
+        // Number the columns supernode by supernode.
         let mut renumbered = vec![NONE; vertices];
         let (mut order, mut begin) = (Vec::with_capacity(vertices), vec![0]);
         for &s in &sequence {
@@ -90,6 +93,7 @@ impl AssemblyTree {
         for (place, &vertex) in order.iter().enumerate() {
             position[vertex as usize] = place as u32;
         }
+        // Renumber rows and parents.
         let (mut rows, mut rows_at) = (Vec::new(), vec![0]);
         let mut parent = Vec::with_capacity(sequence.len());
         for &s in &sequence {
@@ -124,53 +128,54 @@ impl AssemblyTree {
         self.rows(s).iter().map(place).collect()
     }
 
-    /// Rows of the front of `s` that are eliminated, and those below them, with `block` rows per vertex.
+    /// Returns the number of eliminated rows of the front of `s` and the number of rows below, with `block` rows per
+    /// vertex.
     pub(crate) fn front(&self, s: usize, block: usize) -> (usize, usize) {
         (self.columns(s).len() * block, self.rows(s).len() * block)
     }
 
-    /// Number of supernodes.
+    /// Returns the number of supernodes.
     pub(crate) fn len(&self) -> usize {
         self.parent.len()
     }
 
-    /// Positions of the columns of a supernode.
+    /// Returns the positions of the columns of a supernode.
     pub(crate) fn columns(&self, s: usize) -> Range<usize> {
         self.begin[s] as usize..self.begin[s + 1] as usize
     }
 
-    /// Positions of the rows below the columns of a supernode, ascending.
+    /// Returns the positions of the rows below the columns of a supernode, ascending.
     pub(crate) fn rows(&self, s: usize) -> &[u32] {
         &self.rows[self.rows_at[s]..self.rows_at[s + 1]]
     }
 
-    /// Places of those rows in the front (columns, then rows) of the parent.
+    /// Returns the indices of the rows of `s` in the front of its parent (columns, then rows).
     pub(crate) fn places(&self, s: usize) -> &[u32] {
         &self.places[self.rows_at[s]..self.rows_at[s + 1]]
     }
 
-    /// The supernode that takes the contribution of `s`.
+    /// Returns the supernode that receives the contribution of `s`; `None` for a root.
     pub(crate) fn parent(&self, s: usize) -> Option<usize> {
         (self.parent[s] != NONE).then_some(self.parent[s] as usize)
     }
 
-    /// The supernodes that contribute to `s`, ascending.
+    /// Returns the supernodes that contribute to `s`, ascending.
     pub(crate) fn children(&self, s: usize) -> &[u32] {
         &self.children[self.children_at[s] as usize..self.children_at[s + 1] as usize]
     }
 
-    /// Vertex at each position.
+    /// Returns the vertex at each position.
     pub(crate) fn order(&self) -> &[u32] {
         &self.order
     }
 
-    /// Position of each vertex.
+    /// Returns the position of each vertex.
     pub(crate) fn position(&self) -> &[u32] {
         &self.position
     }
 }
 
-/// The elimination tree of single columns, renumbered in postorder.
+/// Elimination tree of single columns, numbered in postorder.
 struct EliminationTree {
     /// Vertex at each position.
     order: Vec<u32>,
@@ -200,6 +205,7 @@ impl EliminationTree {
                 }
             }
         }
+        // Renumber in postorder.
         let (at, children) = children_of(&parent);
         let roots: Vec<u32> = (0..n as u32).filter(|&j| parent[j as usize] == NONE).collect();
         let sequence = postorder(&roots, |j| &children[at[j as usize] as usize..at[j as usize + 1] as usize]);
@@ -216,18 +222,19 @@ impl EliminationTree {
     }
 }
 
-/// Columns of equal structure. One without columns has been amalgamated.
+/// Columns of equal structure. A supernode without columns has been merged into its parent.
 struct Supernode {
     columns: Vec<u32>,
-    /// Rows below the last column, in no order.
+    /// Rows below the last column, unordered.
     rows: Vec<u32>,
     parent: u32,
-    /// Explicit zeros that amalgamation has let in, counted in vertices.
+    /// Number of explicit zeros added by amalgamation, counted in vertices.
     zeros: f64,
 }
 
 impl Supernode {
-    /// Maximal runs of columns, each the only child of the next and with the same structure.
+    /// Returns the fundamental supernodes: maximal runs of columns, each the only child of the next, with equal
+    /// structure.
     fn fundamental(graph: &Graph, columns: &EliminationTree) -> Vec<Self> {
         let n = columns.order.len();
         let (children_at, children) = children_of(&columns.parent);
@@ -243,6 +250,7 @@ impl Supernode {
                     rows.push(row);
                 }
             };
+            // Structure of column j: the matrix below the diagonal and the rows of the children.
             for &neighbour in graph.neighbours(columns.order[j] as usize) {
                 let row = columns.position[neighbour as usize];
                 if row > j as u32 {
@@ -253,6 +261,7 @@ impl Supernode {
             for &child in below {
                 supernodes[supernode_of[child as usize] as usize].rows.iter().for_each(|&row| add(row));
             }
+            // Join the only child if its structure is that of column j plus j itself.
             if let &[only] = below {
                 let index = supernode_of[only as usize];
                 let supernode = &mut supernodes[index as usize];
@@ -273,25 +282,28 @@ impl Supernode {
         supernodes
     }
 
-    /// Vertices of the factor: the triangle of `width` columns with `below` rows under it.
+    /// Returns the number of entries of the factor, in vertices: the triangle of `width` columns with `below` rows
+    /// under it.
     fn size(width: usize, below: usize) -> f64 {
         let width = width as f64;
         width * (0.5 * (width + 1.0) + below as f64)
     }
 }
 
-/// Merges supernodes into their parents while explicit zeros stay a small part of the block.
+/// Merges supernodes into their parents as long as explicit zeros are a small part of the block.
 fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
     let mut children: Vec<Vec<u32>> = vec![Vec::new(); supernodes.len()];
     for (i, s) in supernodes.iter().enumerate().filter(|(_, s)| s.parent != NONE) {
         children[s.parent as usize].push(i as u32);
     }
     for s in 0..supernodes.len() {
+        // Children come first in this numbering: their merges are known.
         let mut candidates = std::mem::take(&mut children[s]);
         // The child with the most rows shares most of its structure with the parent.
         candidates.sort_by_key(|&c| (std::cmp::Reverse(supernodes[c as usize].rows.len()), c));
         let mut kept = Vec::new();
         for c in candidates {
+            // Zeros of the merged block: its size minus the structural entries of both.
             let (child, parent) = (&supernodes[c as usize], &supernodes[s]);
             let width = child.columns.len() + parent.columns.len();
             let merged = Supernode::size(width, parent.rows.len());
@@ -308,6 +320,7 @@ fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
                 kept.push(c);
                 continue;
             }
+            // Merge: the parent takes the columns and the children of the child.
             let mut columns = std::mem::take(&mut supernodes[c as usize].columns);
             supernodes[c as usize].rows = Vec::new();
             columns.append(&mut supernodes[s].columns);
@@ -326,7 +339,8 @@ fn amalgamate(mut supernodes: Vec<Supernode>, block: usize) -> Vec<Supernode> {
     supernodes
 }
 
-/// Puts children first whose subtree needs most memory beyond what they leave (Liu, ACM TOMS 12 (1986) 249).
+/// Sorts children by descending peak memory of their subtree minus the memory of their contribution, which minimises
+/// the peak of the parent (Liu, ACM TOMS 12 (1986) 249).
 fn sort_for_memory(supernodes: &[Supernode], children: &mut [Vec<u32>]) {
     let mut peak = vec![0.0f64; supernodes.len()];
     let left = |s: u32| Supernode::size(supernodes[s as usize].rows.len(), 0);
@@ -336,6 +350,7 @@ fn sort_for_memory(supernodes: &[Supernode], children: &mut [Vec<u32>]) {
             let need = |c: u32| peak[c as usize] - left(c);
             need(b).total_cmp(&need(a)).then(a.cmp(&b))
         });
+        // Peak of the subtree: children in this order, each leaving its contribution, then the front.
         let mut held = 0.0;
         let mut most = 0.0f64;
         for &c in &children[s] {
@@ -347,7 +362,7 @@ fn sort_for_memory(supernodes: &[Supernode], children: &mut [Vec<u32>]) {
     }
 }
 
-/// Children lists in compressed form, ascending.
+/// Returns the children lists in compressed form, ascending.
 fn children_of(parent: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let n = parent.len();
     let mut at = vec![0u32; n + 1];
@@ -366,7 +381,8 @@ fn children_of(parent: &[u32]) -> (Vec<u32>, Vec<u32>) {
     (at, children)
 }
 
-/// Children before parents, without recursion: trees of slender bodies are as deep as they are long.
+/// Returns a postorder: children before parents. Without recursion, since trees of slender bodies are as deep as the
+/// bodies are long.
 fn postorder<'a>(roots: &[u32], children: impl Fn(u32) -> &'a [u32]) -> Vec<u32> {
     let mut sequence = Vec::new();
     let mut stack: Vec<(u32, usize)> = Vec::new();

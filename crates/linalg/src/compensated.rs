@@ -1,23 +1,23 @@
-//! Double-double arithmetic: a number as the unevaluated sum of two, with 106 bits.
+//! Double-double arithmetic: a number is the unevaluated sum of two, with 106 bits.
 //!
-//! Own code and not the crate `twofloat`: the same sums there take six times as long, because its products
-//! call the fused multiply-add as a function and its sums do not vectorise. Algorithms and error bounds: M.
-//! Joldes, J.-M. Muller, V. Popescu, *Tight and rigorous error bounds for basic building blocks of
-//! double-word arithmetic*, ACM Trans. Math. Softw. 44 (2017). With u = 2^-53, relative errors are at most 3
-//! u^2 for a sum, 4 u^2 for a product, 15 u^2 for a quotient, as long as nothing over- or underflows.
+//! The crate `twofloat` is not used: its sums take six times as long, because its products call the fused multiply-add
+//! as a function and its sums do not vectorise. Algorithms and error bounds: M. Joldes, J.-M. Muller, V. Popescu,
+//! *Tight and rigorous error bounds for basic building blocks of double-word arithmetic*, ACM Trans. Math. Softw. 44
+//! (2017). With u = 2^-53, relative errors are at most 3 u^2 for a sum, 4 u^2 for a product and 15 u^2 for a quotient,
+//! without overflow or underflow.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// hi + lo, where hi is the sum rounded to the nearest f64.
+/// Number hi + lo, where hi is the sum rounded to the nearest f64.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DoubleDouble {
-    /// The number rounded to f64.
+    /// Number rounded to f64.
     pub hi: f64,
-    /// What is left.
+    /// Remainder.
     pub lo: f64,
 }
 
-/// a + b = s + e exactly.
+/// Returns s and e with a + b = s + e exactly.
 #[inline(always)]
 fn two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
@@ -25,14 +25,14 @@ fn two_sum(a: f64, b: f64) -> (f64, f64) {
     (s, (a - (s - t)) + (b - t))
 }
 
-/// The same for |a| >= |b|.
+/// Returns s and e with a + b = s + e exactly, for |a| >= |b|.
 #[inline(always)]
 fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     (s, b - (s - a))
 }
 
-/// a b = p + e exactly.
+/// Returns p and e with a b = p + e exactly.
 #[inline(always)]
 fn two_product(a: f64, b: f64) -> (f64, f64) {
     let p = a * b;
@@ -40,19 +40,19 @@ fn two_product(a: f64, b: f64) -> (f64, f64) {
 }
 
 impl DoubleDouble {
-    /// a + b, exactly.
+    /// Returns a + b exactly.
     pub fn sum(a: f64, b: f64) -> Self {
         let (hi, lo) = two_sum(a, b);
         Self { hi, lo }
     }
 
-    /// a b, exactly.
+    /// Returns a b exactly.
     pub fn product(a: f64, b: f64) -> Self {
         let (hi, lo) = two_product(a, b);
         Self { hi, lo }
     }
 
-    /// The square root; NaN for negative numbers.
+    /// Returns the square root; NaN for negative numbers.
     pub fn sqrt(self) -> Self {
         if self.hi == 0.0 {
             return self;
@@ -64,12 +64,12 @@ impl DoubleDouble {
         Self { hi, lo }
     }
 
-    /// A number of f64 that is not larger, at most three units in the last place away.
+    /// Returns a lower bound in f64, at most three units in the last place below the number.
     pub fn below(self) -> f64 {
         self.hi.next_down().next_down()
     }
 
-    /// A number of f64 that is not smaller, at most three units in the last place away.
+    /// Returns an upper bound in f64, at most three units in the last place above the number.
     pub fn above(self) -> f64 {
         self.hi.next_up().next_up()
     }
@@ -135,9 +135,9 @@ impl Div for DoubleDouble {
     }
 }
 
-/// (hi + lo) += a x, lane by lane, of exact products.
+/// Adds a x to hi + lo, lane by lane, with exact products.
 ///
-/// After N of these the error of a lane is at most 4 u^2 (N + 1) times the sum of all |a x| in it.
+/// After N additions the error of a lane is at most 4 u^2 (N + 1) times its sum of all |a x|.
 #[inline(always)]
 pub fn accumulate<const W: usize>(hi: &mut [f64; W], lo: &mut [f64; W], a: f64, x: &[f64; W]) {
     for w in 0..W {
@@ -147,7 +147,8 @@ pub fn accumulate<const W: usize>(hi: &mut [f64; W], lo: &mut [f64; W], a: f64, 
     }
 }
 
-/// (hi + lo) += a (x + y), lane by lane, for |y| <= u |x|. The error is as for [`accumulate`], with N + 2.
+/// Adds a (x + y) to hi + lo, lane by lane, for |y| <= u |x|. After N additions the error of a lane is at most
+/// 4 u^2 (N + 3) times its sum of all |a x|.
 #[inline(always)]
 pub fn accumulate_pair<const W: usize>(
     hi: &mut [f64; W],
@@ -162,8 +163,7 @@ pub fn accumulate_pair<const W: usize>(
     }
 }
 
-/// Runs `work` compiled for the instructions that this processor has. The bits are the same on every
-/// processor.
+/// Runs `work` compiled for the instruction set of this processor. The result has the same bits on every processor.
 pub fn with_fma<R>(work: impl FnOnce() -> R) -> R {
     struct Work<F>(F);
     impl<R, F: FnOnce() -> R> pulp::NullaryFnOnce for Work<F> {

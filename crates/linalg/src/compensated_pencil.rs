@@ -3,10 +3,10 @@
 use super::compensated::DoubleDouble;
 use faer::Mat;
 
-/// Sweeps of the Jacobi method: convergence is quadratic, and what comes in is nearly diagonal.
+/// Largest number of Jacobi sweeps. Convergence is quadratic and the input is nearly diagonal, so that few are needed.
 const SWEEPS: usize = 30;
 
-/// Off-diagonal entries below this part of the diagonal are zero.
+/// Off-diagonal entries count as zero below this part of the diagonal.
 const ZERO: f64 = 1e-33;
 
 /// Rows of a full matrix.
@@ -15,27 +15,27 @@ type Rows = Vec<Vec<DoubleDouble>>;
 /// Eigenpairs of a small pencil.
 #[derive(Debug, Clone)]
 pub struct SmallEigen {
-    /// Ascending.
+    /// Eigenvalues, ascending.
     pub values: Vec<DoubleDouble>,
-    /// One column for each, orthonormal in the second matrix; rounded.
+    /// Eigenvectors, rounded to f64: one column per eigenvalue, orthonormal in the second matrix.
     pub vectors: Mat<f64>,
 }
 
-/// Eigenpairs of P x = kappa Q x, for P and Q symmetric positive definite and scaled so that their diagonals
-/// dominate. Rows of full matrices. `None` when they are not positive definite or not finite.
+/// Computes the eigenpairs of P x = kappa Q x. P and Q are rows of full matrices, symmetric positive definite and
+/// scaled so that their diagonals dominate. Returns `None` if they are not positive definite or not finite.
 ///
-/// Cholesky of Q, then Jacobi on L^-1 P L^-T. For such matrices both are accurate relative to every single
-/// eigenvalue (J. Demmel, K. Veselic, *Jacobi's method is more accurate than QR*, SIAM J. Matrix Anal. Appl.
-/// 13, 1992): the relative error is a small multiple of the order of the pencil times 2^-106.
+/// The method is Cholesky of Q, then Jacobi on L^-1 P L^-T. For such matrices both are accurate relative to every
+/// single eigenvalue (J. Demmel, K. Veselic, *Jacobi's method is more accurate than QR*, SIAM J. Matrix Anal. Appl. 13,
+/// 1992): the relative error is a small multiple of the order of the pencil times 2^-106.
 pub fn small_pencil(mut p: Rows, q: &Rows) -> Option<SmallEigen> {
     let n = q.len();
     let l = cholesky(q)?;
-    // Rows, then columns, of P are solved with L.
+    // P <- L^-1 P L^-T: solve with L for the rows, then for the columns.
     for _ in 0..2 {
         solve_lower(&l, &mut p);
         p = transposed(&p);
     }
-    // Rows of the transposed vectors.
+    // Rows of `turned` are the eigenvectors J of the transformed matrix.
     let mut turned = identity(n);
     jacobi(&mut p, &mut turned)?;
     // X = L^-T J, and X' = J' L^-1.
@@ -60,7 +60,7 @@ fn transposed(a: &Rows) -> Rows {
     (0..a.len()).map(|i| a.iter().map(|row| row[i]).collect()).collect()
 }
 
-/// A <- L^-1 A.
+/// Solves in place: A <- L^-1 A.
 fn solve_lower(l: &Rows, a: &mut Rows) {
     for (i, factors) in l.iter().enumerate() {
         let (above, below) = a.split_at_mut(i);
@@ -75,7 +75,7 @@ fn solve_lower(l: &Rows, a: &mut Rows) {
     }
 }
 
-/// Lower Cholesky factor.
+/// Returns the lower Cholesky factor; `None` if A is not positive definite.
 fn cholesky(a: &Rows) -> Option<Rows> {
     let n = a.len();
     let mut l = vec![vec![DoubleDouble::default(); n]; n];
@@ -96,8 +96,8 @@ fn cholesky(a: &Rows) -> Option<Rows> {
     Some(l)
 }
 
-/// Makes A diagonal by cyclic Jacobi rotations, which the rows of `turned` go through as well; `None` when
-/// they do not converge to positive numbers.
+/// Diagonalises A by cyclic Jacobi rotations, which are also applied to the rows of `turned`. Returns `None` if they do
+/// not converge to positive numbers.
 fn jacobi(a: &mut Rows, turned: &mut Rows) -> Option<()> {
     let n = a.len();
     for _ in 0..SWEEPS {
@@ -125,14 +125,14 @@ fn jacobi(a: &mut Rows, turned: &mut Rows) -> Option<()> {
     None
 }
 
-/// One rotation of rows and columns i and j, which leaves a zero at (i, j); its cosine and sine.
+/// Rotates rows and columns i and j so that entry (i, j) becomes zero. Returns cosine and sine.
 fn rotate(a: &mut Rows, i: usize, j: usize) -> (DoubleDouble, DoubleDouble) {
     let one = DoubleDouble::from(1.0);
     let off = a[i][j];
-    // t = tan(angle) solves t^2 + 2 z t - 1 = 0, the smaller root.
+    // t = tan(angle) is the smaller root of t^2 + 2 z t - 1 = 0.
     let z = (a[j][j] - a[i][i]) / (off * 2.0);
     let size = if z.hi < 0.0 { -z } else { z };
-    // Beyond 1e30, z^2 + 1 is z^2 to all digits and could overflow.
+    // Beyond 1e30, z^2 + 1 equals z^2 to all digits and could overflow.
     let t = if size.hi > 1e30 { one / (size * 2.0) } else { one / (size + (z * z + one).sqrt()) };
     let t = if z.hi < 0.0 { -t } else { t };
     let c = one / (t * t + one).sqrt();

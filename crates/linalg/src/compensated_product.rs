@@ -6,13 +6,13 @@ use super::contiguous::contiguous;
 use faer::MatRef;
 use rayon::prelude::*;
 
-/// Columns of a block.
+/// Number of columns of a block.
 pub const LANES: usize = 8;
 
-/// Rows per parallel task and per partial sum.
+/// Number of rows per parallel task and per partial sum. The partition fixes the order of the sums.
 const ROWS: usize = 1024;
 
-/// n rows and up to [`LANES`] columns of double-double numbers; further columns are zero.
+/// Block of n rows and up to [`LANES`] columns of double-double numbers; unused columns are zero.
 #[derive(Debug, Clone)]
 pub struct CompensatedBlock {
     hi: Vec<[f64; LANES]>,
@@ -20,12 +20,12 @@ pub struct CompensatedBlock {
 }
 
 impl CompensatedBlock {
-    /// The entry in `row` and `column`.
+    /// Returns the entry in `row` and `column`.
     pub fn get(&self, row: usize, column: usize) -> DoubleDouble {
         DoubleDouble { hi: self.hi[row][column], lo: self.lo[row][column] }
     }
 
-    /// Adds another block of the same size.
+    /// Adds another block of equal size.
     pub fn add(&mut self, other: &Self) {
         for row in 0..self.hi.len() {
             for c in 0..LANES {
@@ -36,15 +36,16 @@ impl CompensatedBlock {
     }
 }
 
-/// (A kron I_block) X for X of `block * A.n()` rows and at most [`LANES`] columns.
+/// Returns (A kron I_block) X for X of `block * A.n()` rows and at most [`LANES`] columns.
 ///
 /// With r entries in the row, the error of an entry is at most 4 u^2 (r + 1) (|A| |X|), u = 2^-53.
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes disagree.
 pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>) -> CompensatedBlock {
     let n = a.n() * block;
     assert!(x.nrows() == n && x.ncols() <= LANES, "shapes of a compensated product");
+    // Pack the columns row by row.
     let mut packed = vec![[0.0; LANES]; n];
     for c in 0..x.ncols() {
         for (row, value) in packed.iter_mut().zip(x.col(c).iter()) {
@@ -69,12 +70,12 @@ pub fn multiply_compensated(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64
     CompensatedBlock { hi, lo }
 }
 
-/// A'Y for A (n x m): m rows of [`LANES`] numbers.
+/// Returns A'Y for A (n x m), as m rows of [`LANES`] numbers.
 ///
 /// The error of an entry is at most 4 u^2 [`sum_length`] |A|'|Y|.
 ///
 /// # Panics
-/// When the numbers of rows differ.
+/// If the numbers of rows differ.
 pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[DoubleDouble; LANES]> {
     let n = a.nrows();
     assert_eq!(n, y.hi.len(), "rows of a compensated Gram product");
@@ -98,6 +99,7 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
             (0..a.ncols()).map(column).collect()
         })
         .collect();
+    // Add the partial sums in fixed order.
     let mut total = vec![[DoubleDouble::default(); LANES]; a.ncols()];
     for part in &partial {
         for (sum, part) in total.iter_mut().zip(part) {
@@ -109,10 +111,10 @@ pub fn gram_compensated(a: MatRef<'_, f64>, y: &CompensatedBlock) -> Vec<[Double
     total
 }
 
-/// X' A X in panels of [`LANES`] columns: rows of a symmetric matrix.
+/// Returns X' A X as rows of a symmetric matrix, computed in panels of [`LANES`] columns.
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes disagree.
 pub fn projection_compensated(a: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<Vec<DoubleDouble>> {
     let count = x.ncols();
     let mut projection = vec![vec![DoubleDouble::default(); count]; count];
@@ -130,7 +132,8 @@ pub fn projection_compensated(a: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<Ve
     projection
 }
 
-/// Additions that a term of a sum over `n` rows takes part in at most, with room for those around it.
+/// Returns an upper bound of the number of additions that affect a term of a sum over `n` rows, with a margin for the
+/// surrounding operations.
 pub fn sum_length(n: usize) -> f64 {
     (ROWS.min(n) + n.div_ceil(ROWS) + 16) as f64
 }

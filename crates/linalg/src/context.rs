@@ -1,19 +1,19 @@
-//! The context of long work: the limits it keeps, the listener it reports to, and the counter of what it did.
+//! Context of long work: its limits, its listener and the counter of its work.
 
 use std::sync::{Mutex, PoisonError};
 
-/// A report of long work to its [`Watch`].
+/// Progress report of long work to its [`Watch`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Event<'a> {
-    /// A phase begins.
+    /// Start of a phase.
     Phase(&'a str),
-    /// The plan of the work and the resources it needs, known before it starts.
+    /// Plan of the work and its resources, known before it starts.
     Plan(&'a str),
-    /// Fraction of the current phase that is done, 0 to 1.
+    /// Completed fraction of the current phase, 0 to 1.
     Fraction(f64),
 }
 
-/// A listener for progress.
+/// Callback that receives every progress report, from any thread of the work.
 pub type Watch<'a> = &'a (dyn Fn(Event<'_>) + Sync);
 
 /// Counts of the work of eigen-solvers and linear solvers, independent of the machine.
@@ -21,17 +21,17 @@ pub type Watch<'a> = &'a (dyn Fn(Event<'_>) + Sync);
 /// Tests compare them with recorded values: a slower algorithm fails without a measurement of time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Work {
-    /// Numeric factorisations (Cholesky and inertia counts).
+    /// Number of numeric factorisations (Cholesky and inertia counts).
     pub factorizations: u64,
-    /// Columns solved with a factor.
+    /// Number of columns solved with a factor.
     pub solved_columns: u64,
-    /// Columns multiplied by K.
+    /// Number of columns multiplied by K.
     pub stiffness_columns: u64,
-    /// Columns multiplied by M.
+    /// Number of columns multiplied by M.
     pub mass_columns: u64,
-    /// Thick restarts of Lanczos.
+    /// Number of thick restarts of Lanczos.
     pub restarts: u64,
-    /// Numbers in one factor.
+    /// Number of entries of one factor.
     pub factor_len: u64,
     /// Multiplications and additions of one factorisation.
     pub factor_flops: u64,
@@ -39,7 +39,7 @@ pub struct Work {
     pub factor_bytes: u64,
 }
 
-/// A counter that several parts of the work add to.
+/// Counter to which several parts of the work add.
 #[derive(Debug, Default)]
 pub struct WorkCounter(Mutex<Work>);
 
@@ -50,7 +50,7 @@ impl WorkCounter {
     }
 }
 
-/// The context of long work, handed down by reference through all functions that take part in it.
+/// Context of long work, passed by reference to all functions that take part in it.
 ///
 /// ```
 /// use flexbody_linalg::context::{Context, WorkCounter};
@@ -61,18 +61,18 @@ impl WorkCounter {
 /// ```
 #[derive(Clone, Copy)]
 pub struct Context<'a> {
-    /// Bytes that the work may allocate on top of the memory in use; `None`: no limit.
+    /// Bytes that the work may allocate in addition to the memory in use; `None` for no limit.
     pub memory: Option<u64>,
-    /// Seconds that the work may take by its own estimate, made before it starts; `None`: no limit.
+    /// Seconds that the work may take by its own estimate, made before it starts; `None` for no limit.
     pub longest: Option<f64>,
-    /// The listener.
+    /// Listener for progress.
     pub watch: Watch<'a>,
-    /// The counter of the work; `None`: it is not counted.
+    /// Counter of the work; `None` if the work is not counted.
     pub counter: Option<&'a WorkCounter>,
 }
 
 impl Context<'static> {
-    /// A context without limits, listener or counter.
+    /// Context without limits, listener or counter.
     pub const QUIET: Self = Self { memory: None, longest: None, watch: &|_| {}, counter: None };
 }
 
@@ -82,7 +82,7 @@ impl<'a> Context<'a> {
         Self { watch, ..Context::QUIET }
     }
 
-    /// Returns this context with its work counted by `counter` instead.
+    /// Returns this context with its work counted by `counter`.
     pub fn counted_by<'b>(&self, counter: &'b WorkCounter) -> Context<'b>
     where
         'a: 'b,
@@ -95,17 +95,17 @@ impl<'a> Context<'a> {
         Self { counter: None, ..*self }
     }
 
-    /// Returns this context without a listener, for a part of the work that does not tell how far it is.
+    /// Returns this context without a listener, for work that reports no progress.
     pub fn unheard(&self) -> Self {
         Self { watch: Context::QUIET.watch, ..*self }
     }
 
-    /// Returns this context with no limits of memory and time.
+    /// Returns this context without limits of memory and time.
     pub fn unlimited(&self) -> Self {
         Self { memory: None, longest: None, ..*self }
     }
 
-    /// Adds to the counts.
+    /// Calls `add` with the counts, if there is a counter.
     pub fn count(&self, add: impl FnOnce(&mut Work)) {
         if let Some(WorkCounter(work)) = self.counter {
             add(&mut work.lock().unwrap_or_else(PoisonError::into_inner));
@@ -127,7 +127,7 @@ impl<'a> Context<'a> {
         (self.watch)(Event::Fraction(done));
     }
 
-    /// Returns the bytes that may still be allocated: the limit, or the largest number without one.
+    /// Returns the number of bytes that may still be allocated: the limit, or the largest number if there is no limit.
     pub fn available(&self) -> u64 {
         self.memory.unwrap_or(u64::MAX)
     }

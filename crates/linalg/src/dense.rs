@@ -14,31 +14,31 @@ use faer::linalg::householder;
 use faer::linalg::qr::no_pivoting::factor as qr;
 use faer::{Auto, Col, Conj, Mat, MatRef, Par};
 
-/// Backward error beyond which a decomposition is rejected: |A V - V L| <= this * |A| (maximum norms).
+/// Largest backward error |A V - V L| / |A| (maximum norms) of an accepted decomposition.
 const BACKWARD_ERROR: f64 = 3e-14;
 
-/// Eigenvalues ascending and orthonormal eigenvectors (columns) of a symmetric matrix.
+/// Eigenvalues and orthonormal eigenvectors of a symmetric matrix.
 #[derive(Debug, Clone)]
 pub struct SymmetricEigen {
     /// Eigenvalues, ascending.
     pub values: Vec<f64>,
-    /// Eigenvectors, column i belongs to value i.
+    /// Eigenvectors; column i belongs to value i.
     pub vectors: Mat<f64>,
 }
 
-/// Eigenvalues and eigenvectors of the symmetric matrix whose lower triangle is that of `a`; `None` when the
-/// iteration does not converge or the matrix has non-finite entries.
+/// Returns eigenvalues and eigenvectors of the symmetric matrix whose lower triangle is that of `a`. Returns `None` if
+/// the iteration does not converge or the matrix has non-finite entries.
 ///
-/// faer's divide and conquer (0.24.4) returns eigenvectors that are wrong by up to 1e-3 on matrices with
-/// clustered or strongly graded spectra, which is what a Krylov basis makes: every decomposition is verified,
-/// and the QR iteration takes over where it fails.
+/// The divide-and-conquer method of faer (0.24.4) returns eigenvectors that are wrong by up to 1e-3 for clustered or
+/// strongly graded spectra, which a Krylov basis has. Every decomposition is therefore verified, and the QR iteration
+/// is used if it fails.
 pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
     let n = a.nrows();
     if n == 0 {
         return Some(SymmetricEigen { values: Vec::new(), vectors: Mat::zeros(0, 0) });
     }
     let full = Mat::from_fn(n, n, |i, j| a[(i.max(j), i.min(j))]);
-    // The maximum norm passes over NaN.
+    // The maximum norm ignores NaN.
     if !(0..n).all(|j| (0..n).all(|i| full[(i, j)].is_finite())) {
         return None;
     }
@@ -49,7 +49,7 @@ pub fn symmetric_eigen(a: MatRef<'_, f64>) -> Option<SymmetricEigen> {
         .or_else(|| decompose(&full, only_qr))
 }
 
-/// One decomposition, on one thread: its bits must not depend on the number of threads.
+/// Computes one decomposition on one thread: its bits must not depend on the number of threads.
 fn decompose(a: &Mat<f64>, params: SelfAdjointEvdParams) -> Option<SymmetricEigen> {
     let n = a.nrows();
     let mut values = Col::<f64>::zeros(n);
@@ -68,7 +68,7 @@ fn decompose(a: &Mat<f64>, params: SelfAdjointEvdParams) -> Option<SymmetricEige
     Some(SymmetricEigen { values: values.iter().copied().collect(), vectors })
 }
 
-/// Lower Cholesky factor of the dense symmetric matrix whose lower triangle is that of `a`; `None` when it is
+/// Returns the lower Cholesky factor of the dense symmetric matrix whose lower triangle is that of `a`; `None` if it is
 /// not positive definite.
 pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     let params = <LltParams as Auto<f64>>::auto().into();
@@ -83,8 +83,8 @@ pub fn dense_cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     Some(a)
 }
 
-/// The inverse of the dense symmetric positive definite matrix whose lower triangle is that of `a`, symmetric
-/// to the last bit; `None` when it is not positive definite.
+/// Returns the inverse of the dense symmetric positive definite matrix whose lower triangle is that of `a`, exactly
+/// symmetric; `None` if it is not positive definite.
 pub fn dense_inverse(a: Mat<f64>) -> Option<Mat<f64>> {
     let n = a.nrows();
     let lower = dense_cholesky(a)?;
@@ -94,7 +94,7 @@ pub fn dense_inverse(a: Mat<f64>) -> Option<Mat<f64>> {
     Some(Mat::from_fn(n, n, |i, j| inverse[(i.max(j), i.min(j))]))
 }
 
-/// |A V - V L| / |A|.
+/// Returns |A V - V L| / |A| in maximum norms.
 fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     let n = a.nrows();
     let scaled = Mat::from_fn(n, n, |i, j| eigen.vectors[(i, j)] * eigen.values[j]);
@@ -102,7 +102,8 @@ fn backward_error(a: &Mat<f64>, eigen: &SymmetricEigen) -> f64 {
     largest_entry(difference.as_ref()) / a.norm_max().max(f64::MIN_POSITIVE)
 }
 
-/// Q (n x n), orthogonal, and R (m x m) above zeros, with A = Q R for A (n x m), n >= m. On one thread.
+/// Returns the QR decomposition A = Q R of A (n x m), n >= m: Q (n x n) is orthogonal, R (m x m) stands above zeros.
+/// Runs on one thread.
 pub fn full_qr(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
     let (n, m) = (a.nrows(), a.ncols());
     let block = qr::recommended_block_size::<f64>(n, m);
@@ -126,7 +127,7 @@ pub fn full_qr(mut a: Mat<f64>) -> (Mat<f64>, Mat<f64>) {
     (q, Mat::from_fn(m, m, |i, j| if i <= j { a[(i, j)] } else { 0.0 }))
 }
 
-/// L^-1 B of a lower triangle L.
+/// Returns L^-1 B for a lower triangle L.
 pub fn solve_lower(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut x = b.clone();
     for j in 0..x.ncols() {
@@ -138,7 +139,7 @@ pub fn solve_lower(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     x
 }
 
-/// L^-T B of a lower triangle L.
+/// Returns L^-T B for a lower triangle L.
 pub fn solve_upper(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut x = b.clone();
     for j in 0..x.ncols() {
@@ -154,8 +155,7 @@ pub fn solve_upper(lower: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
 mod tests {
     use super::*;
 
-    /// Spectra over 14 decades in triples: the divide and conquer of faer 0.24.4 loses ten digits on such
-    /// matrices.
+    /// Spectra over 14 decades in triples, for which the divide-and-conquer method of faer 0.24.4 loses ten digits.
     #[test]
     fn graded_and_clustered_spectra_keep_their_backward_error() {
         for n in [5, 130, 210] {

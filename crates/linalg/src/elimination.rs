@@ -1,30 +1,31 @@
-//! Rows of a pencil that others determine, eliminated: u = T y, K -> T' K T, M -> T' M T.
+//! Elimination of dependent rows of a pencil: u = T y, K -> T' K T, M -> T' M T.
 
 use super::{CscMatrix, Pencil, SymmetricMatrix, combine, gram};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
-/// Columns per parallel task.
+/// Number of columns per parallel task.
 const COLUMNS: usize = 2048;
 
-/// T (N x m): the free rows of u are y, dependent rows are sums of free ones, all others are zero.
+/// Transformation T (N x m). The free rows of u are y, dependent rows are linear combinations of free ones, all others
+/// are zero.
 #[derive(Debug, Clone)]
 pub struct Elimination {
     n: usize,
     free: Vec<u32>,
     dependents: Vec<Dependents>,
-    /// Of each row: its place in y, or where it stands among the dependent ones.
+    /// Role of each row: its index in y, or its place among the dependent rows.
     kinds: Vec<RowRole>,
 }
 
-/// Rows that depend on the same others: u\[rows\] = W u\[on\].
+/// Rows that depend on common free rows: u\[rows\] = W u\[on\].
 #[derive(Debug, Clone)]
 pub struct Dependents {
-    /// Which rows.
+    /// Indices of the dependent rows.
     pub rows: Vec<usize>,
-    /// On which free rows they depend.
+    /// Indices of the free rows on which they depend.
     pub on: Vec<usize>,
-    /// W (rows x on).
+    /// Weights W (rows x on).
     pub weights: Mat<f64>,
 }
 
@@ -35,7 +36,7 @@ enum RowRole {
     Dependent(u32, u32),
 }
 
-/// The pencil (T' K T, T' M T), owned.
+/// Reduced pencil (T' K T, T' M T), owned.
 #[derive(Debug, Clone)]
 pub struct ReducedPencil {
     stiffness: SymmetricMatrix,
@@ -44,22 +45,22 @@ pub struct ReducedPencil {
 }
 
 impl ReducedPencil {
-    /// Bytes of both matrices.
+    /// Returns the bytes of both matrices.
     pub fn bytes(&self) -> u64 {
         12 * (self.stiffness.as_csc().nnz() + self.mass.as_csc().nnz()) as u64
     }
 
-    /// As a pencil.
+    /// Returns the matrices as a pencil.
     pub fn pencil(&self) -> Pencil<'_> {
         Pencil::new(&self.stiffness, &self.mass, self.block)
     }
 }
 
 impl Elimination {
-    /// T for `n` rows: `zero` ones, `dependents`, and all others free.
+    /// Builds T for `n` rows: the rows `zero` are zero, `dependents` depend on others, and all other rows are free.
     ///
     /// # Panics
-    /// When a row is given twice, or a row depends on one that is not free.
+    /// If a row is given twice, or a row depends on one that is not free.
     pub fn new(n: usize, zero: &[usize], dependents: Vec<Dependents>) -> Self {
         let mut kinds = vec![RowRole::Free(0); n];
         let mut set = |row: usize, kind: RowRole| {
@@ -84,22 +85,22 @@ impl Elimination {
         Self { n, free, dependents, kinds }
     }
 
-    /// Number m of free rows.
+    /// Returns the number m of free rows.
     pub fn len(&self) -> usize {
         self.free.len()
     }
 
-    /// Returns true when no row is free.
+    /// Returns true if no row is free.
     pub fn is_empty(&self) -> bool {
         self.free.is_empty()
     }
 
-    /// y: the free rows of u (N x k).
+    /// Returns y, the free rows of u (N x k).
     pub fn free_rows(&self, u: MatRef<'_, f64>) -> Mat<f64> {
         Mat::from_fn(self.len(), u.ncols(), |i, j| u[(self.free[i] as usize, j)])
     }
 
-    /// T y (N x k).
+    /// Returns T y (N x k).
     pub fn expand(&self, y: MatRef<'_, f64>) -> Mat<f64> {
         let mut u = Mat::zeros(self.n, y.ncols());
         for j in 0..y.ncols() {
@@ -117,7 +118,7 @@ impl Elimination {
         u
     }
 
-    /// T' f (m x k).
+    /// Returns T' f (m x k).
     pub fn restrict(&self, f: MatRef<'_, f64>) -> Mat<f64> {
         let mut out = self.free_rows(f);
         for Dependents { rows, on, weights } in &self.dependents {
@@ -132,10 +133,10 @@ impl Elimination {
         out
     }
 
-    /// The reduced pencil. It keeps the blocks of `pencil` where whole nodes are left.
+    /// Returns the reduced pencil. It keeps the block size of `pencil` if nodes are eliminated as a whole.
     ///
     /// # Panics
-    /// When the pencil has not N rows.
+    /// If the pencil does not have N rows.
     pub fn reduced(&self, pencil: &Pencil<'_>) -> ReducedPencil {
         assert_eq!(pencil.n(), self.n, "rows of the pencil");
         let block = pencil.block();
@@ -154,10 +155,10 @@ impl Elimination {
         }
     }
 
-    /// T' (A kron I_block) T.
+    /// Returns T' (A kron I_block) T.
     fn congruence(&self, a: &SymmetricMatrix, block: usize) -> SymmetricMatrix {
         let m = self.len();
-        // Of each free row: the dependent ones that take part of it.
+        // Dependent rows that contain each free row, with their weights.
         let mut taken: Vec<Vec<(usize, f64)>> = vec![Vec::new(); m];
         for Dependents { rows, on, weights } in &self.dependents {
             for (i, &row) in rows.iter().enumerate() {
@@ -166,6 +167,7 @@ impl Elimination {
                 }
             }
         }
+        // Each chunk sums its columns in dense scratch space and stores the touched rows in order.
         let chunk = |first: usize| {
             let mut column = ColumnSums { sums: vec![0.0; m], met: vec![false; m], rows: Vec::new() };
             let (mut lengths, mut row_idx, mut values) = (Vec::new(), Vec::new(), Vec::new());
@@ -198,12 +200,12 @@ impl Elimination {
             values.extend(entries);
         }
         let matrix = CscMatrix::from_parts(m, m, col_ptr, row_idx, values);
-        // Without dependent rows entries are only left out; sums may round differently on both sides of the
-        // diagonal.
+        // Without dependent rows the result is exactly symmetric. Otherwise sums may round differently on both sides of
+        // the diagonal.
         SymmetricMatrix::try_from(matrix).unwrap_or_else(SymmetricMatrix::symmetrised)
     }
 
-    /// Adds T' of `value` in one row.
+    /// Adds T' of a vector with `value` in one row and zeros elsewhere.
     fn add(&self, column: &mut ColumnSums, row: usize, value: f64) {
         match self.kinds[row] {
             RowRole::Zero => {}
@@ -225,7 +227,7 @@ impl Elimination {
     }
 }
 
-/// Sums of one column in the making.
+/// Scratch space for the sums of one column.
 struct ColumnSums {
     sums: Vec<f64>,
     met: Vec<bool>,
@@ -247,7 +249,7 @@ impl ColumnSums {
 mod tests {
     use super::*;
 
-    /// A symmetric band matrix.
+    /// Returns a symmetric band matrix.
     fn band(n: usize, seed: usize) -> SymmetricMatrix {
         let value = |i: usize, j: usize| ((i.min(j) * 7 + i.max(j) * 3 + seed) as f64).sin() + 1.5;
         let entries: Vec<(u32, u32, f64)> = (0..n)

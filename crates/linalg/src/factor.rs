@@ -1,5 +1,5 @@
-//! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu,
-//! SIAM Review 34 (1992) 82), in double or single precision. One symbolic analysis serves every shift.
+//! Sparse Cholesky factor of K + tau M by the multifrontal method (Duff and Reid, ACM TOMS 9 (1983) 302; Liu, SIAM
+//! Review 34 (1992) 82), in double or single precision. One symbolic analysis serves all shifts.
 
 use super::assembly_tree::AssemblyTree;
 use super::front::{self, Real, Trapezoid, extend_add};
@@ -14,35 +14,35 @@ use rayon::prelude::*;
 use std::convert::Infallible;
 use std::sync::{Arc, OnceLock};
 
-/// Elimination order of one pencil: computed when the first factor needs it, and kept for all later ones.
+/// Elimination order of one pencil: computed for the first factor, and kept for all later ones.
 #[derive(Debug, Clone, Default)]
 pub struct EliminationOrder(OnceLock<Arc<Analysis>>);
 
 impl EliminationOrder {
-    /// Returns the analysis of `pencil`, which must be the same at every call; `None` when memory runs out.
+    /// Returns the analysis of `pencil`, which must be the same at every call; `None` if memory runs out.
     pub fn of(&self, pencil: &Pencil<'_>) -> Option<Arc<Analysis>> {
         if let Some(known) = self.0.get() {
             return Some(Arc::clone(known));
         }
-        // Not inside `get_or_init`: a thread that waits there could hold up the tasks that the analysis consists of.
+        // Not inside `get_or_init`: a thread that waits there could block the tasks of the analysis.
         let found = Arc::new(Analysis::new(pencil)?);
         Some(Arc::clone(self.0.get_or_init(|| found)))
     }
 }
 
-/// Elimination order and structure of the factor of K - sigma M: valid for every sigma.
+/// Elimination order and structure of the factor of K - sigma M, valid for every sigma.
 #[derive(Debug)]
 pub struct Analysis {
     pub(super) tree: Arc<AssemblyTree>,
     pub(super) walk: TreeWalk,
-    /// Rows per vertex of the tree.
+    /// Number of rows per vertex of the tree.
     pub(super) block: usize,
     flops: f64,
     len: usize,
 }
 
 impl Analysis {
-    /// Orders and analyses the pencil; `None` when memory runs out.
+    /// Orders and analyses the pencil; `None` if memory runs out.
     pub fn new(pencil: &Pencil<'_>) -> Option<Self> {
         let (mut graph, rows) = smallest_graph(pencil)?;
         let order = nested_dissection(&mut graph)?;
@@ -57,17 +57,17 @@ impl Analysis {
         Self { walk, block, flops: work.iter().sum(), len, tree }
     }
 
-    /// Numbers stored in a factor.
+    /// Returns the number of entries stored in a factor.
     pub fn factor_len(&self) -> usize {
         self.len
     }
 
-    /// Multiplications and additions of one Cholesky factorisation.
+    /// Returns the multiplications and additions of one Cholesky factorisation.
     pub fn flops(&self) -> f64 {
         self.flops
     }
 
-    /// Most numbers held at a time, with `threads` subtrees in work at the same time.
+    /// Returns the largest number of entries held at a time, if `threads` subtrees are factored in parallel.
     pub fn peaks(&self, threads: usize) -> Peaks {
         let pivots = |s: usize| {
             let (width, rest) = self.tree.front(s, self.block);
@@ -81,26 +81,26 @@ impl Analysis {
         Peaks {
             factor: self.len as u64,
             cholesky: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: 0 }),
-            // L and L B.
+            // An inertia count holds L and L B.
             inertia: numbers(&|s| Needs { kept: 0, handed_on: rest(s), in_work: 2 * pivots(s) }),
             kept_inertia: numbers(&|s| Needs { kept: pivots(s), handed_on: rest(s), in_work: pivots(s) }),
         }
     }
 
-    /// Zeros for the columns of a front, and for its Schur complement.
+    /// Returns zeros for the columns of a front and for its Schur complement.
     pub(super) fn new_front<T: Real>(&self, s: usize) -> (Trapezoid<T>, Trapezoid<T>) {
         let (width, rest) = self.tree.front(s, self.block);
         (Trapezoid::zeros(width + rest, width), Trapezoid::zeros(rest, rest))
     }
 
-    /// Row of the parent's front for each row below the columns of `s`.
+    /// Returns the row of the parent's front for each row below the columns of `s`.
     pub(super) fn places(&self, s: usize) -> Vec<usize> {
         let rows = |&place: &u32| (0..self.block).map(move |b| place as usize * self.block + b);
         self.tree.places(s).iter().flat_map(rows).collect()
     }
 
-    /// K - sigma M, scaled to a diagonal of about one by powers of two: exact, and within the range of single
-    /// precision in any units.
+    /// Returns K - sigma M scaled to a diagonal of about one by powers of two. The scaling is exact, and keeps the
+    /// entries within the range of single precision in any units.
     pub(super) fn scaled<'a>(&'a self, pencil: &'a Pencil<'a>, sigma: f64) -> Scaled<'a> {
         let diagonals = pencil.stiffness().diagonal().into_iter().zip(pencil.mass_diagonal());
         let scale = diagonals.map(|(k, m)| {
@@ -111,26 +111,26 @@ impl Analysis {
     }
 }
 
-/// Most numbers held at a time.
+/// Largest numbers of entries held at a time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Peaks {
-    /// By a Cholesky factor when it is done.
+    /// Entries of a finished Cholesky factor.
     pub factor: u64,
-    /// During a Cholesky factorisation.
+    /// Entries during a Cholesky factorisation.
     pub cholesky: u64,
-    /// During an inertia count that forgets its factor.
+    /// Entries during an inertia count that does not keep its factor.
     pub inertia: u64,
-    /// During one that keeps it.
+    /// Entries during an inertia count that keeps its factor.
     pub kept_inertia: u64,
 }
 
-/// Multiplications and additions that eliminate `width` columns with `rest` rows below them.
+/// Returns the multiplications and additions for the elimination of `width` columns with `rest` rows below them.
 fn elimination_flops((width, rest): (usize, usize)) -> f64 {
     let (w, r) = (width as f64, rest as f64);
     w * w * w / 3.0 + w * w * r + w * r * r
 }
 
-/// S (K - sigma M) S with the diagonal S, row by row.
+/// Scaled matrix S (K - sigma M) S with the diagonal S, row by row.
 pub(super) struct Scaled<'a> {
     analysis: &'a Analysis,
     pencil: &'a Pencil<'a>,
@@ -150,7 +150,7 @@ impl Scaled<'_> {
         }
     }
 
-    /// Adds the columns of K that a vertex has, the first of which is `local` in the front.
+    /// Adds the columns of K of one vertex; the first of them has index `local` in the front.
     fn assemble_stiffness<T: Real>(
         &self,
         local: usize,
@@ -174,7 +174,8 @@ impl Scaled<'_> {
         }
     }
 
-    /// Adds the same columns of -sigma M: of the rows of Ms that a vertex has, each is for as many rows of M.
+    /// Adds the columns of -sigma M of one vertex. Each row of Ms stands for as many rows of M as the pencil's block
+    /// has.
     fn assemble_mass<T: Real>(&self, local: usize, places: &mut FrontPlaces<'_>, front: &mut Trapezoid<T>) {
         let block = self.analysis.block;
         let vertex = places.vertex();
@@ -198,24 +199,24 @@ impl Scaled<'_> {
     }
 }
 
-/// Places of vertices in the front of a supernode, for the entries of one of its columns of vertices: looked up
-/// once for all rows of the vertex.
+/// Indices of vertices in the front of a supernode, for the entries of one column of vertices. Each vertex is looked up
+/// once for all rows of that column.
 struct FrontPlaces<'a> {
     tree: &'a AssemblyTree,
     s: usize,
     column: usize,
-    /// Vertices, ascending, and their places.
+    /// Vertices, ascending, with their indices; `None` for a vertex that is eliminated earlier.
     known: Vec<(usize, Option<usize>)>,
 }
 
 impl FrontPlaces<'_> {
-    /// The vertex of the column.
+    /// Returns the vertex of the column.
     fn vertex(&self) -> usize {
         self.tree.order()[self.column] as usize
     }
 
-    /// The place of a vertex that is eliminated not before the column. The vertices of a row come ascending: `at`
-    /// is where the last one stood, at first zero.
+    /// Returns the index of a vertex in the front; `None` if it is eliminated before the column. The vertices of a row
+    /// must be asked for in ascending order: `at` is the search position of the last one, zero at first.
     fn of(&mut self, vertex: usize, at: &mut usize) -> Option<usize> {
         while self.known.get(*at).is_some_and(|known| known.0 < vertex) {
             *at += 1;
@@ -244,9 +245,9 @@ impl FrontPlaces<'_> {
     }
 }
 
-/// Something that solves with K + tau M: the sparse factor, or the dense one of a small model.
+/// Solver for K + tau M: a sparse factor, or the dense factor of a small model.
 pub trait Solve {
-    /// The shift tau.
+    /// Returns the shift tau.
     fn shift(&self) -> f64;
 
     /// Replaces X (n x k) by (K + tau M)^-1 X.
@@ -264,7 +265,7 @@ pub struct Cholesky<'a, T = f64> {
 }
 
 impl<'a, T: Real> Cholesky<'a, T> {
-    /// Factors K + tau M; `None` when the matrix is not positive definite.
+    /// Factors K + tau M; `None` if the matrix is not positive definite.
     pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, tau: f64) -> Option<Self> {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, -tau);
@@ -278,7 +279,7 @@ impl<'a, T: Real> Cholesky<'a, T> {
         Some(Self { analysis, fronts, scale: matrix.scale, tau })
     }
 
-    /// Solves for the columns of `x`, of which there are at most `K`, in the precision of the factor.
+    /// Solves for the columns of `x`, at most `K`, in the precision of the factor.
     fn solve_block<const K: usize>(&self, x: MatMut<'_, f64>) {
         let forward = |s: usize, front: &mut [[T; K]]| substitution::forward(&self.fronts[s], front);
         let backward = |s: usize, front: &mut [[T; K]]| substitution::backward(&self.fronts[s], front);
@@ -286,8 +287,8 @@ impl<'a, T: Real> Cholesky<'a, T> {
     }
 }
 
-/// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and
-/// eliminates its columns. The columns of the factor, and what is handed on to the parent; `None` when a pivot is
+/// Assembles the front of supernode `s` from the entries of `matrix` and the contributions of its children, and
+/// eliminates its columns. Returns the columns of the factor and the contribution to the parent; `None` if a pivot is
 /// not positive.
 fn eliminate_front<T: Real>(
     analysis: &Analysis,
@@ -304,7 +305,7 @@ fn eliminate_front<T: Real>(
     Some((pivots, rest))
 }
 
-/// Returns true when a matrix has a Cholesky factor with numbers of type `T`, which is forgotten front by front.
+/// Returns true if a matrix has a Cholesky factor with numbers of type `T`. The factor is not kept.
 fn is_positive_definite<T: Real>(analysis: &Analysis, matrix: &SymmetricMatrix) -> bool {
     let pencil = Pencil::new(matrix, matrix, 1);
     let matrix = analysis.scaled(&pencil, 0.0);
@@ -314,12 +315,11 @@ fn is_positive_definite<T: Real>(analysis: &Analysis, matrix: &SymmetricMatrix) 
     analysis.walk.up(&analysis.tree, &mut vec![(); analysis.tree.len()], &visit).is_ok()
 }
 
-/// Rows that a task reorders: that takes far longer than to start it.
+/// Smallest number of rows that a task reorders, so that the work is far longer than the start of the task.
 const ROWS: usize = 4096;
 
-/// Substitution over the tree, up and down, for the columns of `x`, of which there are at most `K`, with the
-/// scale of each row. `forward` eliminates the leading rows of the front of a supernode, `backward` finds
-/// them from those below.
+/// Substitutes upward and downward over the tree for the columns of `x`, at most `K`, with the `scale` of each row.
+/// `forward` eliminates the leading rows of the front of a supernode; `backward` computes them from the rows below.
 pub(super) fn substitute<T: Real, const K: usize>(
     analysis: &Analysis,
     scale: &[f64],
@@ -336,6 +336,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
         slots.push(own);
         rest = tail;
     }
+    // Upward: collect the contributions of the children, eliminate, hand on the rest.
     let up = |s: usize, own: &mut &mut [[T; K]], children: Vec<Vec<[T; K]>>| {
         let (width, below) = tree.front(s, block);
         let mut front = vec![[T::default(); K]; width + below];
@@ -352,6 +353,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
         Ok::<_, Infallible>(front.split_off(own.len()))
     };
     let Ok(()) = analysis.walk.up(tree, &mut slots, &up);
+    // Downward: append the solution of the rows below, solve, and send each child its rows.
     let down = |s: usize, own: &mut &mut [[T; K]], below: Option<Vec<[T; K]>>| {
         let mut front = own.to_vec();
         front.extend(below.unwrap_or_default());
@@ -368,6 +370,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
         tree.children(s).iter().map(|&c| message(c)).collect()
     };
     analysis.walk.down(tree, &mut slots, &down);
+    // Back to the order and scale of the model.
     let columns_per_task = (ROWS / x.nrows().max(1)).max(1);
     let columns: Vec<_> = x.col_iter_mut().collect();
     columns.into_par_iter().with_min_len(columns_per_task).enumerate().for_each(|(j, mut to)| {
@@ -379,7 +382,7 @@ pub(super) fn substitute<T: Real, const K: usize>(
     });
 }
 
-/// The scaled rows of at most `K` columns of `x` in the order in which they are eliminated.
+/// Returns the scaled rows of at most `K` columns of `x` in elimination order.
 fn in_elimination_order<T: Real, const K: usize>(
     analysis: &Analysis,
     scale: &[f64],
@@ -397,7 +400,7 @@ fn in_elimination_order<T: Real, const K: usize>(
     (0..x.nrows()).into_par_iter().with_min_len(ROWS).map(scaled).collect()
 }
 
-/// Columns solved at once: the factor is streamed once for all of them.
+/// Number of columns that are solved together: the factor is read from memory once for all of them.
 pub(super) const COLUMNS: usize = 8;
 
 impl<T: Real> Solve for Cholesky<'_, T> {
@@ -421,8 +424,8 @@ impl<T: Real> Solve for Cholesky<'_, T> {
     }
 }
 
-/// Part of the entries that K and M may have together from which on the factor of M is given the structure of that of
-/// both: to find its own takes longer than what it saves.
+/// Ratio of the number of entries of M to that of K, both counted in blocks of vertices, above which the factor of M
+/// uses the structure of the joint factor: computing its own structure would take longer than it saves.
 const NEARLY_FULL: f64 = 0.5;
 
 /// Part of the largest diagonal entry of M up to which entries of a row without a positive diagonal are rounding.
@@ -437,10 +440,12 @@ fn has_row_without_mass_that_couples(mass: &SymmetricMatrix) -> bool {
     diagonal.iter().enumerate().any(|(row, entry)| *entry <= 0.0 && couples(row))
 }
 
-/// Returns true when M is positive semidefinite up to rounding: its Cholesky factorisation succeeds after the diagonal has been
-/// raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix). Most masses of
-/// displacements are far from the border: where it succeeds in single precision with a diagonal that is 1e-3 less, that
-/// settles it in half the time. Those of rotations are near it. Uses the order of `analysis`, which is that of the pencil.
+/// Returns true if M is positive semidefinite up to rounding. Its Cholesky factorisation must succeed after the
+/// diagonal is raised by 1e-9 of itself (massless nodes get a one, which couples to nothing in such a matrix).
+///
+/// Most masses of displacements are far from singular: if the factorisation succeeds in single precision with a
+/// diagonal lowered by 1e-3, the answer is found in half the time. Masses of rotations are nearly singular. The order
+/// is that of `analysis`, which must belong to the pencil.
 pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> bool {
     let mass = pencil.mass();
     if has_row_without_mass_that_couples(mass) {
@@ -448,6 +453,7 @@ pub fn is_positive_semidefinite(pencil: &Pencil<'_>, analysis: &Analysis) -> boo
     }
     let order = analysis.tree.order();
     let rows = (mass.n() / order.len().max(1)).max(1);
+    // Count the entries of both matrices in blocks of vertices.
     let by_vertices =
         |matrix: &SymmetricMatrix, rows: usize| matrix.as_csc().nnz() as f64 / (rows * rows) as f64;
     let full = by_vertices(pencil.stiffness(), rows * pencil.block());

@@ -1,6 +1,6 @@
-//! Products of a tall block with a few columns, as orthogonalisation takes them. Nothing is packed first, as general
-//! matrix products do, which then take longer over that than over the products. Sums run over blocks of rows, and in
-//! these over lanes, in a fixed order.
+//! Products of a tall block with a few columns, as in orthogonalisation. General matrix products pack their operands
+//! first, which here takes longer than the products. Sums run over blocks of rows, and within these over lanes, in a
+//! fixed order.
 
 use super::contiguous::{contiguous, contiguous_mut};
 use super::instructions::prefetch;
@@ -9,48 +9,49 @@ use faer::{Mat, MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
-/// Columns up to which these products are faster than general ones.
+/// Largest number of columns for which these products are faster than general ones.
 pub(super) const FEW: usize = 8;
 
-/// Rows that are taken together: those of the few columns and of some of the others stay in the nearest cache.
+/// Number of rows in a block: the rows of the few columns and of some others stay in the first-level cache.
 const ROWS: usize = 256;
 
-/// Columns of the tall block that are taken together: of a product, and of a combination.
+/// Number of columns of the tall block in a tile of a product.
 const TOGETHER: usize = 3;
+/// Number of columns of the tall block in a tile of a combination.
 const COMBINED: usize = 4;
 
-/// A' B (m x k) for A (n x m) and a few columns B (n x k).
+/// Returns A' B (m x k) for A (n x m) and a few columns B (n x k).
 pub(super) fn gram_of_few(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut sums = Mat::zeros(a.ncols(), b.ncols());
     Arch::new().dispatch(Tiles::<_, TOGETHER>(Gram { a, b, sums: sums.as_mut() }));
     sums
 }
 
-/// W += alpha V H for V (n x m), a few columns W (n x k) and small H (m x k).
+/// Adds alpha V H to W for V (n x m), a few columns W (n x k) and small H (m x k).
 pub(super) fn add_few_combinations(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>, alpha: f64) {
     Arch::new().dispatch(Tiles::<_, COMBINED>(Combination { w, v, h, alpha }));
 }
 
-/// Blocks of rows.
+/// Returns the blocks of rows.
 fn blocks(rows: usize) -> impl Iterator<Item = Range<usize>> {
     (0..rows).step_by(ROWS).map(move |first| first..rows.min(first + ROWS))
 }
 
-/// Numbers from the rows that are worked on, of some columns from `first` on, to those that come next: the same
-/// rows of the next columns, or the next rows of the first ones.
+/// Returns the offset, in numbers, from the current rows of `columns` columns from `first` on to the rows that are read
+/// next: the current rows of the next columns, or the next rows of the first columns.
 fn ahead(a: MatRef<'_, f64>, first: usize, columns: usize) -> isize {
     let next = if first + columns < a.ncols() { 0 } else { ROWS as isize };
     let moved = if next == 0 { columns as isize } else { -(first as isize) };
     moved * a.col_stride() + next
 }
 
-/// Some rows of the columns from `first` on.
+/// Returns some rows of the columns from `first` on.
 #[inline(always)]
 fn columns_of<'a, const N: usize>(a: MatRef<'a, f64>, first: usize, rows: &Range<usize>) -> [&'a [f64]; N] {
     std::array::from_fn(|k| &contiguous(a.col(first + k))[rows.clone()])
 }
 
-/// Columns of equal length as vectors, and what is left of them.
+/// Splits columns of equal length into vectors and a rest.
 #[inline(always)]
 fn vectors<S: Simd, const N: usize>(columns: [&[f64]; N]) -> ([&[S::f64s]; N], [&[f64]; N]) {
     let split = columns.map(S::as_simd_f64s);
@@ -58,21 +59,21 @@ fn vectors<S: Simd, const N: usize>(columns: [&[f64]; N]) -> ([&[S::f64s]; N], [
     (split.map(|(vectors, _)| &vectors[..count]), split.map(|(_, rest)| rest))
 }
 
-/// Returns true when the machine has registers for the sums of twice as many columns.
+/// Returns true if the machine has registers for the sums of twice as many columns.
 fn has_long_vectors<S: Simd>() -> bool {
     size_of::<S::f64s>() == 64
 }
 
-/// A product of a tall block with a few columns, made tile by tile.
+/// Product of a tall block with a few columns, computed tile by tile.
 trait Tiled {
-    /// The tall block.
+    /// Returns the tall block.
     fn tall(&self) -> MatRef<'_, f64>;
 
-    /// How many the few columns are.
+    /// Returns the number of the few columns.
     fn few(&self) -> usize;
 
-    /// Adds what `A` columns of the tall block, from the `first` on, and `B` of the few, from `column` on, contribute
-    /// over some rows.
+    /// Adds the contribution of `A` columns of the tall block from `first` on and `B` of the few columns from `column`
+    /// on, over some rows.
     fn add_tile<S: Simd, const A: usize, const B: usize>(
         &mut self,
         simd: S,
@@ -82,12 +83,12 @@ trait Tiled {
     );
 }
 
-/// All tiles, with `G` columns of the tall block where there are so many left, and as many of the few as the sums have
-/// registers for.
+/// Loop over all tiles: `G` columns of the tall block at a time as long as enough are left, and as many of the few
+/// columns as the registers hold sums for.
 struct Tiles<T, const G: usize>(T);
 
-// What is dispatched are structures with loops, not closures, which may be compiled apart from the function that has
-// the instruction set.
+// Structures with loops are dispatched instead of closures: a closure may be compiled outside the function that has the
+// instruction set.
 impl<T: Tiled, const G: usize> WithSimd for Tiles<T, G> {
     type Output = ();
 
@@ -110,7 +111,7 @@ impl<T: Tiled, const G: usize> WithSimd for Tiles<T, G> {
 }
 
 impl<T: Tiled, const G: usize> Tiles<T, G> {
-    /// The tiles of `A` columns of the tall block with all of the few.
+    /// Adds the tiles of `A` columns of the tall block with all of the few columns.
     #[inline(always)]
     fn add_columns<S: Simd, const A: usize>(&mut self, simd: S, first: usize, rows: &Range<usize>) {
         let k = self.0.few();
@@ -134,7 +135,7 @@ impl<T: Tiled, const G: usize> Tiles<T, G> {
     }
 }
 
-/// Adds A' B to the sums.
+/// Product A' B, added to the sums.
 struct Gram<'a> {
     a: MatRef<'a, f64>,
     b: MatRef<'a, f64>,
@@ -173,7 +174,7 @@ impl Tiled for Gram<'_> {
     }
 }
 
-/// Products of all pairs of columns of equal length. Asks for the numbers that are `ahead` of those of A.
+/// Returns the products of all pairs of columns of equal length. Prefetches the numbers that are `ahead` of those of A.
 #[inline(always)]
 fn products<S: Simd, const A: usize, const B: usize>(
     simd: S,
@@ -183,6 +184,7 @@ fn products<S: Simd, const A: usize, const B: usize>(
 ) -> [[f64; B]; A] {
     let (a_vectors, a_rest) = vectors::<S, A>(a);
     let (b_vectors, b_rest) = vectors::<S, B>(b);
+    // One vector of partial sums for each pair of columns.
     let mut sums = [[simd.splat_f64s(0.0); B]; A];
     for i in 0..a_vectors[0].len() {
         for a in &a_vectors {
@@ -195,6 +197,7 @@ fn products<S: Simd, const A: usize, const B: usize>(
             }
         }
     }
+    // Sums over the lanes, and the rows that do not fill a vector.
     let mut totals = [[0.0; B]; A];
     for q in 0..A {
         for c in 0..B {
@@ -207,7 +210,7 @@ fn products<S: Simd, const A: usize, const B: usize>(
     totals
 }
 
-/// W += alpha V H.
+/// Combination W += alpha V H.
 struct Combination<'a> {
     w: MatMut<'a, f64>,
     v: MatRef<'a, f64>,
@@ -242,7 +245,7 @@ impl Tiled for Combination<'_> {
     }
 }
 
-/// W += V factors for columns of equal length. Asks for the numbers that are `ahead` of those of V.
+/// Adds V times `factors` to W for columns of equal length. Prefetches the numbers that are `ahead` of those of V.
 #[inline(always)]
 fn add_multiples<S: Simd, const V: usize, const W: usize>(
     simd: S,
@@ -271,14 +274,14 @@ fn add_multiples<S: Simd, const V: usize, const W: usize>(
     }
 }
 
-/// Columns of vectors as pairs, and what is left of them.
+/// Splits columns of vectors into pairs and a rest.
 #[inline(always)]
 fn chunks<V, const N: usize>(columns: [&[V]; N]) -> ([&[[V; 2]]; N], [&[V]; N]) {
     let split = columns.map(<[V]>::as_chunks);
     (split.map(|(pairs, _)| pairs), split.map(|(_, odd)| odd))
 }
 
-/// The same for groups of `R` vectors, whose sums are in work together.
+/// Adds V times `factors` to W for groups of `R` vectors, whose sums are computed together.
 #[inline(always)]
 fn add_to_vectors<S: Simd, const R: usize, const V: usize, const W: usize>(
     simd: S,
@@ -306,7 +309,7 @@ fn add_to_vectors<S: Simd, const R: usize, const V: usize, const W: usize>(
     }
 }
 
-/// Asks for the numbers that are `ahead` of some vectors.
+/// Prefetches the numbers that are `ahead` of some vectors.
 #[inline(always)]
 fn prefetch_vectors<V>(vectors: &[V], ahead: isize) {
     for vector in vectors {
@@ -322,7 +325,7 @@ mod tests {
         Mat::from_fn(rows, columns, |i, j| (seed + (i * 7 + j * 13) as f64).sin())
     }
 
-    /// Both products against their definition, with whole and begun vectors, tiles and blocks of rows.
+    /// Both products match their definition, with full and partial vectors, tiles and blocks of rows.
     #[test]
     fn products_with_a_few_columns_match_their_definition() {
         for rows in [0, 1, 7, 8, 29, ROWS, ROWS + 21] {

@@ -1,6 +1,5 @@
-//! Dense fronts: trapezoids cut into panels of columns, each panel row-major, and the kernels that eliminate
-//! the leading columns of a front. Work is cut into fixed pieces of rows, so that the bits do not depend on
-//! the number of threads.
+//! Dense fronts: trapezoids in panels of columns, each panel row-major, and the kernels that eliminate the leading
+//! columns of a front. Work is cut into fixed pieces of rows, so that the bits do not depend on the number of threads.
 
 use faer::linalg::cholesky::llt;
 use faer::linalg::matmul::matmul;
@@ -10,17 +9,17 @@ use faer::{Accum, MatMut, MatRef, Par, Spec};
 use rayon::prelude::*;
 use std::ops::{AddAssign, Mul, Neg};
 
-/// Columns of a panel: large enough for products at full speed, small enough for its triangles to cost
+/// Number of columns of a panel: large enough for products at full speed, small enough for its triangles to cost
 /// little.
 pub(super) const PANEL: usize = 128;
 
-/// Rows of a piece of parallel work.
+/// Number of rows in a piece of parallel work.
 pub(super) const ROWS: usize = 256;
 
-/// Multiplications below which a piece of work is not worth a task.
+/// Number of multiplications below which work is not divided into tasks.
 pub(super) const WORTH_A_TASK: usize = 4_000_000;
 
-/// The numbers of a factor.
+/// Number type of a factor.
 pub trait Real:
     faer::traits::RealField
     + pulp::bytemuck::Pod
@@ -34,16 +33,16 @@ pub trait Real:
 {
     /// Unit roundoff.
     const ROUNDOFF: f64;
-    /// Entries of a factor below this count as zero, beside a diagonal of about one: products of larger ones
-    /// stay above the smallest normal number. Numbers below that are up to a hundred times slower on some
-    /// processors, and the factor of a mass matrix decays to them within a few elements. Zero where no factor
-    /// comes near.
+    /// Magnitude below which entries of a factor are set to zero, for a diagonal of about one: products of larger
+    /// entries stay above the smallest normal number. Subnormal numbers are up to a hundred times slower on some
+    /// processors, and the factor of a mass matrix decays to them within a few elements. Zero if no factor comes near
+    /// the smallest normal number.
     const NEGLIGIBLE: f64;
-    /// Rounded from double precision.
+    /// Returns the number rounded from double precision.
     fn of(x: f64) -> Self;
-    /// In double precision.
+    /// Returns the number in double precision.
     fn wide(self) -> f64;
-    /// Numbers in double precision: themselves, or as they are put into `room`.
+    /// Returns the numbers in double precision: themselves, or converted into `room`.
     fn all_wide<'a>(numbers: &'a [Self], room: &'a mut Vec<f64>) -> &'a [f64];
 }
 
@@ -77,9 +76,8 @@ impl Real for f32 {
     }
 }
 
-/// Columns 0..width of the lower triangle of a symmetric matrix with `height` rows. Panel p holds the columns
-/// from p [`PANEL`] and the rows from there down, row by row; above the diagonal of its leading square stands
-/// nothing of use.
+/// Columns 0..width of the lower triangle of a symmetric matrix with `height` rows. Panel p holds the columns from p
+/// [`PANEL`] and the rows from there down, row by row. The entries above the diagonal of its leading square are unused.
 #[derive(Debug, Default)]
 pub(crate) struct Trapezoid<T> {
     height: usize,
@@ -101,7 +99,7 @@ impl<T: Real> Trapezoid<T> {
         self.width
     }
 
-    /// Number of entries stored for this shape.
+    /// Returns the number of entries stored for this shape.
     pub(crate) fn stored(height: usize, width: usize) -> usize {
         (0..width.div_ceil(PANEL)).map(|p| (height - p * PANEL) * PANEL.min(width - p * PANEL)).sum()
     }
@@ -116,7 +114,7 @@ impl<T: Real> Trapezoid<T> {
         self.panels[p][at] += value;
     }
 
-    /// Rows `from..` (counted in the trapezoid) of panel `p`.
+    /// Returns the rows `from..` (counted in the trapezoid) of panel `p`.
     pub(super) fn below(&self, p: usize, from: usize) -> MatRef<'_, T> {
         let width = self.panel_width(p);
         let skipped = from - p * PANEL;
@@ -124,8 +122,8 @@ impl<T: Real> Trapezoid<T> {
     }
 }
 
-/// Adds `source`, whose rows and columns are `places` of the front with columns `pivots` and Schur complement
-/// `rest`.
+/// Adds `source` to the front with columns `pivots` and Schur complement `rest`. `places` are the indices of its rows
+/// and columns in the front.
 pub(super) fn extend_add<T: Real>(
     pivots: &mut Trapezoid<T>,
     rest: &mut Trapezoid<T>,
@@ -135,10 +133,11 @@ pub(super) fn extend_add<T: Real>(
     let w = pivots.width;
     for (p, panel) in source.panels.iter().enumerate() {
         let (first, width) = (p * PANEL, source.panel_width(p));
+        // Columns that stay adjacent are added run by run.
         let runs = runs(&places[first..first + width], w);
         for (i, row) in panel.chunks_exact(width).enumerate() {
             let place = places[first + i];
-            // Columns of the leading square above the diagonal hold nothing.
+            // The leading square is unused above the diagonal.
             let used = (i + 1).min(width);
             for run in &runs {
                 if run.source >= used {
@@ -158,7 +157,7 @@ pub(super) fn extend_add<T: Real>(
     }
 }
 
-/// Consecutive columns that go to consecutive columns of one panel.
+/// Consecutive columns that are added to consecutive columns of one panel.
 struct Run {
     source: usize,
     length: usize,
@@ -183,8 +182,8 @@ fn runs(places: &[usize], pivots: usize) -> Vec<Run> {
     runs
 }
 
-/// Runs `work(index, piece)` on pieces of [`ROWS`] rows of a row-major block, at the same time when that
-/// pays.
+/// Runs `work(index, piece)` on pieces of [`ROWS`] rows of a row-major block, in parallel if `cost` multiplications are
+/// worth it.
 pub(super) fn by_rows<T: Real>(
     block: &mut [T],
     width: usize,
@@ -198,7 +197,7 @@ pub(super) fn by_rows<T: Real>(
     }
 }
 
-/// C -= A B' on the lower triangle of a square C.
+/// Subtracts A B' from the lower triangle of a square C.
 fn subtract_lower<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
     triangular::matmul(
         c,
@@ -213,13 +212,13 @@ fn subtract_lower<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>)
     );
 }
 
-/// C -= A B'.
+/// Subtracts A B' from C.
 fn subtract<T: Real>(c: MatMut<'_, T>, a: MatRef<'_, T>, b: MatRef<'_, T>) {
     matmul(c, Accum::Add, a, b.transpose(), T::of(-1.0), Par::Seq);
 }
 
-/// Subtracts from one panel (rows from its own first column on) the product of the eliminated panels `left`
-/// with `right`: A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B.
+/// Subtracts the product of the eliminated panels `left` and `right` from one panel (its rows start at its own first
+/// column): A -= sum over p of L_p R_p'. For Cholesky both are L; otherwise R = L B.
 pub(super) fn subtract_eliminated<T: Real>(
     target: &mut [T],
     width: usize,
@@ -242,7 +241,8 @@ pub(super) fn subtract_eliminated<T: Real>(
     }
 }
 
-/// X <- X L^-T for the rows of a panel below its square; L is lower triangular.
+/// Computes X <- X L^-T for the rows of a panel below its square, with a lower triangle L. `unit` means a unit
+/// diagonal.
 pub(super) fn divide_rows<T: Real>(below: &mut [T], l: MatRef<'_, T>, unit: bool) {
     let width = l.ncols();
     by_rows(below, width, below.len() * width, |_, rows| {
@@ -269,8 +269,8 @@ pub(super) fn drop_negligible<T: Real>(entries: &mut [T]) {
     }
 }
 
-/// Cholesky of the columns `pivots` of a front; their contribution is subtracted from `rest`. `None` when a
-/// pivot is not positive.
+/// Computes the Cholesky factor of the columns `pivots` of a front and subtracts their contribution from `rest`.
+/// Returns `None` if a pivot is not positive.
 pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<T>) -> Option<()> {
     let mut memory = dyn_stack::MemBuffer::new(llt::factor::cholesky_in_place_scratch::<T>(
         PANEL.min(pivots.width),
@@ -281,6 +281,7 @@ pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<
         let (first, width) = (p * PANEL, pivots.panel_width(p));
         let mut panel = std::mem::take(&mut pivots.panels[p]);
         let left: Vec<MatRef<'_, T>> = (0..p).map(|q| pivots.below(q, first)).collect();
+        // Panel p: subtract the panels before it, factor its square, divide the rows below.
         subtract_eliminated(&mut panel, width, &left, &left);
         let (square, below) = panel.split_at_mut(width * width);
         let mut diagonal = MatRef::from_row_major_slice(&*square, width, width).to_owned();
@@ -293,7 +294,7 @@ pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<
             Spec::default(),
         )
         .ok()?;
-        // A failed pivot may also show as something that is not a number.
+        // A failed pivot may also appear as NaN.
         if (0..width).any(|j| diagonal[(j, j)].wide().is_nan() || diagonal[(j, j)] <= T::default()) {
             return None;
         }
@@ -307,7 +308,7 @@ pub(super) fn cholesky<T: Real>(pivots: &mut Trapezoid<T>, rest: &mut Trapezoid<
     Some(())
 }
 
-/// Schur complement: rest -= L R' of all eliminated columns.
+/// Computes the Schur complement: rest -= L R' of all eliminated columns.
 pub(super) fn subtract_from_rest<T: Real>(
     left: &Trapezoid<T>,
     right: &Trapezoid<T>,

@@ -1,5 +1,5 @@
-//! K - sigma M = L B L' with pivoting inside the panels of each front, kept to solve with: the dynamic
-//! stiffness at a frequency; and in single precision, to count with.
+//! Factor K - sigma M = L B L' with pivoting inside the panels of each front, kept for solutions: the dynamic stiffness
+//! at a frequency in double precision, and inertia counts in single precision.
 
 use super::Pencil;
 use super::contiguous::contiguous_mut;
@@ -16,12 +16,12 @@ use faer::prelude::ReborrowMut;
 use rayon::prelude::*;
 use std::convert::Infallible;
 
-/// Factor of the indefinite matrix K - sigma M with numbers of type `T`. It is solved with in double
-/// precision: what it is off from the matrix is the rounding of the factorisation alone.
+/// Factor of the indefinite matrix K - sigma M with numbers of type `T`. Solutions are computed in double precision, so
+/// that their error comes from the rounding of the factorisation alone.
 pub struct Indefinite<'a, T = f64> {
     analysis: &'a Analysis,
     sigma: f64,
-    /// L, and B and the order of the rows in each leading square.
+    /// Panels of L, with B and the row order of each leading square.
     fronts: Vec<(Trapezoid<T>, Vec<Blocks<T>>)>,
     /// Scale of each row.
     scale: Vec<f64>,
@@ -29,8 +29,8 @@ pub struct Indefinite<'a, T = f64> {
 }
 
 impl<'a, T: Real> Indefinite<'a, T> {
-    /// Factors K - sigma M. Whether the factor is any good its [`Inertia`] tells: no zero pivot, and a small
-    /// backward error; or [`perturbation`](Self::perturbation).
+    /// Factors K - sigma M. The caller must check the factor: by its [`Inertia`] (no zero pivot, and a small backward
+    /// error) or by [`perturbation`](Self::perturbation).
     pub fn new(analysis: &'a Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, sigma);
@@ -46,7 +46,7 @@ impl<'a, T: Real> Indefinite<'a, T> {
         Self { analysis, sigma, fronts, scale: matrix.scale, inertia }
     }
 
-    /// Signs of the pivots, and the backward error of the factorisation.
+    /// Returns the signs of the pivots and the backward error of the factorisation.
     pub fn inertia(&self) -> Inertia {
         self.inertia
     }
@@ -63,23 +63,24 @@ impl<'a, T: Real> Indefinite<'a, T> {
         }
     }
 
-    /// Returns true when K - sigma M has the inertia of this factor in spite of its rounding; the number that tells.
+    /// Returns a bound below one if K - sigma M certainly has the inertia of this factor in spite of rounding.
     ///
-    /// With A the matrix and F the product of the factors, both scaled to a diagonal of about one, and
-    /// G = I - F^-1 A: a matrix (1 - t) F + t A between the two is singular only where 1/t is an eigenvalue
-    /// of G. So A has the inertia of F if no eigenvalue of G reaches one, which no norm of a power of G less
-    /// than one permits. The mean square of G^p z over normal vectors z has the square of the Frobenius norm
-    /// of G^p as its mean: were that one, the mean square over `COLUMNS` vectors would be less than 1 /
-    /// `MARGIN`^2 with a probability of 10^-15. Powers tell more than G, whose norm comes from what it
-    /// turns into the modes next to sigma from all others, and is much larger than its eigenvalues.
+    /// Let A be the matrix and F the product of the factors, both scaled to a diagonal of about one, and G = I - F^-1
+    /// A. A matrix (1 - t) F + t A between the two is singular only if 1/t is an eigenvalue of G. A therefore has the
+    /// inertia of F if no eigenvalue of G reaches one, which holds if the norm of some power of G is less than one. The
+    /// mean square of G^p z over normal vectors z has the squared Frobenius norm of G^p as its expectation: if that
+    /// were one, the mean square over `COLUMNS` vectors would be less than 1 / `MARGIN`^2 with a probability of 10^-15.
+    /// Powers are sharper than G itself, whose norm comes from the part of all other modes that it maps into the modes
+    /// next to sigma, and is much larger than its eigenvalues.
     ///
-    /// The norm that was measured, times `MARGIN`; `None` where none of the powers is small enough.
+    /// The bound is the measured norm times `MARGIN`. Returns `None` if no power is small enough.
     pub fn perturbation(&self, pencil: &Pencil<'_>) -> Option<f64> {
         let n = pencil.n();
         let [mut z, mut x, mut product, mut heavy] = [(); 4].map(|()| Tall::zeros(n, COLUMNS));
         for_columns(&mut z, |i, j, z| *z = normal(i as u64, j as u64));
         let mut before = f64::INFINITY;
         for _ in 0..POWERS {
+            // z <- G z = z - S^-1 (K - sigma M)^-1 (K - sigma M) S z, with the solution by the factor.
             let (given, scale) = (z.as_ref(), &self.scale);
             for_columns(&mut x, |i, j, x| *x = scale[i] * given[(i, j)]);
             pencil.stiffness_times(x.as_ref(), product.as_mut());
@@ -93,7 +94,7 @@ impl<'a, T: Real> Indefinite<'a, T> {
             if bound < 1.0 {
                 return Some(bound);
             }
-            // Not a number falls neither.
+            // The comparison also fails for NaN.
             let falls = bound < FALLING * before;
             if !falls {
                 return None;
@@ -114,7 +115,7 @@ impl Solve for Indefinite<'_> {
     }
 }
 
-/// Calls `change` with row, column and entry of a block, its columns side by side.
+/// Calls `change` with row, column and entry for all entries of a block, its columns in parallel.
 fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync) {
     let columns: Vec<_> = block.as_mut().col_iter_mut().map(contiguous_mut).collect();
     columns.into_par_iter().enumerate().for_each(|(j, column)| {
@@ -122,18 +123,19 @@ fn for_columns(block: &mut Tall, change: impl Fn(usize, usize, &mut f64) + Sync)
     });
 }
 
-/// See [`Indefinite::perturbation`]: the probability that the mean square of eight normal numbers is less
-/// than 10^-4 is 10^-15.
+/// Factor from the measured norm to the bound of [`Indefinite::perturbation`]. The mean square of eight normal numbers
+/// is less than 10^-4 with a probability of 10^-15; a smaller margin is less certain.
 const MARGIN: f64 = 100.0;
 
-/// Powers of G that are looked at, as long as each is so much smaller than the one before.
+/// Largest power of G that is evaluated.
 const POWERS: usize = 12;
+/// Largest ratio of successive bounds at which the next power is evaluated.
 const FALLING: f64 = 0.5;
 
-/// Rows of L that are brought to double precision together: they stay in the nearest cache.
+/// Number of rows of L that are converted to double precision together: they stay in the first-level cache.
 const TOGETHER: usize = 32;
 
-/// Calls `work` with a few rows of L in double precision, as many rows of `below` each time.
+/// Calls `work` with a few rows of L in double precision, and the matching item of `below`.
 fn for_rows<T: Real, B>(
     l: &[T],
     width: usize,
@@ -146,8 +148,8 @@ fn for_rows<T: Real, B>(
     }
 }
 
-/// Leading rows y with L y = front, in the order of the pivots of each panel, and what is left of the rows
-/// below.
+/// Solves L y = front for the leading rows, in the pivot order of each panel, and subtracts their contribution from the
+/// rows below.
 fn forward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
@@ -171,7 +173,7 @@ fn forward<T: Real, const K: usize>(
     }
 }
 
-/// Leading rows x with B L' x = y, back in the order of the front; the rows below are known.
+/// Solves B L' x = y for the leading rows, and returns them to the order of the front. The rows below are known.
 fn backward<T: Real, const K: usize>(
     (columns, blocks): &(Trapezoid<T>, Vec<Blocks<T>>),
     values: &mut [[f64; K]],
@@ -179,6 +181,7 @@ fn backward<T: Real, const K: usize>(
     for (p, block) in blocks.iter().enumerate().rev() {
         let (first, width) = (p * PANEL, columns.panel_width(p));
         let (own, below) = values[first..].split_at_mut(width);
+        // Blocks of B: y <- B^-1 y, one column at a time.
         let mut y = own.to_vec();
         let mut column = vec![0.0; width];
         for k in 0..K {
@@ -186,6 +189,7 @@ fn backward<T: Real, const K: usize>(
             block.divide(&mut column);
             y.iter_mut().zip(&column).for_each(|(to, from)| to[k] = *from);
         }
+        // Rows below: y <- y - L_below' x_below. Parts of parallel tasks are added in the order of the rows.
         let piece = |l: &[T], below: &[[f64; K]], y: &mut [[f64; K]]| {
             for_rows(l, width, below.chunks(TOGETHER), |l, below| subtract_transposed(l, below, y));
         };
@@ -205,6 +209,7 @@ fn backward<T: Real, const K: usize>(
                 }
             }
         }
+        // Unit triangle of the panel: L' x = y, then back from the order of the pivots.
         solve_transposed(T::all_wide(triangle, &mut Vec::new()), &mut y);
         for (&row, x) in block.order.iter().zip(&y) {
             own[row] = *x;
@@ -218,8 +223,8 @@ mod tests {
     use crate::{CscMatrix, SymmetricMatrix, symmetric_eigen};
     use faer::Mat;
 
-    /// A chain of `n` masses with springs of changing stiffness along it and, every seventh, one to a mass
-    /// far away.
+    /// Returns a chain of `n` masses with springs of varying stiffness and, at every seventh mass, a spring to a
+    /// distant one.
     fn chain(n: usize) -> [SymmetricMatrix; 2] {
         let (mut k, mut m) = (Vec::new(), Vec::new());
         let mut spring = |i: usize, j: usize, c: f64| {
@@ -238,12 +243,12 @@ mod tests {
         [k, m].map(|t| SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &t)))
     }
 
-    /// Solutions fulfil their equations between, below and above all eigenvalues, with one and several panels
-    /// in a front.
+    /// Solutions satisfy their equations for shifts between, below and above all eigenvalues, with one and several
+    /// panels in a front.
     #[test]
     fn solutions_fulfil_their_equations() {
         for (n, block) in [(1, 1), (9, 3), (90, 1), (300, 2)] {
-            // With a front of all rows: nothing is sparse.
+            // One front of all rows: a full matrix.
             for full in [false, true] {
                 let [mut k, m] = chain(n.max(2));
                 let n = m.n();
@@ -279,7 +284,7 @@ mod tests {
                         - pencil.apply_mass(x.as_ref()) * faer::Scale(sigma);
                     let scale = 100.0 * (1.0 + sigma) * x.norm_max() + b.norm_max();
                     assert!((&product - &b).norm_max() < 1e-13 * scale, "{n} {block} {full} {sigma}");
-                    // The count of another path.
+                    // The count without a stored factor is equal.
                     assert_eq!(factor.inertia(), Inertia::new(&analysis, &pencil, sigma));
                     let dense = Mat::from_fn(n, n, |i, j| {
                         let at = |a: &SymmetricMatrix| a.as_csc().get(i, j);
@@ -294,15 +299,15 @@ mod tests {
         }
     }
 
-    /// Eigenvalues of the chain, ascending.
+    /// Returns the eigenvalues of the chain, ascending.
     fn eigenvalues([k, m]: &[SymmetricMatrix; 2]) -> Vec<f64> {
         let root = |i: usize| m.as_csc().get(i, i).sqrt();
         let dense = Mat::from_fn(k.n(), k.n(), |i, j| k.as_csc().get(i, j) / root(i) / root(j));
         symmetric_eigen(dense.as_ref()).expect("finite").values
     }
 
-    /// A count in single precision is never sure of a wrong number, is sure where the shift is well between
-    /// two eigenvalues, and unsure where rounding moves one across.
+    /// A count in single precision is never certain of a wrong number. It is certain if the shift lies well between two
+    /// eigenvalues, and uncertain where rounding could move one across.
     #[test]
     fn counts_in_single_precision_know_how_far_they_go() {
         for n in [40, 700] {
@@ -334,8 +339,8 @@ mod tests {
         }
     }
 
-    /// What is measured is the rounding of the factor: none of it in double precision, and in single as much
-    /// as the spectrum of I - F^-1 A has, which dense algebra finds.
+    /// The bound measures the rounding of the factor: almost none in double precision, and in single precision the norm
+    /// of I - F^-1 A, computed with dense algebra.
     #[test]
     fn the_rounding_of_a_count_is_measured() {
         let matrices = chain(60);

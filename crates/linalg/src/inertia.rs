@@ -1,5 +1,5 @@
-//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front; who only counts does not
-//! keep the factor.
+//! Inertia of K - sigma M by L B L' with pivoting inside the panels of each front. A count alone does not keep the
+//! factor.
 
 use super::Pencil;
 use super::factor::{Analysis, Scaled};
@@ -15,46 +15,47 @@ use rayon::prelude::*;
 use std::cmp::Ordering::{Equal, Greater, Less};
 use std::convert::Infallible;
 
-/// Signs of the eigenvalues of K - sigma M, equal in number to those of the pencil on either side of sigma
-/// when M is positive semidefinite (Sylvester).
+/// Numbers of negative and zero eigenvalues of K - sigma M. If M is positive semidefinite, the negative ones equal the
+/// number of eigenvalues of the pencil below sigma (Sylvester).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inertia {
-    /// Eigenvalues below zero: modes below sigma.
+    /// Number of negative eigenvalues: modes below sigma.
     pub negative: usize,
-    /// Zero pivots.
+    /// Number of zero pivots.
     pub zero: usize,
-    /// Backward error of the factorisation relative to the scaled matrix: the unit roundoff times the largest
-    /// diagonal entry of |L| |B| |L|', which bounds all others (Higham, Accuracy and Stability, section
-    /// 11.1). A large one means that element growth spoilt the factor and with it the count.
+    /// Backward error of the factorisation relative to the scaled matrix: twice the unit roundoff times the largest
+    /// diagonal entry of |L| |B| |L|', which bounds all other entries (Higham, Accuracy and Stability, section 11.1). A
+    /// large value means that element growth made the factor and the count useless.
     pub backward_error: f64,
 }
 
-/// What a front hands to its parent.
+/// Contribution of a front to its parent.
 pub(super) struct Contribution<T> {
     schur: Trapezoid<T>,
-    /// Diagonal of |L| |B| |L|' so far, for its rows.
+    /// Diagonal of |L| |B| |L|' so far, for the rows of the contribution.
     growth: Vec<f64>,
 }
 
-/// The columns of a front after their elimination.
+/// Columns of a front after their elimination.
 pub(super) struct Eliminated<T> {
     /// L below the leading squares of the panels.
     pub columns: Trapezoid<T>,
-    /// The leading squares, one per panel.
+    /// Factored leading squares, one per panel.
     pub blocks: Vec<Blocks<T>>,
     /// Largest diagonal entry of |L| |B| |L|' in these columns.
     growth: f64,
 }
 
 impl<T: Real> Eliminated<T> {
-    /// Numbers of negative and of zero pivots, and the growth.
+    /// Returns the numbers of negative and of zero pivots, and the growth.
     pub(crate) fn counts(&self) -> (usize, usize, f64) {
         let (negative, zero) =
             self.blocks.iter().fold((0, 0), |(n, z), block| (n + block.negative, z + block.zero));
         (negative, zero, self.growth)
     }
 
-    /// The columns, with the unit triangles of the leading squares in their places, and what else there is of these.
+    /// Returns the columns, with the unit triangles of the leading squares copied into them, and the rest of these
+    /// squares.
     pub(crate) fn into_factor(mut self) -> (Trapezoid<T>, Vec<Blocks<T>>) {
         for (panel, block) in self.columns.panels.iter_mut().zip(&mut self.blocks) {
             let width = block.order.len();
@@ -67,7 +68,7 @@ impl<T: Real> Eliminated<T> {
     }
 }
 
-/// Assembles the front of supernode `s` of `matrix` from its entries and what its children hand on, and
+/// Assembles the front of supernode `s` from the entries of `matrix` and the contributions of its children, and
 /// eliminates its columns.
 pub(super) fn eliminate_front<T: Real>(
     analysis: &Analysis,
@@ -93,7 +94,7 @@ pub(super) fn eliminate_front<T: Real>(
 }
 
 impl Inertia {
-    /// Factors K - sigma M as L B L' (B of 1x1 and 2x2 blocks), counts, and forgets the factor.
+    /// Factors K - sigma M as L B L' (B has 1x1 and 2x2 blocks), counts, and drops the factor.
     pub fn new(analysis: &Analysis, pencil: &Pencil<'_>, sigma: f64) -> Self {
         let tree = &analysis.tree;
         let matrix = analysis.scaled(pencil, sigma);
@@ -107,7 +108,7 @@ impl Inertia {
         Self::of_fronts::<f64>(counts)
     }
 
-    /// Of the negative pivots, the zero pivots and the growth of every front.
+    /// Sums the negative pivots and zero pivots of all fronts, and takes their largest growth.
     pub(super) fn of_fronts<T: Real>(counts: impl IntoIterator<Item = (usize, usize, f64)>) -> Self {
         let (mut negative, mut zero, mut growth) = (0, 0, Vec::new());
         for (n, z, g) in counts {
@@ -119,14 +120,14 @@ impl Inertia {
     }
 }
 
-/// Eliminates the columns `pivots` of a front. Returns the leading squares of its panels, factored.
+/// Eliminates the columns `pivots` of a front. Returns the factored leading squares of its panels.
 fn eliminate<T: Real>(
     pivots: &mut Trapezoid<T>,
     rest: &mut Trapezoid<T>,
     growth: &mut [f64],
 ) -> Vec<Blocks<T>> {
     let (height, width) = (pivots.height(), pivots.width());
-    // L B beside L.
+    // L B, in the layout of L.
     let mut scaled = Trapezoid::zeros(height, width);
     let mut squares = Vec::with_capacity(pivots.panels.len());
     for p in 0..pivots.panels.len() {
@@ -134,6 +135,7 @@ fn eliminate<T: Real>(
         let mut panel = std::mem::take(&mut pivots.panels[p]);
         let left: Vec<MatRef<'_, T>> = (0..p).map(|q| pivots.below(q, first)).collect();
         let right: Vec<MatRef<'_, T>> = (0..p).map(|q| scaled.below(q, first)).collect();
+        // Panel p: subtract the panels before it, factor its square, divide the rows below.
         subtract_eliminated(&mut panel, width, &left, &right);
         let (square, below) = panel.split_at_mut(width * width);
         let blocks = Blocks::new(MatRef::from_row_major_slice(&*square, width, width));
@@ -150,19 +152,19 @@ fn eliminate<T: Real>(
     squares
 }
 
-/// Sums that are taken side by side.
+/// Number of sums that are computed side by side.
 const LANES: usize = 8;
 
-/// P A P' = L B L' of the leading square of a panel.
+/// Factorisation P A P' = L B L' of the leading square of a panel.
 pub(super) struct Blocks<T> {
     /// Unit lower triangle below the diagonal.
     l: Mat<T>,
     /// Row of A at each place.
     pub order: Vec<usize>,
     diagonal: Vec<f64>,
-    /// True when there are 2x2 blocks.
+    /// True if B has 2x2 blocks.
     has_pairs: bool,
-    /// Nonzero where a 2x2 block of B starts.
+    /// Off-diagonal entry at the start of each 2x2 block of B, zero elsewhere.
     coupling: Vec<f64>,
     negative: usize,
     zero: usize,
@@ -193,7 +195,7 @@ impl<T: Real> Blocks<T> {
         Self { l, order, diagonal, has_pairs, coupling, negative, zero }
     }
 
-    /// Row `i` of the unit triangle.
+    /// Returns row `i` of the unit triangle.
     fn row(&self, i: usize) -> impl Iterator<Item = T> + '_ {
         (0..self.order.len()).map(move |j| match j.cmp(&i) {
             Less => self.l[(i, j)],
@@ -202,11 +204,12 @@ impl<T: Real> Blocks<T> {
         })
     }
 
-    /// Rows of L from the rows `below` the square, whose L B is left in `scaled`; adds what they contribute
-    /// to |L| |B| |L|'.
+    /// Replaces the rows `below` the square by rows of L, stores their L B in `scaled`, and adds their part of the
+    /// diagonal of |L| |B| |L|' to `growth`.
     fn divide_below(&self, below: &mut [T], scaled: &mut [T], growth: &mut [f64]) {
         let width = self.order.len();
         let piece = |rows: &mut [T], scaled: &mut [T], growth: &mut [f64]| {
+            // Columns in the order of the pivots.
             let mut old = vec![T::default(); width];
             for row in rows.chunks_exact_mut(width) {
                 old.copy_from_slice(row);
@@ -214,9 +217,11 @@ impl<T: Real> Blocks<T> {
                     *new = old[from];
                 }
             }
+            // L B by substitution with the unit triangle.
             divide_rows(rows, self.l.as_ref(), true);
             drop_negligible(rows);
             scaled.copy_from_slice(rows);
+            // L, in double precision, and its growth.
             let mut wide = vec![0.0; width];
             for (row, g) in rows.chunks_exact_mut(width).zip(growth) {
                 wide.iter_mut().zip(&*row).for_each(|(to, from)| *to = from.wide());
@@ -240,7 +245,7 @@ impl<T: Real> Blocks<T> {
         }
     }
 
-    /// Row of L from a row of L B: the row times B^-1.
+    /// Replaces a row of L B by the row of L: multiplies it by B^-1.
     pub(crate) fn divide(&self, row: &mut [f64]) {
         if !self.has_pairs {
             row.iter_mut().zip(&self.diagonal).for_each(|(x, d)| *x /= d);
@@ -253,7 +258,7 @@ impl<T: Real> Blocks<T> {
                 row[j] /= self.diagonal[j];
                 j += 1;
             } else {
-                // Scaled by the coupling, which dominates such a block.
+                // Divide by the coupling, which dominates such a block.
                 let (a, d) = (self.diagonal[j] / off, self.diagonal[j + 1] / off);
                 let determinant = a * d - 1.0;
                 let (x, y) = (row[j] / off, row[j + 1] / off);
@@ -264,7 +269,7 @@ impl<T: Real> Blocks<T> {
         }
     }
 
-    /// |l|' |B| |l| of a row of L.
+    /// Returns |l|' |B| |l| of a row of L.
     fn growth(&self, row: &[T]) -> f64 {
         let (lanes, rest) = row.as_chunks::<LANES>();
         let (diagonal, last) = self.diagonal.as_chunks::<LANES>();
@@ -282,7 +287,7 @@ impl<T: Real> Blocks<T> {
     }
 }
 
-/// Negative and zero eigenvalues of the block diagonal B.
+/// Returns the numbers of negative and zero eigenvalues of the block diagonal B.
 fn count(diagonal: &[f64], coupling: &[f64]) -> (usize, usize) {
     let (mut negative, mut zero) = (0, 0);
     let mut j = 0;
@@ -295,7 +300,8 @@ fn count(diagonal: &[f64], coupling: &[f64]) -> (usize, usize) {
             continue;
         }
         let (d1, d2) = (diagonal[j], diagonal[j + 1]);
-        // Signs of the two eigenvalues, by determinant and trace; scaled against overflow.
+        // The signs of the two eigenvalues follow from determinant and trace, divided by the coupling to avoid
+        // overflow.
         let determinant = (d1 / off) * (d2 / off) - 1.0;
         if determinant < 0.0 {
             negative += 1;

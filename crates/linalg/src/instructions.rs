@@ -1,8 +1,8 @@
-//! The vector instructions of this machine.
+//! Vector instructions of this machine.
 
 use pulp::Arch;
 
-/// The widest vector instructions that the kernels find here. Sums keep their order whatever they are.
+/// Returns the name of the widest vector instructions that the kernels use. The order of sums does not depend on them.
 pub fn instruction_set() -> &'static str {
     #[cfg(target_arch = "x86_64")]
     {
@@ -17,8 +17,8 @@ pub fn instruction_set() -> &'static str {
     "of the build alone"
 }
 
-/// The widest vector instructions whose vectors are not longer than rows of so many bytes, which the kernels then
-/// hold in whole vectors.
+/// Returns the widest instruction set whose vectors are at most `bytes` long, so that the kernels hold rows of that
+/// size in whole vectors.
 pub(super) fn instructions_for_rows(bytes: usize) -> Arch {
     match Arch::new() {
         #[cfg(target_arch = "x86_64")]
@@ -27,13 +27,12 @@ pub(super) fn instructions_for_rows(bytes: usize) -> Arch {
     }
 }
 
-/// Asks the processor to bring the line at `address` into its cache; any address will do. (Reading ahead
-/// instead, in safe code, leaves solves with 4 columns at 0.63 of the speed.)
+/// Prefetches the cache line at `address`, which may be any address. Reading ahead in safe code instead leaves solves
+/// with 4 columns at 0.63 of the speed.
 #[inline(always)]
 #[allow(unsafe_code)]
 pub(super) fn prefetch<T>(address: *const T) {
-    // SAFETY: a hint, of the instructions that every x86-64 has: nothing is read, and an address that nothing
-    // may be read from is ignored.
+    // SAFETY: a prefetch hint, which every x86-64 has, reads no data; invalid addresses are ignored.
     #[cfg(target_arch = "x86_64")]
     unsafe {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};

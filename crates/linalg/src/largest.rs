@@ -1,24 +1,24 @@
-//! The largest of numbers that are checked afterwards. `f64::max` and `norm_max` of faer leave a NaN out, and
-//! a check of what they give would pass; here a NaN stays.
+//! Maxima that keep NaN. `f64::max` and `norm_max` of faer ignore a NaN, so that a later check of their result would
+//! pass.
 
 use faer::MatRef;
 
-/// The larger of two numbers, NaN when one of them is.
+/// Returns the larger of two numbers; NaN if one of them is NaN.
 pub fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
-/// Zero for what only rounding makes negative; NaN stays.
+/// Returns zero for a number that is negative by rounding only; keeps NaN.
 pub fn not_negative(value: f64) -> f64 {
     larger(value, 0.0)
 }
 
-/// The largest of zero and some numbers, NaN when one of them is.
+/// Returns the largest of zero and some numbers; NaN if one of them is NaN.
 pub fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, larger)
 }
 
-/// The largest magnitude among the entries of a matrix, NaN when one of them is.
+/// Returns the largest magnitude among the entries of a matrix; NaN if one of them is NaN.
 pub fn largest_entry(a: MatRef<'_, f64>) -> f64 {
     largest((0..a.ncols()).flat_map(|j| (0..a.nrows()).map(move |i| a[(i, j)].abs())))
 }

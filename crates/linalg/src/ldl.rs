@@ -1,21 +1,21 @@
-//! L D L' of a sparse positive semidefinite matrix, or of a complex sum of some, row by row (Davis, ACM TOMS
-//! 31 (2005) 587): where one vector is solved for again and again, by one thread and without an allocation.
-//! Large models and blocks of vectors have [`Cholesky`](super::Cholesky).
+//! Factor L D L' of a sparse positive semidefinite matrix, or of a complex sum of such matrices, computed row by row
+//! (Davis, ACM TOMS 31 (2005) 587). It suits repeated solutions of one vector on one thread without allocation. For
+//! large models and blocks of vectors, use [`Cholesky`](super::Cholesky).
 
 use super::matrix_sum::{MatrixSum, Scalar};
 use super::ordering::{nested_dissection, node_graph};
 use super::{Pencil, SymmetricMatrix};
 
-/// No parent in the elimination tree.
+/// Marks a root of the elimination tree: no parent.
 const NONE: u32 = u32::MAX;
 
-/// A = P' L D L' P, and where A has no inverse, that of A with some diagonal entries doubled.
+/// Factor A = P' L D L' P. If A is singular, it is the factor of A with some diagonal entries doubled.
 #[derive(Debug, Clone)]
 pub struct SparseLdl<T = f64> {
-    /// Row at each place of the elimination order.
+    /// Row at each position of the elimination order.
     order: Vec<u32>,
     col_ptr: Vec<usize>,
-    /// Places below the diagonal of L, column by column.
+    /// Positions below the diagonal of L, column by column.
     row_idx: Vec<u32>,
     values: Vec<T>,
     inverse_pivots: Vec<T>,
@@ -23,11 +23,11 @@ pub struct SparseLdl<T = f64> {
 }
 
 impl SparseLdl {
-    /// Factors a positive semidefinite matrix. A pivot up to `floor` times the diagonal entry of its row
-    /// counts as zero, and is replaced by that entry (by one in an empty row).
+    /// Factors a positive semidefinite matrix. A pivot up to `floor` times the diagonal entry of its row counts as
+    /// zero, and is replaced by that entry (by one in an empty row).
     ///
-    /// `None` when a pivot lies below minus that: the matrix is indefinite; also when it is too large for the
-    /// ordering.
+    /// Returns `None` if a pivot lies below minus this limit (the matrix is indefinite), or if the matrix is too large
+    /// for the ordering.
     pub fn new(a: &SymmetricMatrix, floor: f64) -> Option<Self> {
         let sum = MatrixSum::new(vec![(1.0, a, 1)]);
         let mut rows = RowByRow::new(&sum, Structure::new(&sum, &Pencil::new(a, a, 1))?);
@@ -50,12 +50,11 @@ impl SparseLdl {
 }
 
 impl<T: Scalar> SparseLdl<T> {
-    /// Factors a sum of semidefinite matrices whose factors lie in one quadrant of the complex plane, as
-    /// those of M + z D + z^2 K do for z^2 to the right of the imaginary axis: no pivot is needed to keep it
-    /// stable (Higham, Math. Comp. 67 (1998) 1591). In the order that suits `pencil`, whose matrices are
-    /// among them.
+    /// Factors a sum of semidefinite matrices whose factors lie in one quadrant of the complex plane, such as M + z D +
+    /// z^2 K for z^2 to the right of the imaginary axis. No pivoting is needed for stability (Higham, Math. Comp. 67
+    /// (1998) 1591). The elimination order is that of `pencil`, whose matrices are part of the sum.
     ///
-    /// `None` when a pivot vanishes to rounding: the sum is singular; also when it is too large for the
+    /// Returns `None` if a pivot vanishes up to rounding (the sum is singular), or if the sum is too large for the
     /// ordering.
     pub fn of_sum(sum: &MatrixSum<'_, T>, pencil: &Pencil<'_>) -> Option<Self> {
         let mut rows = RowByRow::new(sum, Structure::new(sum, pencil)?);
@@ -63,7 +62,7 @@ impl<T: Scalar> SparseLdl<T> {
             rows.gather(k);
             let (diagonal, pivot) = rows.eliminate(k);
             let small = f64::EPSILON * f64::EPSILON * diagonal.square();
-            // Not a number is none either.
+            // The comparison also rejects NaN.
             if pivot.square().partial_cmp(&small) != Some(std::cmp::Ordering::Greater) {
                 return None;
             }
@@ -72,27 +71,27 @@ impl<T: Scalar> SparseLdl<T> {
         Some(rows.finish(Vec::new()))
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn n(&self) -> usize {
         self.order.len()
     }
 
-    /// Number of entries of L below the diagonal.
+    /// Returns the number of entries of L below the diagonal.
     pub fn entries(&self) -> usize {
         self.values.len()
     }
 
-    /// Rows whose pivot was zero, ascending: as many as the matrix has null vectors. The solution for e_j, j
-    /// one of them, is a null vector; together they span the null space. Right-hand sides in the range of A
-    /// have the solution of A x = b that is zero in these rows.
+    /// Returns the rows with a zero pivot, ascending; their number is the dimension of the null space. For each of
+    /// these rows j the solution for e_j is a null vector, and together they span the null space. For right-hand sides
+    /// in the range of A, the solution of A x = b is the one that is zero in these rows.
     pub fn null_rows(&self) -> &[usize] {
         &self.null_rows
     }
 
-    /// x <- (A kron I_block)^-1 x.
+    /// Replaces x by (A kron I_block)^-1 x.
     ///
     /// # Panics
-    /// When `x` and `scratch` have not block n entries, or the block is not of 1, 2 or 3.
+    /// If `x` or `scratch` does not have block n entries, or the block is not 1, 2 or 3.
     pub fn solve_in_place(&self, block: usize, x: &mut [T], scratch: &mut [T]) {
         match block {
             1 => self.solve_block::<1>(x, scratch),
@@ -109,6 +108,7 @@ impl<T: Scalar> SparseLdl<T> {
         for (y, &row) in y.iter_mut().zip(&self.order) {
             *y = x[row as usize];
         }
+        // Forward substitution with L, then division by the pivots and back substitution with L'.
         for j in 0..n {
             let from = y[j];
             let column = self.col_ptr[j]..self.col_ptr[j + 1];
@@ -130,19 +130,19 @@ impl<T: Scalar> SparseLdl<T> {
     }
 }
 
-/// What is known of L before any number of it.
+/// Structure of L, before its numbers are computed.
 struct Structure {
-    /// Row at each place of the elimination order, and the place of each row.
+    /// Row at each position of the elimination order, and position of each row.
     order: Vec<u32>,
     place: Vec<u32>,
-    /// The elimination tree.
+    /// Parent of each column in the elimination tree.
     parent: Vec<u32>,
-    /// Where each column of L begins.
+    /// Start of each column of L.
     col_ptr: Vec<usize>,
 }
 
 impl Structure {
-    /// Of a sum in the order that suits `pencil`. `None` when that is too large for the ordering.
+    /// Computes the structure for a sum in the order of `pencil`; `None` if it is too large for the ordering.
     fn new<T: Scalar>(a: &MatrixSum<'_, T>, pencil: &Pencil<'_>) -> Option<Self> {
         let n = a.n();
         let block = pencil.block() as u32;
@@ -153,6 +153,7 @@ impl Structure {
         order.iter().enumerate().for_each(|(k, &row)| place[row as usize] = k as u32);
         let (mut parent, mut met) = (vec![NONE; n], vec![NONE; n]);
         let mut col_ptr = vec![0usize; n + 1];
+        // The entries of row k of L are the paths in the tree from the entries of row k of A.
         for k in 0..n as u32 {
             met[k as usize] = k;
             a.for_row(order[k as usize] as usize, |column, _| {
@@ -173,20 +174,20 @@ impl Structure {
     }
 }
 
-/// The factorisation as it goes on: the columns of L grow row by row.
+/// Factorisation in progress: the columns of L grow row by row.
 struct RowByRow<'a, T> {
     a: &'a MatrixSum<'a, T>,
     structure: Structure,
-    /// End of what is there of each column.
+    /// End of the computed part of each column.
     end: Vec<usize>,
     row_idx: Vec<u32>,
     values: Vec<T>,
     pivots: Vec<T>,
-    /// The row in work, zero elsewhere.
+    /// Current row; zero outside it.
     sums: Vec<T>,
-    /// Columns that the row in work has entries in, against the order in which they are eliminated.
+    /// Columns in which the current row has entries, in reverse order of elimination.
     reach: Vec<usize>,
-    /// The row that met each column last, and the path in the tree from one entry.
+    /// Row that reached each column last, and the path in the tree from one entry.
     met: Vec<u32>,
     path: Vec<usize>,
 }
@@ -214,7 +215,7 @@ impl<'a, T: Scalar> RowByRow<'a, T> {
         SparseLdl { order, col_ptr, row_idx, values, inverse_pivots, null_rows }
     }
 
-    /// The entries of row k of A, and which columns of L they reach.
+    /// Loads row k of A, and finds the columns of L that it reaches.
     fn gather(&mut self, k: usize) {
         let Self { a, structure: Structure { order, place, parent, .. }, sums, reach, met, path, .. } = self;
         met[k] = k as u32;
@@ -230,12 +231,12 @@ impl<'a, T: Scalar> RowByRow<'a, T> {
                 met[i] = k as u32;
                 i = parent[i] as usize;
             }
-            // Taken from its end below: each path before those that it ends in.
+            // Reversed, so that each path comes before the paths that it ends in.
             reach.extend(path.drain(..).rev());
         });
     }
 
-    /// Row k of L. Returns the diagonal entry of A and what is left of it.
+    /// Computes row k of L. Returns the diagonal entry of A and the pivot.
     fn eliminate(&mut self, k: usize) -> (T, T) {
         let Self { structure, end, row_idx, values, pivots, sums, reach, .. } = self;
         let diagonal = std::mem::replace(&mut sums[k], T::ZERO);
@@ -264,7 +265,7 @@ mod tests {
         ((i * 37 + 11) % 101) as f64 / 101.0 - 0.4
     }
 
-    /// The sum of v v' for vectors of a few entries each: of rank `vectors` at most, semidefinite.
+    /// Returns the sum of v v' for vectors of a few entries each: semidefinite, with a rank of at most `vectors`.
     fn gram(n: usize, vectors: usize) -> SymmetricMatrix {
         let mut triplets = Vec::new();
         for v in 0..vectors {
@@ -300,7 +301,7 @@ mod tests {
 
     #[test]
     fn null_vectors_are_found_and_ranges_are_solved() {
-        // Rank 40 of 60 rows; the last row empty.
+        // Rank 40 of 60 rows; the last row is empty.
         let whole = gram(59, 40);
         let entries: Vec<(u32, u32, f64)> = (0..59)
             .flat_map(|j| {

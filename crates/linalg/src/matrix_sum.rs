@@ -1,20 +1,20 @@
-//! A sum of sparse symmetric matrices with real or complex factors, which is not formed.
+//! Sum of sparse symmetric matrices with real or complex factors, which is not formed.
 
 use super::SymmetricMatrix;
 use nalgebra::Complex;
 use std::ops::{AddAssign, Div, Mul, SubAssign};
 
-/// Real or complex numbers.
+/// Real or complex number.
 pub trait Scalar: Copy + Mul<Output = Self> + Div<Output = Self> + AddAssign + SubAssign {
-    /// Zero.
+    /// Number zero.
     const ZERO: Self;
-    /// One.
+    /// Number one.
     const ONE: Self;
-    /// The product with a real number.
+    /// Returns the product with a real number.
     fn times(self, real: f64) -> Self;
-    /// 1 / x.
+    /// Returns 1 / x.
     fn reciprocal(self) -> Self;
-    /// The square of |x|.
+    /// Returns |x|^2.
     fn square(self) -> f64;
 }
 
@@ -46,17 +46,17 @@ impl Scalar for Complex<f64> {
     }
 }
 
-/// sum_k a_k A_k kron I: numbers, matrices, and the size of the identity.
+/// Sum of a_k A_k kron I, stored as factors, matrices and sizes of the identities.
 #[derive(Debug, Clone)]
 pub struct MatrixSum<'a, T> {
     terms: Vec<(T, &'a SymmetricMatrix, usize)>,
 }
 
 impl<'a, T: Scalar> MatrixSum<'a, T> {
-    /// The sum of `terms`.
+    /// Creates the sum of `terms`.
     ///
     /// # Panics
-    /// When there are none, or their sizes disagree.
+    /// If there are no terms, or their sizes differ.
     pub fn new(terms: Vec<(T, &'a SymmetricMatrix, usize)>) -> Self {
         assert!(
             terms.windows(2).all(|pair| pair[0].1.n() * pair[0].2 == pair[1].1.n() * pair[1].2),
@@ -66,12 +66,12 @@ impl<'a, T: Scalar> MatrixSum<'a, T> {
         Self { terms }
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn n(&self) -> usize {
         self.terms[0].1.n() * self.terms[0].2
     }
 
-    /// Shows column and value of the entries of a row: those of one matrix after those of another.
+    /// Calls `see` with column and value of every entry of a row, matrix by matrix.
     pub fn for_row(&self, row: usize, mut see: impl FnMut(usize, T)) {
         for (factor, matrix, block) in &self.terms {
             let (columns, values) = matrix.row(row / block);

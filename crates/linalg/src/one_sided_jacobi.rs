@@ -2,17 +2,19 @@
 
 use faer::Mat;
 
-/// Cosine between two columns up to which they count as orthogonal.
+/// Cosine between two columns up to which they count as orthogonal. A smaller value may prevent convergence.
 const ORTHOGONAL: f64 = 4.0 * f64::EPSILON;
 
-/// Sweeps after which the rotations end in any case: graded matrices of 500 columns take 7 to 10.
+/// Largest number of sweeps. Graded matrices of 500 columns take 7 to 10.
 const MAX_SWEEPS: usize = 60;
 
-/// Left singular vectors U and singular values of `g` = U diag(s) V' (n x n, of full rank), the values ascending.
+/// Computes left singular vectors U and singular values of `g` = U diag(s) V' (n x n, of full rank), with the values in
+/// ascending order.
 ///
-/// Rotations of pairs of columns make these orthogonal (Hestenes 1958). Every singular value of G = B D, D diagonal,
-/// is found to the rounding of the well-conditioned B, however widely the entries of D differ (Demmel, Veselic 1992).
-/// A stiffness in modes of 1 Hz and of 1 MHz needs these digits; a decomposition of G G' loses the small values.
+/// Rotations of pairs of columns make the columns orthogonal (Hestenes 1958). For G = B D with a diagonal D, every
+/// singular value is accurate to the rounding of the well-conditioned B, however widely the entries of D differ
+/// (Demmel, Veselic 1992). A stiffness in modes of 1 Hz and of 1 MHz needs this accuracy; a decomposition of G G' loses
+/// the small values.
 ///
 /// Returns `None` if a column is zero or an entry is not finite.
 pub fn left_singular_vectors(mut g: Mat<f64>) -> Option<(Vec<f64>, Mat<f64>)> {
@@ -43,7 +45,7 @@ fn sweep(g: &mut Mat<f64>) -> bool {
                 continue;
             }
             rotated = true;
-            // The smaller of the two angles that make the columns orthogonal.
+            // Use the smaller of the two angles that make the columns orthogonal.
             let ratio = (b - a) / (2.0 * mixed);
             let tangent = ratio.signum() / (ratio.abs() + ratio.hypot(1.0));
             let cosine = 1.0 / tangent.hypot(1.0);
@@ -64,7 +66,7 @@ mod tests {
 
     #[test]
     fn graded_columns_keep_their_digits() {
-        // G = B D with singular values that are known: B orthogonal.
+        // G = B D with an orthogonal B has the known singular values D.
         let n = 6;
         let reflection = |i: usize, j: usize| f64::from(i == j) - 2.0 / n as f64;
         let scale = |j: usize| 10f64.powi(3 * j as i32 - 9);

@@ -1,20 +1,20 @@
 //! Fill-reducing ordering and connectivity of the node graph.
 //!
-//! Nested dissection by METIS on the graph with one vertex per node: the same fill as on the graph of degrees
-//! of freedom in half the time, and a quarter of the factorisation work of minimum degree on compact solids.
+//! Nested dissection by METIS runs on the graph with one vertex per node: it gives the fill of the graph of degrees of
+//! freedom in half the time, and a quarter of the factorisation work of minimum degree on compact solids.
 
 use super::assembly_tree::Graph;
 use super::{Pencil, SymmetricMatrix};
 use rayon::prelude::*;
 use std::sync::Mutex;
 
-/// METIS seeds and uses one random state per process: one call at a time keeps the ordering reproducible.
+/// Lock for METIS, which has one random state per process: one call at a time keeps the ordering reproducible.
 static METIS: Mutex<()> = Mutex::new(());
 
-/// Calls `take` with every neighbour of a vertex of `S` rows, ascending: those that K or M couples it to. The
+/// Calls `take` with every neighbour of a vertex of `S` rows, ascending: the vertices that K or M couples to it. The
 /// vertex has `H` rows of Ms.
 fn neighbours<const S: usize, const H: usize>(pencil: &Pencil<'_>, vertex: u32, mut take: impl FnMut(u32)) {
-    // Merged without a list of what has been met.
+    // Merge the sorted rows, without a list of visited vertices.
     let at = vertex as usize;
     let mut stiffness: [&[u32]; S] = std::array::from_fn(|b| pencil.stiffness().row(at * S + b).0);
     let mut mass: [&[u32]; H] = std::array::from_fn(|b| pencil.mass().row(at * H + b).0);
@@ -31,7 +31,7 @@ fn neighbours<const S: usize, const H: usize>(pencil: &Pencil<'_>, vertex: u32, 
     }
 }
 
-/// Leaves the columns from `end` on: before it are at most those of one vertex.
+/// Skips the columns before `end`.
 #[inline(always)]
 fn skip(columns: &mut &[u32], end: u32) {
     while let Some((&column, after)) = columns.split_first()
@@ -41,25 +41,25 @@ fn skip(columns: &mut &[u32], end: u32) {
     }
 }
 
-/// Graph of the nodes of a pencil: two are neighbours where K or M couples them. `None` when it is too large
-/// for the 32-bit numbers of the ordering library.
+/// Returns the graph of the nodes of a pencil: two are neighbours if K or M couples them. Returns `None` if it is too
+/// large for the 32-bit indices of METIS.
 ///
 /// # Panics
-/// When a node has not one, two or three rows.
+/// If a node does not have one, two or three rows.
 pub(super) fn node_graph(pencil: &Pencil<'_>) -> Option<Graph> {
     vertex_graph(pencil, pencil.block())
 }
 
-/// Rows of a node with rotations, and of parts of it, that vertices may stand for where the pencil has rows
-/// alone; beside them numbers of the graph, all rows of two neighbours taken as coupled, over those of K, up
-/// to which they do. Rows that are coupled one by one are better told apart; but three are the displacements
-/// of a node, or its rotations, which elimination couples soon: frames along the axes have three times the
-/// numbers, and less work than single rows would, which take ten times as long to be ordered.
+/// Sizes of vertices that are tested for a pencil without nodes (a node with rotations, or parts of it), each with the
+/// largest accepted ratio of the entries of the block graph, all rows of two neighbours taken as coupled, to those of
+/// K. Rows with individual couplings are better as separate vertices. Three rows, however, are the displacements or the
+/// rotations of a node, which elimination couples soon: frames along the axes have three times the entries, but less
+/// work than with single rows, which take ten times as long to be ordered.
 const NODE_ROWS: [(usize, f64); 3] = [(6, 1.6), (3, 4.0), (2, 1.6)];
 
-/// Graph whose vertices are nodes, also where the pencil has rows alone, and the rows of a vertex: rows one
-/// after the other that are coupled to the same ones are those of a node. The graph of rows of shells has 36
-/// times the edges and takes as much longer to be ordered. `None` as above.
+/// Returns a graph whose vertices are nodes, also if the pencil has single rows, and the number of rows per vertex.
+/// Consecutive rows with common couplings belong to a node. The graph of the rows of shells has 36 times the edges, and
+/// ordering takes longer by the same factor. Returns `None` if the graph is too large for the 32-bit indices of METIS.
 pub(super) fn smallest_graph(pencil: &Pencil<'_>) -> Option<(Graph, usize)> {
     if pencil.block() == 1 {
         let (n, entries) = (pencil.n(), pencil.stiffness().as_csc().nnz() as f64);
@@ -74,7 +74,7 @@ pub(super) fn smallest_graph(pencil: &Pencil<'_>) -> Option<(Graph, usize)> {
     Some((node_graph(pencil)?, pencil.block()))
 }
 
-/// Graph with one vertex for every `size` rows.
+/// Returns the graph with one vertex for every `size` rows; `None` if it is too large for the 32-bit indices of METIS.
 pub(super) fn vertex_graph(pencil: &Pencil<'_>, size: usize) -> Option<Graph> {
     match (size, size / pencil.block()) {
         (1, 1) => graph::<1, 1>(pencil),
@@ -88,7 +88,7 @@ pub(super) fn vertex_graph(pencil: &Pencil<'_>, size: usize) -> Option<Graph> {
 }
 
 fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
-    /// Vertices per parallel task.
+    /// Number of vertices per parallel task.
     const VERTICES: usize = 1024;
     let vertices = pencil.n() / S;
     let mut pointers = vec![0i32; vertices + 1];
@@ -98,6 +98,7 @@ fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
     for vertex in 0..vertices {
         pointers[vertex + 1] = pointers[vertex].checked_add(pointers[vertex + 1])?;
     }
+    // Count first, then fill: each task writes the neighbours of its vertices.
     let mut lists = vec![0i32; pointers[vertices] as usize];
     let mut shares = Vec::with_capacity(vertices / VERTICES + 1);
     let mut rest = lists.as_mut_slice();
@@ -118,8 +119,8 @@ fn graph<const S: usize, const H: usize>(pencil: &Pencil<'_>) -> Option<Graph> {
     Some(Graph { pointers, neighbours: lists })
 }
 
-/// Elimination order of the vertices of a graph: entry i is eliminated as the i-th. `None` when the ordering
-/// library fails (it runs out of memory). The graph is only borrowed mutably because the library asks for it.
+/// Returns the elimination order of the vertices of a graph: entry i is eliminated as the i-th. Returns `None` if METIS
+/// fails (out of memory). The graph is not changed; METIS requires mutable arrays.
 pub(super) fn nested_dissection(graph: &mut Graph) -> Option<Vec<u32>> {
     let vertices = graph.len();
     if graph.neighbours.is_empty() || vertices < 3 {
@@ -129,12 +130,12 @@ pub(super) fn nested_dissection(graph: &mut Graph) -> Option<Vec<u32>> {
     Some(order.into_iter().map(|vertex| vertex as u32).collect())
 }
 
-/// How much larger than a half each half of a graph may be, in thousandths: half of the library's own. (Measured on bars,
-/// cubes, tetrahedra, plates, shells and frames of 50,000 to 200,000 rows: up to half the time, the same factors within a
-/// hundredth.)
+/// Largest imbalance of the halves of a graph, in thousandths: half the default of METIS. Measured on bars, cubes,
+/// tetrahedra, plates, shells and frames of 50,000 to 200,000 rows: down to half the time, with factors equal to within
+/// a hundredth.
 const UNBALANCED: i32 = 100;
 
-// The one call of the C library; the arrays outlive it and have the lengths its manual asks for.
+// The only call of the C library; the arrays outlive the call and have the lengths that its manual requires.
 #[allow(unsafe_code)]
 fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
     let mut vertices = (pointers.len() - 1) as i32;
@@ -158,11 +159,11 @@ fn metis(pointers: &mut [i32], neighbours: &mut [i32]) -> Option<Vec<i32>> {
     (status == metis_sys::rstatus_et_METIS_OK).then_some(order)
 }
 
-/// Connected component of every block of rows, numbered from 0 in the order of their first block. Any entry
-/// of any of the matrices, all of one size, connects.
+/// Returns the connected component of every block of rows, numbered from 0 in the order of their first block. Any entry
+/// of any of the matrices, which must be of one size, connects.
 ///
 /// # Panics
-/// When there is no matrix.
+/// If there is no matrix.
 pub fn connected_components(matrices: &[&SymmetricMatrix], block: usize) -> Vec<usize> {
     let vertices = matrices[0].n() / block;
     let mut component = vec![usize::MAX; vertices];
@@ -177,7 +178,7 @@ pub fn connected_components(matrices: &[&SymmetricMatrix], block: usize) -> Vec<
         while let Some(vertex) = stack.pop() {
             let rows = vertex * block..(vertex + 1) * block;
             for list in matrices.iter().flat_map(|matrix| rows.clone().map(|row| matrix.row(row).0)) {
-                // Entries of one block stand side by side: it is looked up once.
+                // Entries of one block are adjacent: look the block up once.
                 let mut known = rows.clone();
                 for &column in list {
                     if known.contains(&(column as usize)) {
@@ -204,7 +205,7 @@ mod tests {
     use faer::Mat;
     use std::collections::BTreeSet;
 
-    /// Blocks of three rows, coupled through any one of their nine entries; the last two blocks stand alone.
+    /// Returns blocks of three rows, coupled through any one of their nine entries; the last two blocks are isolated.
     fn scattered(vertices: u32) -> (SymmetricMatrix, Vec<BTreeSet<i32>>) {
         let mut entries = Vec::new();
         let mut adjacent = vec![BTreeSet::new(); vertices as usize];
@@ -230,7 +231,7 @@ mod tests {
     #[test]
     fn the_graph_has_one_vertex_per_block_and_every_neighbour_once() {
         let (matrix, mut adjacent) = scattered(2500);
-        // A mass that couples vertices 0 and 9, which K does not, and 0 and 1, which it does.
+        // The mass couples vertices 0 and 9, which K does not, and 0 and 1, which K does.
         let mut entries: Vec<(u32, u32, f64)> = (0..2500).map(|i| (i, i, 1.0)).collect();
         entries.extend([(0, 9, 0.1), (9, 0, 0.1), (0, 1, 0.1), (1, 0, 0.1)]);
         let mass = SymmetricMatrix::new(CscMatrix::from_triplets(2500, 2500, &entries)).expect("symmetric");
@@ -245,8 +246,8 @@ mod tests {
         assert_eq!(order.iter().collect::<BTreeSet<_>>().len(), 2500);
     }
 
-    /// Rows of a matrix of nodes with six rows, all coupled to those of the neighbours along a chain and a
-    /// loop; `holes`: but for some.
+    /// Returns a matrix of nodes with six rows, all coupled to those of the neighbours along a chain and a loop;
+    /// `holes` removes some couplings.
     fn of_six_rows(nodes: u32, holes: u32) -> SymmetricMatrix {
         let mut entries = Vec::new();
         for v in 0..nodes {
@@ -266,8 +267,8 @@ mod tests {
         SymmetricMatrix::new(CscMatrix::from_triplets(n, n, &entries)).expect("symmetric")
     }
 
-    /// Six rows of a node become one vertex where they are coupled alike, three where they are not, and rows
-    /// stay alone that are coupled one by one; the solution is the same.
+    /// Six rows of a node become one vertex if they are coupled alike, three if they are not, and rows with individual
+    /// couplings stay single. The solution is correct in all cases.
     #[test]
     fn nodes_are_found_among_rows() {
         let alone = scattered(60).0;

@@ -1,8 +1,8 @@
-//! Product of a symmetric sparse matrix (optionally kron an identity) with a block of vectors.
+//! Products of a symmetric sparse matrix (optionally kron an identity) with a block of vectors.
 //!
-//! The columns are taken eight at a time and packed row by row, so that the matrix is streamed once per eight
-//! columns and every gathered row is one cache line (measured: 6 times faster than column by column). Each
-//! result row is one sum in storage order: the same bits at any thread count.
+//! The columns are processed eight at a time and packed row by row, so that the matrix is read once per eight columns
+//! and every gathered row is one cache line (measured: 6 times faster than column by column). Each result row is one
+//! sum in storage order, so that the bits do not depend on the number of threads.
 
 use super::SymmetricMatrix;
 use super::contiguous::{contiguous, contiguous_mut};
@@ -11,23 +11,23 @@ use faer::{MatMut, MatRef};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Rows per parallel task.
+/// Number of rows per parallel task.
 const ROWS: usize = 1024;
-/// Rows of a task that are written at a time.
+/// Number of rows of a task that are written at a time.
 const TILE: usize = 32;
 
-/// y = (A kron I_block) x for x, y of `block * A.n()` rows and any number of columns.
+/// Computes y = (A kron I_block) x for x, y of `block * A.n()` rows and any number of columns.
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match, or the block is not 1, 2 or 3.
 pub fn multiply(a: &SymmetricMatrix, block: usize, x: MatRef<'_, f64>, y: MatMut<'_, f64>) {
     sum_terms(a, block, x, y, |term| term);
 }
 
-/// y = (A kron I_block) x for one vector: by one thread, nothing allocated.
+/// Computes y = (A kron I_block) x for one vector, on one thread and without allocation.
 ///
 /// # Panics
-/// When the shapes disagree, or the block is not of 1, 2 or 3.
+/// If the shapes do not match, or the block is not 1, 2 or 3.
 pub fn multiply_vector(a: &SymmetricMatrix, block: usize, x: &[f64], y: &mut [f64]) {
     assert!(x.len() == a.n() * block && y.len() == x.len(), "shapes of a product");
     match block {
@@ -42,10 +42,10 @@ fn vector_pass<const B: usize>(a: &SymmetricMatrix, x: &[f64], y: &mut [f64]) {
     Arch::new().dispatch(VectorProduct::<B> { a, x: x.as_chunks().0, y: y.as_chunks_mut().0 });
 }
 
-// What is dispatched are structures: a closure may be compiled apart from the function that has the instruction
-// set, without it.
+// Structures are dispatched instead of closures: a closure may be compiled outside the function that has the
+// instruction set.
 
-/// y = (A kron I_B) x.
+/// Product y = (A kron I_B) x.
 struct VectorProduct<'a, const B: usize> {
     a: &'a SymmetricMatrix,
     x: &'a [[f64; B]],
@@ -64,16 +64,16 @@ impl<const B: usize> WithSimd for VectorProduct<'_, B> {
     }
 }
 
-/// x'A x: by one thread, nothing allocated.
+/// Returns x'A x, on one thread and without allocation.
 ///
 /// # Panics
-/// When `x` has not as many entries as A has rows.
+/// If `x` does not have one entry for each row of A.
 pub fn quadratic_form(a: &SymmetricMatrix, x: &[f64]) -> f64 {
     assert_eq!(x.len(), a.n(), "one entry for each row");
     Arch::new().dispatch(QuadraticForm { a, x: x.as_chunks().0 })
 }
 
-/// x'A x.
+/// Quadratic form x'A x.
 struct QuadraticForm<'a> {
     a: &'a SymmetricMatrix,
     x: &'a [[f64; 1]],
@@ -93,7 +93,7 @@ impl WithSimd for QuadraticForm<'_> {
     }
 }
 
-/// The product of a row, in several sums that do not wait for each other.
+/// Returns the product of a row, with several independent sums to hide the latency.
 #[inline(always)] // compiled once per instruction set
 fn row_times<const B: usize>(columns: &[u32], values: &[f64], x: &[[f64; B]]) -> [f64; B] {
     const SUMS: usize = 4;
@@ -110,11 +110,11 @@ fn row_times<const B: usize>(columns: &[u32], values: &[f64], x: &[[f64; B]]) ->
     std::array::from_fn(|b| sums.iter().map(|sum| sum[b]).sum())
 }
 
-/// y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] for other sums of the
-/// same terms.
+/// Computes y_i = sum_j f(a_ij x_j), component by component for A kron I_block: [`multiply`] with a function of each
+/// term.
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match, or the block is not 1, 2 or 3.
 pub fn sum_terms(
     a: &SymmetricMatrix,
     block: usize,
@@ -155,7 +155,7 @@ pub fn sum_terms(
     }
 }
 
-/// One pass over the matrix: `B` components per matrix row, `W` columns.
+/// Makes one pass over the matrix, with `B` components per matrix row and `W` columns.
 fn pass<const B: usize, const W: usize>(
     a: &SymmetricMatrix,
     x: MatRef<'_, f64>,
@@ -164,9 +164,11 @@ fn pass<const B: usize, const W: usize>(
 ) {
     let arch = Arch::new();
     let columns: [&[f64]; W] = std::array::from_fn(|c| contiguous(x.col(c)));
+    // Pack the columns row by row.
     let rows = (0..a.n()).into_par_iter().with_min_len(ROWS);
     let packed: Vec<[[f64; W]; B]> =
         rows.map(|i| std::array::from_fn(|b| columns.map(|column| column[i * B + b]))).collect();
+    // Give each task its rows of all columns.
     let mut targets: Vec<_> =
         y.col_iter_mut().map(|column| contiguous_mut(column).chunks_mut(ROWS * B)).collect();
     let shares: Vec<[&mut [f64]; W]> = (0..a.n().div_ceil(ROWS))
@@ -177,7 +179,7 @@ fn pass<const B: usize, const W: usize>(
     });
 }
 
-/// Rows `first`, `first + 1`, ... of the product, as many as `y` has room for.
+/// Rows `first`, `first + 1`, ... of the product, as many as `y` holds.
 struct RowProducts<'a, F, const B: usize, const W: usize> {
     a: &'a SymmetricMatrix,
     first: usize,
@@ -192,7 +194,7 @@ impl<F: Fn(f64) -> f64, const B: usize, const W: usize> WithSimd for RowProducts
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
         let Self { a, first, x, mut y, f } = self;
-        // Rows are finished in a small tile: written to the columns one by one they would be taken apart in the
+        // Rows are collected in a small tile: written to the columns one by one, the vectors would be split in the
         // inner loop.
         let mut tile = [[[0.0f64; W]; B]; TILE];
         let rows = y[0].len() / B;

@@ -1,6 +1,6 @@
-//! Reproducible random numbers by place: the same at any number of threads.
+//! Reproducible random numbers by row and column, independent of the number of threads.
 
-/// Uniform in (-1, 1): a SplitMix64 hash of (seed, row, column).
+/// Returns a uniform number in (-1, 1): a SplitMix64 hash of (seed, row, column).
 pub fn uniform(seed: u64, row: u64, column: u64) -> f64 {
     let mut z = seed
         .wrapping_mul(0xA076_1D64_78BD_642F)
@@ -13,9 +13,9 @@ pub fn uniform(seed: u64, row: u64, column: u64) -> f64 {
     (z >> 11) as f64 / (1u64 << 52) as f64 - 1.0
 }
 
-/// Normal with mean zero and variance one (Box and Muller, Ann. Math. Stat. 29 (1958) 610).
+/// Returns a normal number with mean zero and variance one (Box and Muller, Ann. Math. Stat. 29 (1958) 610).
 pub(crate) fn normal(row: u64, column: u64) -> f64 {
-    // In (0, 1]: of zero there is no logarithm.
+    // In (0, 1], since zero has no logarithm.
     let radius = 0.5 * (1.0 - uniform(1, row, column));
     let angle = std::f64::consts::PI * uniform(2, row, column);
     (-2.0 * radius.max(f64::MIN_POSITIVE).ln()).sqrt() * angle.cos()

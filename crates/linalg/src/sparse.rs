@@ -1,14 +1,14 @@
-//! Compressed sparse matrices: a general one as readers deliver it, and the symmetric one that all work uses.
+//! Compressed sparse matrices: the general form that readers deliver, and the symmetric form of all computations.
 
 use super::stored::Stored;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Columns per parallel task.
+/// Number of columns per parallel task.
 const COLUMNS: usize = 4096;
 
-/// Sparse matrix in compressed column form, rows ascending within each column, no duplicates, no zeros unless
-/// [`CscMatrix::from_parts`] brought them. The default has no rows and no columns.
+/// Sparse matrix in compressed column form. Rows ascend within each column, without duplicates. Zeros are stored only
+/// if [`CscMatrix::from_parts`] received them. The default has no rows and no columns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CscMatrix {
     n_rows: usize,
@@ -25,11 +25,11 @@ impl Default for CscMatrix {
 }
 
 impl CscMatrix {
-    /// Takes the three arrays as they are, zeros included.
+    /// Creates a matrix from its three arrays, zeros included.
     ///
     /// # Panics
-    /// When they do not describe a matrix: lengths that disagree, rows out of range or not strictly
-    /// ascending within a column. Readers check and report before they call this.
+    /// If the arrays do not describe a matrix: lengths that disagree, rows out of range or not strictly ascending
+    /// within a column. Readers check and report errors before they call this function.
     pub fn from_parts(
         n_rows: usize,
         n_cols: usize,
@@ -50,12 +50,13 @@ impl CscMatrix {
         Self { n_rows, n_cols, col_ptr, row_idx, values }
     }
 
-    /// Builds a matrix from (row, column, value) triplets: duplicates are summed in the order given, zeros
-    /// are dropped, sums that cancel among them.
+    /// Builds a matrix from (row, column, value) triplets. Duplicates are summed in the given order; zeros are dropped,
+    /// including sums that cancel.
     ///
     /// # Panics
-    /// When an index is out of range.
+    /// If an index is out of range.
     pub fn from_triplets(n_rows: usize, n_cols: usize, triplets: &[(u32, u32, f64)]) -> Self {
+        // Count the entries of each column, then distribute them.
         let mut count = vec![0usize; n_cols + 1];
         for &(r, c, v) in triplets {
             assert!((r as usize) < n_rows && (c as usize) < n_cols, "triplet out of range");
@@ -90,12 +91,12 @@ impl CscMatrix {
         Self::made(n_rows, n_cols, col_ptr, row_idx, values)
     }
 
-    /// Of arrays that were made as they have to be.
+    /// Creates a matrix from arrays that are known to be valid.
     fn made(n_rows: usize, n_cols: usize, col_ptr: Vec<usize>, row_idx: Vec<u32>, values: Vec<f64>) -> Self {
         Self { n_rows, n_cols, col_ptr, row_idx: row_idx.into(), values: values.into() }
     }
 
-    /// Takes a compressed matrix of the `sprs` crate (row or column storage).
+    /// Converts a compressed matrix of the `sprs` crate (row or column storage).
     pub fn from_sprs(matrix: &sprs::CsMat<f64>) -> Self {
         let csc = matrix.to_csc();
         let (n_rows, n_cols) = (csc.rows(), csc.cols());
@@ -106,62 +107,63 @@ impl CscMatrix {
         Self::from_triplets(n_rows, n_cols, &triplets)
     }
 
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn n_rows(&self) -> usize {
         self.n_rows
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn n_cols(&self) -> usize {
         self.n_cols
     }
 
-    /// Returns true when its numbers are lent, as by a file that they stay in.
+    /// Returns true if the numbers are borrowed, for example from a file.
     pub fn is_lent(&self) -> bool {
         matches!((&self.row_idx, &self.values), (Stored::Lent(_), Stored::Lent(_)))
     }
 
-    /// Number of stored entries.
+    /// Returns the number of stored entries.
     pub fn nnz(&self) -> usize {
         self.values.len()
     }
 
-    /// Column pointers, `n_cols + 1` of them.
+    /// Returns the `n_cols + 1` column pointers.
     pub fn col_ptr(&self) -> &[usize] {
         &self.col_ptr
     }
 
-    /// Row of each entry.
+    /// Returns the row of each entry.
     pub fn row_idx(&self) -> &[u32] {
         &self.row_idx
     }
 
-    /// Value of each entry.
+    /// Returns the value of each entry.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Rows and values of column `j`.
+    /// Returns rows and values of column `j`.
     pub fn column(&self, j: usize) -> (&[u32], &[f64]) {
         let range = self.col_ptr[j]..self.col_ptr[j + 1];
         (&self.row_idx[range.clone()], &self.values[range])
     }
 
-    /// The entry at (`row`, `col`), zero when not stored.
+    /// Returns the entry at (`row`, `col`); zero if it is not stored.
     pub fn get(&self, row: usize, col: usize) -> f64 {
         let (rows, values) = self.column(col);
         rows.binary_search(&(row as u32)).map_or(0.0, |k| values[k])
     }
 
-    /// The square matrix with row and column i moved to `to[i]`; those that go to `u32::MAX`, which have no entries, are
-    /// left out.
+    /// Returns the square matrix with row and column i moved to `to[i]`. Rows with `to[i] == u32::MAX`, which must have
+    /// no entries, are left out.
     ///
     /// # Panics
-    /// When `to` is not a permutation of the rows that stay, or one that is left out has entries.
+    /// If `to` is not a permutation of the remaining rows, or a row that is left out has entries.
     pub fn permuted(&self, to: &[u32]) -> Self {
         assert!(self.n_rows == self.n_cols && to.len() == self.n_cols, "permutation of a square matrix");
         let stays = |new: &u32| *new != u32::MAX;
         let n = to.iter().filter(|new| stays(new)).count();
+        // Inverse permutation, then column pointers, then the columns in parallel.
         let mut from = vec![u32::MAX; n];
         for (old, &new) in to.iter().enumerate().filter(|(_, new)| stays(new)) {
             from[new as usize] = old as u32;
@@ -190,10 +192,10 @@ impl CscMatrix {
         Self::made(n, n, col_ptr, row_idx, values)
     }
 
-    /// Returns true when pattern and values are exactly symmetric.
+    /// Returns true if pattern and values are exactly symmetric.
     pub fn is_symmetric(&self) -> bool {
         let n = self.n_cols;
-        // Every task has a cursor per column: a few long ranges.
+        // Each task has one cursor per column, so that few long ranges are best.
         let length = n.div_ceil(16).max(COLUMNS);
         let surplus = |first: usize| self.lower_surplus(first..(first + length).min(n));
         self.n_rows == n
@@ -201,8 +203,8 @@ impl CscMatrix {
                 == Some(0)
     }
 
-    /// Number of entries below the diagonal less that above it in some columns; `None` when an entry below
-    /// has no equal one at the mirrored place.
+    /// Returns the number of entries below the diagonal minus that above it, in some columns. Returns `None` if an
+    /// entry below has no equal one at the mirrored position.
     fn lower_surplus(&self, columns: Range<usize>) -> Option<i64> {
         let mut surplus = 0;
         // Ascending columns j meet the mirrored entries (j, i) of column i in ascending order.
@@ -227,7 +229,7 @@ impl CscMatrix {
         Some(surplus)
     }
 
-    /// The transpose; for a symmetric matrix, an equal one.
+    /// Returns the transpose.
     pub fn transpose(&self) -> Self {
         let mut col_ptr = vec![0usize; self.n_rows + 1];
         for &r in self.row_idx.iter() {
@@ -253,7 +255,7 @@ impl CscMatrix {
 }
 
 impl CscMatrix {
-    /// Leaves out the entries that are zero.
+    /// Removes the entries that are zero.
     fn drop_zeros(&mut self) {
         if self.values.iter().all(|value| *value != 0.0) {
             return;
@@ -276,22 +278,22 @@ impl CscMatrix {
     }
 }
 
-/// Symmetric sparse matrix, both triangles stored: column j is also row j, so products gather row by row
-/// with the same sum order at any thread count.
+/// Symmetric sparse matrix with both triangles stored. Column j is also row j, so that products gather row by row with
+/// an order of sums that does not depend on the number of threads.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SymmetricMatrix(CscMatrix);
 
 impl SymmetricMatrix {
-    /// Takes a matrix whose pattern and values are exactly symmetric; `None` when they are not.
+    /// Wraps a matrix whose pattern and values are exactly symmetric; `None` for any other.
     pub fn new(matrix: CscMatrix) -> Option<Self> {
         Self::try_from(matrix).ok()
     }
 
-    /// Takes the mean of a nearly symmetric matrix and its transpose, without the entries that cancel. Where
-    /// both have the same pattern that takes no more memory than the matrix has.
+    /// Returns the mean of a nearly symmetric matrix and its transpose, without entries that cancel. If both have one
+    /// pattern, this needs no additional memory.
     ///
     /// # Panics
-    /// When the matrix is not square.
+    /// If the matrix is not square.
     pub fn symmetrised(mut matrix: CscMatrix) -> Self {
         assert_eq!(matrix.n_rows, matrix.n_cols, "square");
         let mut cursor: Vec<usize> = matrix.col_ptr[..matrix.n_cols].to_vec();
@@ -304,7 +306,7 @@ impl SymmetricMatrix {
                 // Ascending columns j meet the mirrored entries (j, i) of column i in ascending order.
                 let mirrored = cursor[i];
                 if mirrored == matrix.col_ptr[i + 1] || matrix.row_idx[mirrored] as usize != j {
-                    // The means taken so far are those of themselves.
+                    // Entries that are already means keep their values.
                     return Self::symmetrised_by_transpose(&matrix);
                 }
                 cursor[i] += 1;
@@ -312,7 +314,7 @@ impl SymmetricMatrix {
                 let mean = 0.5 * (values[at] + values[mirrored]);
                 (values[at], values[mirrored]) = (mean, mean);
             }
-            // What is left above the diagonal has no entry below it.
+            // A remaining entry above the diagonal has none below.
             let end = matrix.col_ptr[j + 1];
             let above = matrix.row_idx[cursor[j]..end].first().is_some_and(|&row| (row as usize) < j);
             if above {
@@ -330,6 +332,7 @@ impl SymmetricMatrix {
         for j in 0..n {
             let (ra, va) = matrix.column(j);
             let (rb, vb) = transpose.column(j);
+            // Merge two ascending columns.
             let (mut a, mut b) = (0, 0);
             while a < ra.len() || b < rb.len() {
                 let row = match (ra.get(a), rb.get(b)) {
@@ -357,30 +360,30 @@ impl SymmetricMatrix {
         Self(CscMatrix::made(n, n, col_ptr, row_idx, values))
     }
 
-    /// Number of rows and columns.
+    /// Returns the number of rows and columns.
     pub fn n(&self) -> usize {
         self.0.n_cols
     }
 
-    /// The matrix in compressed column (equally: row) form.
+    /// Returns the matrix in compressed column (and row) form.
     pub fn as_csc(&self) -> &CscMatrix {
         &self.0
     }
 
-    /// Columns and values of row `i`.
+    /// Returns columns and values of row `i`.
     pub fn row(&self, i: usize) -> (&[u32], &[f64]) {
         self.0.column(i)
     }
 
-    /// The diagonal.
+    /// Returns the diagonal.
     pub fn diagonal(&self) -> Vec<f64> {
         (0..self.n()).into_par_iter().with_min_len(COLUMNS).map(|i| self.0.get(i, i)).collect()
     }
 
-    /// Some rows, ascending, and the same columns.
+    /// Returns the submatrix of some rows, ascending, and the corresponding columns.
     ///
     /// # Panics
-    /// When the rows do not ascend or go beyond the matrix.
+    /// If the rows do not ascend or exceed the matrix.
     pub fn principal(&self, rows: &[usize]) -> Self {
         assert!(rows.is_sorted_by(|a, b| a < b), "rows ascend");
         let n = rows.len();
@@ -398,10 +401,10 @@ impl SymmetricMatrix {
         Self(CscMatrix::made(n, n, col_ptr, row_idx, values))
     }
 
-    /// D A D for a diagonal D.
+    /// Returns D A D for a diagonal D.
     ///
     /// # Panics
-    /// When D has another size.
+    /// If the size of D differs.
     pub fn scaled(&self, diagonal: &[f64]) -> Self {
         assert_eq!(diagonal.len(), self.n(), "one factor per row");
         let mut matrix = self.0.clone();
@@ -409,15 +412,15 @@ impl SymmetricMatrix {
         for j in 0..self.n() {
             let range = self.0.col_ptr[j]..self.0.col_ptr[j + 1];
             for (&i, v) in self.0.row_idx[range.clone()].iter().zip(&mut values[range]) {
-                // The product of the factors first: the same to the bit on both sides of the diagonal.
+                // Multiply the factors first, so that both sides of the diagonal have the same bits.
                 *v *= diagonal[i as usize] * diagonal[j];
             }
         }
         Self(matrix)
     }
 
-    /// The matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` when one is not
-    /// stored.
+    /// Returns the matrix with each stored diagonal entry a_ii replaced by `f(i, a_ii)`; `None` if a diagonal entry is
+    /// not stored.
     pub fn with_diagonal(&self, f: impl Fn(usize, f64) -> f64) -> Option<Self> {
         let mut matrix = self.clone();
         let values = matrix.0.values.own();
@@ -428,8 +431,8 @@ impl SymmetricMatrix {
         Some(matrix)
     }
 
-    /// The matrix with every positive diagonal entry multiplied by `factor` and a one in place of every
-    /// other.
+    /// Returns the matrix with every positive diagonal entry multiplied by `factor`, and every other diagonal entry
+    /// replaced by one.
     pub(super) fn with_raised_diagonal(&self, factor: f64) -> Self {
         if self.diagonal().iter().all(|&d| d > 0.0)
             && let Some(raised) = self.with_diagonal(|_, d| d * factor)
@@ -450,26 +453,26 @@ impl SymmetricMatrix {
 }
 
 impl TryFrom<CscMatrix> for SymmetricMatrix {
-    /// The matrix itself, unchanged.
+    /// The rejected matrix, unchanged.
     type Error = CscMatrix;
 
-    /// Takes a matrix whose pattern and values are exactly symmetric, and gives any other back.
+    /// Wraps a matrix whose pattern and values are exactly symmetric, and returns any other.
     fn try_from(matrix: CscMatrix) -> Result<Self, CscMatrix> {
         if matrix.is_symmetric() { Ok(Self(matrix)) } else { Err(matrix) }
     }
 }
 
-/// Some columns of a matrix that is being made.
+/// Consecutive columns of a matrix under construction.
 pub struct ColumnBlock<'a> {
-    /// Which columns.
+    /// Range of the columns.
     pub columns: Range<usize>,
-    /// Their share of the rows.
+    /// Row indices of these columns.
     pub rows: &'a mut [u32],
-    /// Their share of the values.
+    /// Values of these columns.
     pub values: &'a mut [f64],
 }
 
-/// Cuts the entries of a matrix into those of the columns between successive `cuts`.
+/// Splits the entries of a matrix at the columns `cuts`.
 pub fn split_columns<'a>(
     col_ptr: &[usize],
     cuts: &[usize],
@@ -506,7 +509,7 @@ mod tests {
         let band = |i: u32, j: u32| (i, j, value(31 * i + 7 * j));
         let all = |i: u32| (i.saturating_sub(3)..(i + 4).min(50)).map(move |j| band(i, j));
         let mut entries: Vec<_> = (0..50).flat_map(all).collect();
-        // These two cancel.
+        // The following two cancel.
         entries.retain(|(i, j, _)| (*i, *j) != (20, 21) && (*i, *j) != (21, 20));
         entries.extend([(20, 21, 1.5), (21, 20, -1.5)]);
         let both = CscMatrix::from_triplets(50, 50, &entries);
@@ -521,7 +524,7 @@ mod tests {
         assert_eq!(mean.as_csc().get(20, 21), 0.0);
     }
 
-    /// A banded symmetric matrix of several tasks.
+    /// Returns the entries of a banded symmetric matrix of several tasks.
     fn banded(n: usize) -> Vec<(u32, u32, f64)> {
         let value = |i: usize, j: usize| ((i.min(j) * 7 + i.max(j)) as f64).sin() + 2.0;
         (0..n)

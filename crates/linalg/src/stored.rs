@@ -1,26 +1,26 @@
-//! The numbers of a sparse matrix: its own, or lent by whoever holds them, as a file that is mapped into memory.
+//! Numbers of a sparse matrix: owned, or borrowed from a lender such as a memory-mapped file.
 
 use std::fmt::{Debug, Formatter};
 use std::ops::Deref;
 use std::panic::{RefUnwindSafe, UnwindSafe};
 use std::sync::Arc;
 
-/// Who lends numbers. They never change.
+/// Owner of borrowed numbers, which must never change.
 pub trait Lender<T>: AsRef<[T]> + Send + Sync + UnwindSafe + RefUnwindSafe {}
 
 impl<T, L: AsRef<[T]> + Send + Sync + UnwindSafe + RefUnwindSafe> Lender<T> for L {}
 
-/// A list of numbers. To change lent ones takes a copy.
+/// List of numbers. Borrowed numbers are copied before they are changed.
 #[derive(Clone)]
 pub enum Stored<T: 'static> {
-    /// In memory of its own.
+    /// Owned numbers.
     Own(Vec<T>),
-    /// Where somebody else has them.
+    /// Numbers borrowed from a lender.
     Lent(Arc<dyn Lender<T>>),
 }
 
 impl<T: Clone> Stored<T> {
-    /// The numbers, to be changed.
+    /// Returns the numbers for writing; copies borrowed ones first.
     pub(super) fn own(&mut self) -> &mut Vec<T> {
         if let Self::Lent(lent) = self {
             *self = Self::Own((**lent).as_ref().to_vec());

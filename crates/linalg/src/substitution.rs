@@ -1,6 +1,6 @@
-//! Substitution with the panels of a front for a few right-hand sides at a time: bound by the speed at which
-//! memory delivers the factor. Panels and right-hand sides are row-major; four rows of the panel are taken
-//! together, read once from end to end. Large panels are cut into fixed pieces of rows.
+//! Substitution with the panels of a front for a few right-hand sides at a time. The speed is limited by reading the
+//! factor from memory. Panels and right-hand sides are row-major; several rows of the panel are processed together and
+//! read once. Large panels are cut into fixed pieces of rows.
 
 use super::front::{PANEL, Real, Trapezoid};
 use super::instructions::{instructions_for_rows, prefetch};
@@ -10,14 +10,14 @@ use pulp::bytemuck::{cast_slice, cast_slice_mut};
 use pulp::{Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Rows of a piece of parallel work.
+/// Number of rows in a piece of parallel work.
 const ROWS: usize = 512;
 
-/// Numbers of a panel below which cutting it is not worth the tasks.
+/// Number of entries of a panel below which it is not divided into tasks.
 pub(super) const WORTH_TASKS: usize = 300_000;
 
-/// Forward substitution with the columns of a Cholesky factor: `front` holds a row of `K` right-hand sides
-/// for every row of the front; the leading rows become the solution, the others what is left for the parent.
+/// Forward substitution with the columns of a Cholesky factor. `front` holds a row of `K` right-hand sides for every
+/// row of the front. The leading rows become the solution; the contribution of these is subtracted from the rows below.
 pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
     let arch = instructions_for_rows(size_of::<[T; K]>());
     for (p, panel) in l.panels.iter().enumerate() {
@@ -35,7 +35,7 @@ pub(super) fn forward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T
     }
 }
 
-/// Back substitution with the transpose for the leading rows of `front`; the rows below hold their solution.
+/// Back substitution with the transpose for the leading rows of `front`. The rows below hold their solution.
 pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[T; K]]) {
     let arch = instructions_for_rows(size_of::<[T; K]>());
     for (p, panel) in l.panels.iter().enumerate().rev() {
@@ -63,65 +63,65 @@ pub(super) fn backward<T: Real, const K: usize>(l: &Trapezoid<T>, front: &mut [[
     }
 }
 
-/// y -= L x, L row by row.
+/// Subtracts L x from y; L is stored row by row.
 pub(super) fn subtract_product<const K: usize>(l: &[f64], x: &[[f64; K]], y: &mut [[f64; K]]) {
     instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SubtractProduct(l, x, y));
 }
 
-/// x -= L' y, L row by row.
+/// Subtracts L' y from x; L is stored row by row.
 pub(super) fn subtract_transposed<const K: usize>(l: &[f64], y: &[[f64; K]], x: &mut [[f64; K]]) {
     instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SubtractTransposed(l, y, x));
 }
 
-/// x <- L^-1 x for a square of the rows of a lower triangle.
+/// Replaces x by L^-1 x, for a square that holds the rows of a lower triangle.
 pub(super) fn solve_lower<const K: usize>(l: &[f64], x: &mut [[f64; K]]) {
     instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SolveLower(l, x));
 }
 
-/// x <- L^-T x for the same.
+/// Replaces x by L^-T x, for a square that holds the rows of a lower triangle.
 pub(super) fn solve_transposed<const K: usize>(l: &[f64], x: &mut [[f64; K]]) {
     instructions_for_rows(size_of::<[f64; K]>()).dispatch(Step::SolveTransposed(l, x));
 }
 
-/// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its
-/// columns to the other (x).
+/// One pass over a part of a panel. The rows of L belong to the longer block of right-hand sides (y), its columns to
+/// the other (x).
 enum Step<'a, T, const K: usize> {
-    /// x <- L^-1 x for the leading square of a panel.
+    /// Replaces x by L^-1 x for the leading square of a panel.
     SolveLower(&'a [T], &'a mut [[T; K]]),
-    /// y -= L x.
+    /// Subtracts L x from y.
     SubtractProduct(&'a [T], &'a [[T; K]], &'a mut [[T; K]]),
-    /// x -= L' y.
+    /// Subtracts L' y from x.
     SubtractTransposed(&'a [T], &'a [[T; K]], &'a mut [[T; K]]),
-    /// x <- L^-T x for the leading square of a panel.
+    /// Replaces x by L^-T x for the leading square of a panel.
     SolveTransposed(&'a [T], &'a mut [[T; K]]),
 }
 
-// Everything below is inlined into one function per instruction set. A row of right-hand sides is a few
-// vectors that stay in registers, and every number of L is spread over a vector of its own: left to itself,
-// the compiler runs its vectors along the rows of L and pays for it in shuffles.
+// All functions below are inlined into one function per instruction set. A row of right-hand sides is a few vectors
+// that stay in registers, and every number of L is broadcast to a vector. Without this the compiler vectorises along
+// the rows of L, which costs shuffles.
 
 impl<T: Real, const K: usize> WithSimd for Step<'_, T, K> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) {
-        // Rows of L taken together: enough sums to hide the latency of a multiplication, few enough for the
+        // Number of rows of L in a group: enough sums to hide the latency of a multiplication, few enough for the
         // registers.
         match size_of::<[T; K]>() / size_of::<T::SimdVec<S>>() {
             1 => Kernels::<T, S, 1>(T::simd_ctx(simd)).run::<8, K>(self),
             2 => Kernels::<T, S, 2>(T::simd_ctx(simd)).run::<4, K>(self),
             4 => Kernels::<T, S, 4>(T::simd_ctx(simd)).run::<2, K>(self),
-            // Rows shorter than a vector, machines without vectors.
+            // Rows shorter than a vector, and machines without vectors.
             _ => Kernels::<T, Scalar, K>(T::simd_ctx(Scalar)).run::<1, K>(self),
         }
     }
 }
 
-/// Columns of L between two calls of [`fetch`].
+/// Number of columns of L between two calls of [`fetch`].
 const STEP: usize = 8;
 
-/// Asks for the lines of the `R` [`STEP`] numbers of L from `from` on. Several rows read side by side are no
-/// stream that the hardware foresees; these requests, one row group ahead and in the order of memory, are.
+/// Prefetches the `R` [`STEP`] numbers of L from `from` on. The hardware does not recognise several rows read side by
+/// side as a stream; these requests, one row group ahead and in the order of memory, form one.
 #[inline(always)]
 fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
     for at in (from..from + R * STEP).step_by(64 / size_of::<T>()) {
@@ -129,20 +129,20 @@ fn fetch<T: Real, const R: usize>(l: &[T], from: usize) {
     }
 }
 
-/// The right-hand sides of a row.
+/// Right-hand sides of a row, as vectors.
 type Row<T, S, const N: usize> = [<T as ComplexField>::SimdVec<S>; N];
 
-/// The kernels for rows of `N` vectors of the instruction set `S`.
+/// Kernels for rows of `N` vectors of the instruction set `S`.
 struct Kernels<T: Real, S: Simd, const N: usize>(T::SimdCtx<S>);
 
 impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
-    /// Takes `R` rows of L together.
+    /// Runs a step with `R` rows of L at a time.
     #[inline(always)]
     fn run<const R: usize, const K: usize>(&self, step: Step<'_, T, K>) {
         match step {
             Step::SolveLower(l, x) => {
                 let x = Self::rows_mut(x);
-                // The odd rows come first, where there is next to nothing to subtract.
+                // Odd rows come first, where there is the least to subtract.
                 let odd = x.len() % R;
                 (0..odd).for_each(|base| self.solve_lower::<1>(l, x, base));
                 (odd..x.len()).step_by(R).for_each(|base| self.solve_lower::<R>(l, x, base));
@@ -228,7 +228,7 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
         }
     }
 
-    /// Products of the first `R` rows of L, `stride` numbers apart, with x.
+    /// Returns the products of the first `R` rows of L, `stride` numbers apart, with x.
     #[inline(always)]
     fn products<const R: usize>(&self, l: &[T], stride: usize, x: &[Row<T, S, N>]) -> [Row<T, S, N>; R] {
         let rows: [&[T]; R] = std::array::from_fn(|q| &l[q * stride..][..x.len()]);
@@ -244,7 +244,7 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
         sums
     }
 
-    /// x -= the transpose of the first `R` rows of L, `stride` numbers apart, times y.
+    /// Subtracts the transpose of the first `R` rows of L, `stride` numbers apart, times y from x.
     #[inline(always)]
     fn subtract_rows<const R: usize>(
         &self,
@@ -269,7 +269,7 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
         }
     }
 
-    /// sum += l x.
+    /// Adds l x to sum.
     #[inline(always)]
     fn add_multiple(&self, sum: &mut Row<T, S, N>, l: T, x: &Row<T, S, N>) {
         let l = T::simd_splat(&self.0, &l);
@@ -298,13 +298,13 @@ impl<T: Real, S: Simd, const N: usize> Kernels<T, S, N> {
 mod tests {
     use super::*;
 
-    /// Entry of a well-conditioned factor.
+    /// Returns an entry of a well-conditioned factor.
     fn entry(i: usize, j: usize) -> f64 {
         let noise = ((i * 37 + j * 101) % 211) as f64 / 211.0 - 0.5;
         if i == j { 2.0 + noise } else { 0.05 * noise }
     }
 
-    /// Forward and back substitution against the definition, row by row in double precision.
+    /// Compares forward and back substitution with their definition, row by row in double precision.
     fn check<T: Real, const K: usize>(width: usize, rows: usize, tolerance: f64) {
         let height = width + rows;
         let mut l = Trapezoid::<T>::zeros(height, width);

@@ -1,5 +1,5 @@
-//! Products of tall, skinny blocks (n x m, n large) with fixed partitions: partial results of fixed row
-//! chunks are added in a fixed order, so that the bits do not depend on the number of threads.
+//! Products of tall, skinny blocks (n x m, n large) with fixed partitions. Partial results of fixed row chunks are
+//! added in a fixed order, so that the bits do not depend on the number of threads.
 
 use super::contiguous::{contiguous, contiguous_mut};
 use super::few_columns::{FEW, add_few_combinations, gram_of_few};
@@ -10,13 +10,13 @@ use rayon::prelude::*;
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
-/// Rows per partial product.
+/// Number of rows per partial product.
 const ROWS: usize = 4096;
 
-/// Pieces of so many rows that one thread clears before another is called for help.
+/// Smallest number of pieces of [`ROWS`] numbers that one thread clears before the work is split.
 const PIECES: usize = 16;
 
-/// A tall block that grows by columns, whose memory is first touched as they come, by all threads.
+/// Tall block that grows by columns. All threads take part in the first write to new memory.
 #[derive(Debug, Clone, Default)]
 pub struct Tall {
     entries: Vec<f64>,
@@ -24,19 +24,19 @@ pub struct Tall {
 }
 
 impl Tall {
-    /// Zeros.
+    /// Creates a block of zeros.
     pub fn zeros(rows: usize, columns: usize) -> Self {
         let mut own = Self::with_room(rows, columns);
         own.add_zeros(columns);
         own
     }
 
-    /// No columns yet, with room for some that is not touched before they come.
+    /// Creates a block without columns, with memory reserved for `columns`.
     pub fn with_room(rows: usize, columns: usize) -> Self {
         Self { entries: Vec::with_capacity(rows * columns), rows }
     }
 
-    /// A copy, made by all threads.
+    /// Returns a copy, made by all threads.
     pub fn copied(x: MatRef<'_, f64>) -> Self {
         let mut own = Self::with_room(x.nrows(), x.ncols());
         own.push(x);
@@ -46,16 +46,16 @@ impl Tall {
     /// Appends columns, copied by all threads.
     ///
     /// # Panics
-    /// When the row counts differ.
+    /// If the row counts differ.
     pub fn push(&mut self, x: MatRef<'_, f64>) {
         assert_eq!(x.nrows(), self.rows, "rows of columns to append");
         x.col_iter().for_each(|column| self.push_multiple(1.0, column));
     }
 
-    /// Appends a multiple of a column, made by all threads.
+    /// Appends a multiple of a column, computed by all threads.
     ///
     /// # Panics
-    /// When the row counts differ.
+    /// If the row counts differ.
     pub fn push_multiple(&mut self, scale: f64, x: ColRef<'_, f64>) {
         assert_eq!(x.nrows(), self.rows, "rows of a column to append");
         self.entries.par_extend(contiguous(x).par_iter().with_min_len(ROWS).map(|x| scale * x));
@@ -66,43 +66,44 @@ impl Tall {
         self.entries.par_extend(rayon::iter::repeat_n(0.0, self.rows * columns).with_min_len(ROWS));
     }
 
-    /// Keeps the first columns, so many of them where there are more; the memory of the others stays.
+    /// Keeps at most the first `columns` columns. The memory of the others stays reserved.
     pub fn truncate(&mut self, columns: usize) {
         self.entries.truncate(self.rows * columns);
     }
 
-    /// Columns that are there.
+    /// Returns the number of columns.
     pub fn ncols(&self) -> usize {
         self.entries.len() / self.rows.max(1)
     }
 
-    /// The whole block.
+    /// Returns the whole block.
     pub fn as_ref(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.entries, self.rows, self.ncols())
     }
 
-    /// The whole block, to be written.
+    /// Returns the whole block for writing.
     pub fn as_mut(&mut self) -> MatMut<'_, f64> {
         let columns = self.ncols();
         MatMut::from_column_major_slice_mut(&mut self.entries, self.rows, columns)
     }
 
-    /// Some of the columns.
+    /// Returns a range of columns.
     pub fn columns(&self, which: Range<usize>) -> MatRef<'_, f64> {
         self.as_ref().subcols(which.start, which.len())
     }
 
-    /// Some of the columns, to be written.
+    /// Returns a range of columns for writing.
     pub fn columns_mut(&mut self, which: Range<usize>) -> MatMut<'_, f64> {
         self.as_mut().subcols_mut(which.start, which.len())
     }
 
-    /// The first columns.
+    /// Returns the first columns.
     pub fn first(&self, columns: usize) -> MatRef<'_, f64> {
         self.columns(0..columns)
     }
 
-    /// The first columns, to be written; all are made anew where there are too few.
+    /// Returns the first columns for writing. If there are too few, the block is replaced by zeros with that number of
+    /// columns.
     pub fn first_mut(&mut self, columns: usize) -> MatMut<'_, f64> {
         if columns > self.ncols() {
             *self = Self::zeros(self.rows, columns);
@@ -111,32 +112,32 @@ impl Tall {
     }
 }
 
-/// Zeros (n x m), written by all threads: [`Mat::zeros`] writes them by one, and the system clears memory that is
-/// touched for the first time, which takes longer than most of what is done with it.
+/// Returns zeros (n x m), written by all threads. [`Mat::zeros`] writes them on one thread, and the system clears
+/// memory at the first access, which takes longer than most computations with the block.
 #[allow(unsafe_code)]
 pub fn zeros(rows: usize, columns: usize) -> Mat<f64> {
     let mut own = Mat::<f64>::with_capacity(rows, columns);
     let stride = own.col_stride().unsigned_abs();
-    // SAFETY: faer reserves room for as many columns as were asked for, `stride` numbers apart, and nobody else has it;
-    // numbers that are not yet there are taken as such.
+    // SAFETY: faer reserves `stride` numbers for each of the requested columns, and no other reference to them exists;
+    // uninitialised numbers are accessed as `MaybeUninit`.
     let room = unsafe {
         std::slice::from_raw_parts_mut(own.as_ptr_mut().cast::<MaybeUninit<f64>>(), stride * columns)
     };
     room.par_chunks_mut(ROWS).with_min_len(PIECES).for_each(|part| part.fill(MaybeUninit::new(0.0)));
-    // SAFETY: all of them have been written.
+    // SAFETY: all numbers have been written.
     unsafe { own.set_dims(rows, columns) };
     own
 }
 
-/// A copy, made by all threads.
+/// Returns a copy, made by all threads.
 pub fn copied(x: MatRef<'_, f64>) -> Mat<f64> {
     side_by_side(&[x])
 }
 
-/// A' B (m x k) of tall blocks A (n x m) and B (n x k).
+/// Returns A' B (m x k) of tall blocks A (n x m) and B (n x k).
 ///
 /// # Panics
-/// When the row counts differ.
+/// If the row counts differ.
 pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     assert_eq!(a.nrows(), b.nrows(), "rows of a Gram product");
     let n = a.nrows();
@@ -158,24 +159,25 @@ pub fn gram(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     sum_pairwise(&partial)
 }
 
-/// a_j' b_j for the columns of equal-shaped blocks A and B (n x m).
+/// Returns a_j' b_j for the columns of equal-shaped blocks A and B (n x m).
 ///
 /// # Panics
-/// When the shapes differ.
+/// If the shapes differ.
 pub fn column_products(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Vec<f64> {
     assert_eq!(a.ncols(), b.ncols(), "columns of a product by columns");
     (0..a.ncols()).map(|j| gram(a.subcols(j, 1), b.subcols(j, 1))[(0, 0)]).collect()
 }
 
-/// Norms between these are those of their squares.
+/// Range of norms that are computed from sums of squares without overflow or underflow.
 const SQUARES: std::ops::RangeInclusive<f64> = 1e-140..=1e140;
 
-/// Euclidean norms of the columns of a tall block.
+/// Returns the Euclidean norms of the columns of a tall block.
 pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
     let chunks = a.nrows().div_ceil(ROWS);
     let squares = |k: usize| -> f64 {
         let (chunk, column) = (k % chunks, k / chunks);
         let part = a.col(column).subrows(chunk * ROWS, ROWS.min(a.nrows() - chunk * ROWS));
+        // Eight sums side by side over each chunk of rows.
         let (lanes, rest) = contiguous(part).as_chunks::<8>();
         let mut sums = [0.0; 8];
         lanes.iter().for_each(|x| (0..8).for_each(|w| sums[w] += x[w] * x[w]));
@@ -189,10 +191,10 @@ pub fn column_norms(a: MatRef<'_, f64>) -> Vec<f64> {
     (0..a.ncols()).map(norm).collect()
 }
 
-/// x' diag(w) x.
+/// Returns x' diag(w) x.
 ///
 /// # Panics
-/// When the lengths differ.
+/// If the lengths differ.
 pub fn weighted_square(x: ColRef<'_, f64>, weights: &[f64]) -> f64 {
     assert_eq!(x.nrows(), weights.len(), "one weight for each row");
     let part = |(x, w): (&[f64], &[f64])| x.iter().zip(w).map(|(x, w)| x * x * w).sum::<f64>();
@@ -200,12 +202,12 @@ pub fn weighted_square(x: ColRef<'_, f64>, weights: &[f64]) -> f64 {
     parts.iter().sum()
 }
 
-/// x /= size.
+/// Divides x by `size`.
 pub fn divide(x: ColMut<'_, f64>, size: f64) {
     contiguous_mut(x).par_chunks_mut(ROWS).for_each(|x| x.iter_mut().for_each(|x| *x /= size));
 }
 
-/// Sum of equal-shaped matrices, pairwise: error grows with the logarithm of their number.
+/// Returns the pairwise sum of equal-shaped matrices: its error grows with the logarithm of their number.
 fn sum_pairwise(parts: &[Mat<f64>]) -> Mat<f64> {
     match parts {
         [] => Mat::zeros(0, 0),
@@ -217,44 +219,44 @@ fn sum_pairwise(parts: &[Mat<f64>]) -> Mat<f64> {
     }
 }
 
-/// W -= V H for tall V (n x m), W (n x k) and small H (m x k).
+/// Subtracts V H from W for tall V (n x m), W (n x k) and small H (m x k).
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match.
 pub fn subtract_combination(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) {
     add_product(w, Accum::Add, v, h, -1.0);
 }
 
-/// W += V H for tall V (n x m), W (n x k) and small H (m x k).
+/// Adds V H to W for tall V (n x m), W (n x k) and small H (m x k).
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match.
 pub fn add_combination(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) {
     add_product(w, Accum::Add, v, h, 1.0);
 }
 
-/// V H (n x k) for tall V (n x m) and small H (m x k).
+/// Returns V H (n x k) for tall V (n x m) and small H (m x k).
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match.
 pub fn combine(v: MatRef<'_, f64>, h: MatRef<'_, f64>) -> Mat<f64> {
     let mut out = zeros(v.nrows(), h.ncols());
     combine_into(out.as_mut(), v, h);
     out
 }
 
-/// W = V H for tall V (n x m), W (n x k) and small H (m x k).
+/// Computes W = V H for tall V (n x m), W (n x k) and small H (m x k).
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match.
 pub fn combine_into(w: MatMut<'_, f64>, v: MatRef<'_, f64>, h: MatRef<'_, f64>) {
     add_product(w, Accum::Replace, v, h, 1.0);
 }
 
-/// V <- V H in its first columns, for tall V (n x m) and small H (m x k) with k <= m.
+/// Replaces the first k columns of V by V H, for tall V (n x m) and small H (m x k) with k <= m.
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match.
 pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
     assert!(v.ncols() == h.nrows() && h.ncols() <= h.nrows(), "tall product in place");
     let chunks = v.nrows().div_ceil(ROWS);
@@ -265,10 +267,10 @@ pub fn combine_in_place(v: MatMut<'_, f64>, h: MatRef<'_, f64>) {
     });
 }
 
-/// y_j -= s_j x_j for the columns of equal-shaped blocks.
+/// Subtracts s_j x_j from y_j for the columns of equal-shaped blocks.
 ///
 /// # Panics
-/// When the shapes disagree.
+/// If the shapes do not match.
 pub fn subtract_columns(y: MatMut<'_, f64>, scales: &[f64], x: MatRef<'_, f64>) {
     assert!(
         y.nrows() == x.nrows() && y.ncols() == x.ncols() && x.ncols() == scales.len(),
@@ -280,10 +282,10 @@ pub fn subtract_columns(y: MatMut<'_, f64>, scales: &[f64], x: MatRef<'_, f64>) 
     });
 }
 
-/// The columns of all blocks, in their order.
+/// Returns the columns of all blocks, in order.
 ///
 /// # Panics
-/// When the row counts differ.
+/// If the row counts differ.
 pub fn side_by_side(blocks: &[MatRef<'_, f64>]) -> Mat<f64> {
     let n = blocks.first().map_or(0, |block| block.nrows());
     assert!(blocks.iter().all(|block| block.nrows() == n), "rows of blocks side by side");
@@ -303,7 +305,7 @@ fn add_product(w: MatMut<'_, f64>, accum: Accum, v: MatRef<'_, f64>, h: MatRef<'
     });
 }
 
-/// The same by one thread.
+/// Computes the product for the rows of one chunk, on one thread.
 fn add_product_of_rows(
     mut w: MatMut<'_, f64>,
     accum: Accum,
@@ -320,7 +322,7 @@ fn add_product_of_rows(
     add_few_combinations(w, v, h, alpha);
 }
 
-/// Cuts a block into `chunks` pieces of [`ROWS`] rows (the last one shorter).
+/// Cuts a block into `chunks` pieces of [`ROWS`] rows; the last one may be shorter.
 fn split_rows(mut w: MatMut<'_, f64>, chunks: usize) -> Vec<MatMut<'_, f64>> {
     let mut pieces = Vec::with_capacity(chunks);
     for _ in 0..chunks {
@@ -382,7 +384,7 @@ mod tests {
             assert_eq!(own, Mat::<f64>::zeros(rows, columns), "{rows} {columns}");
             let given = Mat::from_fn(rows, columns, |i, j| (i + 10 * j) as f64);
             assert_eq!(copied(given.as_ref()), given);
-            // Taken apart by columns and by rows.
+            // Copied by columns and by rows.
             assert_eq!(copied(given.as_ref().transpose()), given.transpose());
         }
     }

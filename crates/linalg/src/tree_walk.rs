@@ -1,44 +1,45 @@
 //! Parallel walks over the assembly tree: upward (factorisation, forward substitution) and downward (back
-//! substitution). Heavy subtrees run at the same time; what is done at a supernode, and the order in which
-//! its children's results reach it, do not depend on the number of threads.
+//! substitution). Heavy subtrees run in parallel. The work at a supernode, and the order in which it receives the
+//! results of its children, do not depend on the number of threads.
 
 use super::assembly_tree::AssemblyTree;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Heavy subtrees do at least this part of all work: enough of them for eight threads.
+/// Smallest part of all work in a heavy subtree: enough subtrees for eight threads.
 const HEAVY_PART: f64 = 1.0 / 32.0;
 
-/// Work below which a subtree is never cut.
+/// Amount of work below which a subtree is not divided.
 const HEAVY_WORK: f64 = 1e7;
 
-/// A subtree with the heavy ones below its lowest branching: those run at the same time, the rest after them.
+/// Subtree with the heavy subtrees below its lowest branching. These run in parallel, the rest after them.
 #[derive(Debug)]
 struct Segment {
     supernodes: Range<usize>,
     branches: Vec<Segment>,
 }
 
-/// Memory of the work at one supernode.
+/// Memory for the work at one supernode.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Needs {
-    /// Held until the end of the walk.
+    /// Memory held until the end of the walk.
     pub kept: usize,
-    /// Held until the parent has been visited.
+    /// Memory held until the parent has been visited.
     pub handed_on: usize,
-    /// Held during the visit only.
+    /// Memory held during the visit only.
     pub in_work: usize,
 }
 
-/// How walks cut the tree.
+/// Division of the tree into subtrees for parallel walks.
 #[derive(Debug)]
 pub(crate) struct TreeWalk {
     trees: Segment,
 }
 
 impl TreeWalk {
-    /// Cuts the tree by the work at each supernode.
+    /// Divides the tree by the work at each supernode.
     pub(crate) fn new(tree: &AssemblyTree, work: &[f64]) -> Self {
+        // Work of each subtree, and its first supernode.
         let mut below = work.to_vec();
         let mut first: Vec<usize> = (0..tree.len()).collect();
         for s in 0..tree.len() {
@@ -52,10 +53,11 @@ impl TreeWalk {
         let roots: Vec<usize> = (0..tree.len()).filter(|&s| tree.parent(s).is_none()).collect();
         let all: f64 = roots.iter().map(|&r| below[r]).sum();
         let heavy = (HEAVY_PART * all).max(HEAVY_WORK);
-        // Parents come after children, so their segments find the branches ready.
+        // Parents come after children, so that the branches of their segments exist already.
         let mut branches: Vec<Vec<Segment>> = (0..tree.len()).map(|_| Vec::new()).collect();
         let gather = |children: Vec<usize>, branches: &mut Vec<Vec<Segment>>| -> Vec<Segment> {
             let heavy: Vec<usize> = children.into_iter().filter(|&c| below[c] >= heavy).collect();
+            // A single heavy child extends the segment downward.
             if let [one] = heavy[..] {
                 return std::mem::take(&mut branches[one]);
             }
@@ -72,17 +74,17 @@ impl TreeWalk {
         Self { trees: Segment { supernodes: 0..tree.len(), branches: top } }
     }
 
-    /// Most memory that an upward walk holds at a time, in the units of `needs`, with so many branches in
-    /// work at the same time: those that need most beyond what they leave.
+    /// Returns the largest memory that an upward walk holds at a time, in the units of `needs`, with `threads` branches
+    /// in parallel: those that need most beyond what they leave.
     pub(crate) fn peak(&self, tree: &AssemblyTree, threads: usize, needs: &dyn Fn(usize) -> Needs) -> usize {
         peak(tree, &self.trees, threads.max(1), needs).0
     }
 
-    /// Calls `visit(supernode, slot, results of its children)` for every supernode, children first. Results
-    /// of roots are dropped.
+    /// Calls `visit(supernode, slot, results of its children)` for every supernode, children first. The results of
+    /// roots are dropped.
     ///
     /// # Errors
-    /// The first one in elimination order among those met.
+    /// The first error, in elimination order, among those that occurred.
     pub(crate) fn up<S: Send, U: Send, E: Send>(
         &self,
         tree: &AssemblyTree,
@@ -92,8 +94,8 @@ impl TreeWalk {
         up(tree, &self.trees, slots, visit).map(|_| ())
     }
 
-    /// Calls `visit(supernode, slot, message of its parent)` for every supernode, parents first; it returns
-    /// the messages to its children, in their order. Roots get `None`.
+    /// Calls `visit(supernode, slot, message of its parent)` for every supernode, parents first. `visit` returns the
+    /// messages to its children, in their order. Roots receive `None`.
     pub(crate) fn down<S: Send, D: Send>(
         &self,
         tree: &AssemblyTree,
@@ -104,7 +106,7 @@ impl TreeWalk {
     }
 }
 
-/// The slots of each branch of a segment.
+/// Returns the slots of each branch of a segment.
 fn split<'a, 'b, S>(segment: &'a Segment, slots: &'b mut [S]) -> Vec<(&'a Segment, &'b mut [S])> {
     let (mut rest, mut at) = (slots, segment.supernodes.start);
     let mut parts = Vec::with_capacity(segment.branches.len());
@@ -117,7 +119,7 @@ fn split<'a, 'b, S>(segment: &'a Segment, slots: &'b mut [S]) -> Vec<(&'a Segmen
     parts
 }
 
-/// The supernodes of a segment outside its branches, ascending.
+/// Returns the supernodes of a segment outside its branches, ascending.
 fn own(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
     let ends = segment.branches.iter().map(|b| b.supernodes.end);
     let starts = segment.branches.iter().map(|b| b.supernodes.start).chain([segment.supernodes.end]);
@@ -126,7 +128,7 @@ fn own(segment: &Segment) -> impl DoubleEndedIterator<Item = usize> {
     gaps.into_iter().flatten()
 }
 
-/// The most that a segment holds at a time, and what is left at its end.
+/// Returns the largest memory that a segment holds at a time, and the memory held at its end.
 fn peak(
     tree: &AssemblyTree,
     segment: &Segment,
@@ -135,6 +137,7 @@ fn peak(
 ) -> (usize, usize) {
     let branches: Vec<(usize, usize)> =
         segment.branches.iter().map(|branch| peak(tree, branch, threads, needs)).collect();
+    // Branches in parallel: all leave their results, and the largest needs occur together.
     let mut held: usize = branches.iter().map(|b| b.1).sum();
     let mut beyond: Vec<usize> = branches.iter().map(|b| b.0 - b.1).collect();
     beyond.sort_unstable();
@@ -148,7 +151,7 @@ fn peak(
     (most, held)
 }
 
-/// The results of the supernodes of a segment that have no parent inside it.
+/// Results of the supernodes of a segment whose parents lie outside the segment.
 type Open<U> = Vec<(usize, U)>;
 
 fn up<S: Send, U: Send, E: Send>(
@@ -160,6 +163,7 @@ fn up<S: Send, U: Send, E: Send>(
     let start = segment.supernodes.start;
     let results: Vec<Result<Open<U>, E>> =
         split(segment, slots).into_par_iter().map(|(branch, slots)| up(tree, branch, slots, visit)).collect();
+    // Branches in parallel, then the rest of the segment in elimination order.
     let mut pending: Vec<Option<U>> = segment.supernodes.clone().map(|_| None).collect();
     for result in results {
         for (s, value) in result? {
@@ -195,6 +199,7 @@ fn down<S: Send, D: Send>(
             pending[c as usize - start] = Some(message);
         }
     }
+    // The rest of the segment is done: each branch receives its messages.
     let parts = split(segment, slots);
     let mut tasks = Vec::with_capacity(parts.len());
     for (branch, slots) in parts {

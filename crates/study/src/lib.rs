@@ -1,4 +1,4 @@
-//! What a scene needs of a body, and what accuracy costs there.
+//! Study of a body in a scene: the terms and modes that the scene needs, and the cost of accuracy.
 
 #![deny(
     clippy::exit,

@@ -1,5 +1,5 @@
-//! A body made for one scene: a conversion that computes no more than the scene may need, and keeps no more
-//! than it needs.
+//! Conversion of a body for one scene: it computes only the terms that the scene may need, and keeps only those that it
+//! does need.
 
 use crate::reference::{Enriched, Enrichment, Fewest, MOST_LACKING, MotionBodies, ReferenceError, enrich};
 use crate::selection::{Selection, WantedResponses, largest_eigenvalue, rule_out, select};
@@ -18,21 +18,20 @@ use flexbody_motion::scene::LoadCases;
 /// Settings of a conversion for a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tailoring {
-    /// Settings of the conversion: what there is to select from.
+    /// Settings of the conversion before the selection.
     pub settings: ConvertSettings,
-    /// Whether a band of the scene replaces the wanted modes: all up to twice the band, if there are any.
+    /// True if the band of the scene sets the number of modes: all up to twice the band, if there are any.
     pub by_band: bool,
-    /// Whether the shapes that the motion is made of replace the modes that it was computed with, where fewer
-    /// of them do.
+    /// True if shapes made of the motion replace the modes of the simulation, if fewer shapes suffice.
     pub of_motion: bool,
 }
 
 impl Tailoring {
-    /// A body with everything that any of the load cases may need, enriched until what it lacks of the model no
-    /// longer counts there.
+    /// Makes a body with everything that any of the load cases may need, and enriches it until its truncation error is
+    /// small there.
     ///
     /// # Errors
-    /// As [`convert`](flexbody_body::convert::convert) and [`enrich`].
+    /// The errors of [`convert`](flexbody_body::convert::convert) and [`enrich`].
     pub fn convert(
         &self,
         model: &FeModel,
@@ -42,8 +41,8 @@ impl Tailoring {
         self.enriched(model, cases, context, |modal| Ok(modal.condense()))
     }
 
-    /// Conversions by `condense`, each with more static responses than the one before, until the body lacks
-    /// nothing that counts.
+    /// Converts with `condense`, with more static responses in each round, until the truncation error of the body is
+    /// small enough.
     fn enriched(
         &self,
         model: &FeModel,
@@ -65,11 +64,11 @@ impl Tailoring {
         enrich(model, cases, enrichment, context, make, |made| &made.body)
     }
 
-    /// The body of the fewest shapes of its motions that leave half of the tolerances to others, in place of
-    /// the `whole` one whose motions they are; that one where no number of them does.
+    /// Returns a body of the fewest shapes of the motions of `whole` that leave half of the tolerances to dropped
+    /// terms. Returns `whole` with a warning if no number of shapes suffices.
     ///
     /// # Errors
-    /// Those of [`trace`](flexbody_motion::scene::trace) and of the conversion.
+    /// The errors of [`trace`](flexbody_motion::scene::trace) and of the conversion.
     fn of_motion(
         &self,
         model: &FeModel,
@@ -86,6 +85,7 @@ impl Tailoring {
             reference.diagnostics.push(Diagnostic::new(Code::MotionWithoutBasis, message));
             return Ok(Enriched { made: reference, rounds });
         }
+        // The shapes may take what the truncation error of the whole body leaves.
         let lacks: Vec<f64> = own().map(|own| own.map_or(0.0, |own| own.worst)).collect();
         let bodies = MotionBodies::new(model, &reference.body, cases, context)?;
         let make = |bodies: &MotionBodies<'_>, count: usize| -> Result<Conversion> {
@@ -117,21 +117,21 @@ impl Tailoring {
         Ok(Enriched { made: reference, rounds })
     }
 
-    /// The settings with all modes of given shapes.
+    /// Returns settings that use all modes of the given shapes.
     fn settings_of_shapes(&self, basis: BasisChoice) -> ConvertSettings {
         let mut settings = ConvertSettings { basis, ..self.settings.clone() };
         settings.modes.wanted = Wanted::Lowest(usize::MAX);
         settings
     }
 
-    /// The same with the static responses to `loads` in the basis.
+    /// Returns these settings with the static responses to `loads` in the basis.
     fn with_motion(&self, loads: &Mat<f64>) -> Self {
         let mut own = self.clone();
         own.settings.basis = self.settings.basis.with_motion(loads).unwrap_or(own.settings.basis);
         own
     }
 
-    /// The settings with the modes that the highest band of the load cases wants.
+    /// Returns settings with the modes up to the highest band of the load cases; `None` if no band decides.
     fn settings_of_band(&self, cases: &LoadCases) -> Option<ConvertSettings> {
         let highest = largest_eigenvalue(cases).filter(|_| self.by_band)?;
         let mut settings = self.settings.clone();
@@ -139,8 +139,8 @@ impl Tailoring {
         Some(settings)
     }
 
-    /// The modes that the band of a scene wants; those of the settings without a band, and for a body that is
-    /// stiff in it.
+    /// Computes the modes of `band_settings`. Uses the settings without a band if there is none, or if the body has no
+    /// mode in the band.
     fn find_modes<'m>(
         &'m self,
         band_settings: Option<&'m ConvertSettings>,
@@ -157,8 +157,8 @@ impl Tailoring {
     }
 }
 
-/// Loads whose static responses join the modes where nobody names others: those `stated` with the model;
-/// without, those of the load cases, of which free modes alone know nothing.
+/// Returns the loads whose static responses join the modes by default: the loads `stated` with the model or, without
+/// these, the loads of the load cases.
 pub fn loads_for(cases: Option<&LoadCases>, stated: &[LoadSource]) -> Vec<LoadSource> {
     if !stated.is_empty() {
         return stated.to_vec();
@@ -169,10 +169,11 @@ pub fn loads_for(cases: Option<&LoadCases>, stated: &[LoadSource]) -> Vec<LoadSo
     loads.into_iter().filter(|(wanted, _)| *wanted).map(|(_, load)| load).collect()
 }
 
-/// The basis of a kind that is computed from the model, with the residual vectors of `loads` where it takes them.
+/// Returns a basis of the given kind, computed from the model. It contains residual vectors of `loads` if the kind
+/// takes them.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage) for imported shapes, which are no result of the model; errors of the files of loads.
+/// [`Usage`](Code::Usage) for imported shapes, which are not computed from the model; errors of the files of loads.
 pub fn computed_basis(kind: BasisKind, loads: &[LoadSource], model: &FeModel) -> Result<BasisChoice> {
     let residual_vectors = || read_loads(loads, model);
     match kind {
@@ -191,10 +192,10 @@ pub fn computed_basis(kind: BasisKind, loads: &[LoadSource], model: &FeModel) ->
     }
 }
 
-/// Loads of residual vectors, with the files read that they need.
+/// Reads the files that the loads of residual vectors need.
 ///
 /// # Errors
-/// Those of [`read_shapes`] and [`UserLoads::new`].
+/// The errors of [`read_shapes`] and [`UserLoads::new`].
 fn read_loads(loads: &[LoadSource], model: &FeModel) -> Result<Vec<Loads>> {
     loads.iter().map(|set| read_set(set, model)).collect()
 }
@@ -213,11 +214,11 @@ fn read_set(set: &LoadSource, model: &FeModel) -> Result<Loads> {
     }
 }
 
-/// Converts `model` to a body with the terms and modes that the load cases need: what bounds of tier 0 rule out is
-/// never computed, the rest is decided about the converted body. The scene becomes one of its sources.
+/// Converts `model` to a body with the terms and modes that the load cases need. Terms that bounds of tier 0 rule out
+/// are not computed; the rest is decided for the converted body. The scene files become sources of the body.
 ///
 /// # Errors
-/// As [`convert`](flexbody_body::convert::convert), [`enrich`] and [`select`].
+/// The errors of [`convert`](flexbody_body::convert::convert), [`enrich`] and [`select`].
 pub fn convert_for(
     model: &FeModel,
     tailoring: &Tailoring,
@@ -226,7 +227,7 @@ pub fn convert_for(
 ) -> Result<(Conversion, Selection)> {
     refuse_unfit(tailoring, cases)?;
     let condense = |modal: &ModalModel<'_>| {
-        // Rigid motion alone is multiplied by M before the scenes have said which groups they may need.
+        // Only the products of M with rigid motion are computed before the scenes rule out groups.
         let linear = modal.condense_linear();
         let terms = rule_out(&modal.body(&linear)?, cases, context)?;
         Ok(modal.condense_kept(linear, terms))
@@ -238,6 +239,7 @@ pub fn convert_for(
     let Enriched { made: mut conversion, rounds } = enriched;
     let selection = select(&conversion.body, &rounds, cases, context)?;
     let reduced = conversion.body.reduced(&selection.modes, selection.groups, selection.terms.clone())?;
+    // Record the scene and its histories as sources of the body.
     let mut parts = reduced.into_parts();
     let series = cases.iter().flat_map(|scene| &scene.series).map(|file| &file.source);
     for source in cases.iter().filter_map(|scene| scene.source.as_ref()).chain(series) {
@@ -250,7 +252,7 @@ pub fn convert_for(
     Ok((conversion, selection))
 }
 
-/// Refuses what a basis that is made of a motion cannot serve.
+/// Refuses settings and scenes for which a conversion with selection, or a basis made of motion, is not possible.
 fn refuse_unfit(tailoring: &Tailoring, cases: &LoadCases) -> Result<()> {
     if tailoring.settings.frame.interface().is_some() {
         let message = "a scene chooses terms and modes of bodies in mean axes, not of one whose frame stands on an interface";

@@ -1,4 +1,4 @@
-//! What can be said on the command line about work on a cluster and about many bodies.
+//! Arguments of the commands for clusters and batches.
 
 use super::{JobArguments, Printing, memory_size, names, positive};
 use clap::{Args, ValueEnum};
@@ -14,13 +14,13 @@ pub struct PrepareArguments {
     /// Manifest of the model (see docs/input.md), or the job of an FE program (docs/fe_programs.md)
     #[arg(value_name = "MODEL.toml|JOB.inp")]
     pub model: PathBuf,
-    /// The job of an FE program.
+    /// Job of an FE program.
     #[command(flatten)]
     pub job: JobArguments,
-    /// Warn only of densities that no matter has, and of mass between nodes that no stiffness joins
+    /// Treat implausible densities, and mass coupling without stiffness, as warnings instead of errors
     #[arg(long)]
     pub allow_implausible: bool,
-    /// Folder to write, all that the cluster needs; it is made where it is not there
+    /// Folder to write, with all that the cluster needs; it is created if it does not exist
     #[arg(short, long, value_name = "DIR")]
     pub output: PathBuf,
     /// Number of flexible modes [default: 20]
@@ -29,14 +29,13 @@ pub struct PrepareArguments {
     /// All flexible modes up to this frequency instead
     #[arg(long, value_name = "HZ", value_parser = positive)]
     pub max_frequency: Option<f64>,
-    /// Promise about the modes: fast or standard
+    /// Accuracy of the modes: fast or standard
     #[arg(long, value_parser = names::accuracy(), default_value = Accuracy::default().name())]
     pub accuracy: Accuracy,
-    /// Bits of the whole numbers of the PETSc on the cluster; matrices of more than two billion entries need
-    /// 64
+    /// Bits of the integers of the PETSc on the cluster; matrices of more than two billion entries need 64
     #[arg(long, value_name = "BITS", default_value = "32", value_parser = ["32", "64"])]
     pub indices: String,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -44,33 +43,34 @@ pub struct PrepareArguments {
 /// Arguments of `assemble`.
 #[derive(Debug, Args)]
 pub struct AssembleArguments {
-    /// Folder that `prepare` has written and the driver has worked in
+    /// Folder that `prepare` has written and the driver has run in
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// The model, where it does not lie any more where `prepare` has read it
+    /// Model, if it has moved since `prepare` has read it
     #[arg(long, value_name = "MODEL.toml|JOB.inp")]
     pub model: Option<PathBuf>,
     /// Flex-body file to write
     #[arg(short, long, value_name = "BODY.flex.h5")]
     pub output: PathBuf,
-    /// Take so many of the modes [default: as many as were wanted]
+    /// Number of modes to use [default: as many as were requested]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub modes: Option<u32>,
-    /// Make the built-in inertia count too, which factors K - sigma M on this machine
+    /// Also make the built-in inertia count, which factors K - sigma M on this machine
     #[arg(long)]
     pub prove: bool,
-    /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the room and has 7 digits
+    /// Floats of shapes and of the inertia of the modes in the file: f32 takes half the space and has 7 digits
     #[arg(long, value_parser = names::storage(), default_value = Storage::default().name())]
     pub storage: Storage,
-    /// Memory that the program may use: a number with K, M, G or T
-    /// [default: what the machine and its control groups leave]
+    /// Memory that the program may use: a number with K, M, G or T [default: all that the machine and its control
+    /// groups have free]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
-    /// Frame of the body: com (centre of mass, axes of the model), principal (there, principal axes), model (that of the
-    /// model), or interface=NAME: on the reference point of an interface, which then rests in every mode [default: com]
+    /// Frame of the body: com (centre of mass, axes of the model), principal (centre of mass, principal axes), model
+    /// (frame of the model), or interface=NAME (reference point of an interface, which is then at rest in every mode)
+    /// [default: com]
     #[arg(long, value_name = "FRAME")]
     pub frame: Option<FrameChoice>,
-    /// Lumped masses to compare with: row-sum, diagonal-scaling, user=FILE (node,mass), or none
+    /// Lumped masses for comparison: row-sum, diagonal-scaling, user=FILE (node,mass), or none
     #[arg(long, value_name = "SCHEMES", default_value = "row-sum,diagonal-scaling")]
     pub lumped: String,
     /// Leave the surface out of the file
@@ -79,13 +79,13 @@ pub struct AssembleArguments {
     /// Report to write, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Threads; results do not depend on it [default: all processors]
+    /// Number of threads; results are independent of it [default: all processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub threads: Option<u16>,
-    /// Print all that is known of the body instead of a summary
+    /// Print all facts about the body instead of a summary
     #[arg(short, long)]
     pub verbose: bool,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -96,48 +96,48 @@ pub struct BatchArguments {
     /// List of bodies (see docs/cluster.md)
     #[arg(value_name = "LIST.toml")]
     pub list: PathBuf,
-    /// Memory that all conversions together may use: a number with K, M, G or T
-    /// [default: what the machine and its control groups leave]
+    /// Memory that all conversions together may use: a number with K, M, G or T [default: all that the machine and its
+    /// control groups have free]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub memory_limit: Option<u64>,
     /// Report about all bodies, format by extension: .html, .json or .txt (repeatable)
     #[arg(long, value_name = "FILE")]
     pub report: Vec<PathBuf>,
-    /// Let options of the list name programs to start (--mpiexec, --python); without it such a list is refused
+    /// Let options of the list name programs to start (--mpiexec, --python); otherwise such a list is refused
     #[arg(long)]
     pub allow_programs: bool,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
 
-/// Who finds the modes.
+/// Solver for the modes.
 #[derive(Debug, Args)]
 pub struct EngineArguments {
-    /// Who finds the free modes: this program, or SLEPc over MPI (docs/cluster.md)
+    /// Solver for the free modes: this program, or SLEPc over MPI (docs/cluster.md)
     #[arg(long, value_enum, default_value_t = EngineName::BuiltIn)]
     pub engine: EngineName,
-    /// Ranks of --engine slepc
+    /// Number of MPI ranks of --engine slepc
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub ranks: u32,
-    /// How --engine slepc solves
+    /// Method of --engine slepc
     #[arg(long, value_parser = names::solver(), default_value = Solver::default().name())]
     pub solver: Solver,
-    /// Words that start MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
+    /// Command that starts MPI, before `-n N` [default: FLEXBODY_MPIEXEC, else mpiexec]
     #[arg(long, value_name = "WORDS")]
     pub mpiexec: Option<String>,
     /// Python with petsc4py and slepc4py, started by -I: without PYTHONPATH and packages of the current folder
     /// [default: FLEXBODY_PYTHON, else python3 or /usr/bin/python3]
     #[arg(long, value_name = "PYTHON")]
     pub python: Option<PathBuf>,
-    /// Folder that --engine slepc works in and that stays
-    /// [default: BODY.flex.h5.cluster, which stays only where the run fails, to go on from]
+    /// Working folder of --engine slepc, which is kept [default: BODY.flex.h5.cluster, which is kept only if the run
+    /// fails, to continue from it]
     #[arg(long, value_name = "DIR")]
     pub cluster_folder: Option<PathBuf>,
 }
 
 impl Default for EngineArguments {
-    /// This program.
+    /// Returns the built-in solver.
     fn default() -> Self {
         Self {
             engine: EngineName::BuiltIn,

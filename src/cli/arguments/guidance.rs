@@ -8,7 +8,7 @@ use flexbody_input::RECIPES;
 /// Arguments of `doctor`.
 #[derive(Debug, Args)]
 pub struct DoctorArguments {
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -16,10 +16,10 @@ pub struct DoctorArguments {
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
 pub struct CompletionsArguments {
-    /// The shell
+    /// Shell
     #[arg(value_enum)]
     pub shell: clap_complete::Shell,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -27,10 +27,10 @@ pub struct CompletionsArguments {
 /// Arguments of `man`.
 #[derive(Debug, Args)]
 pub struct ManArguments {
-    /// Command that the page is about [default: the program]
+    /// Command of the page [default: the program]
     #[arg(value_name = "COMMAND")]
     pub command: Option<String>,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
@@ -41,12 +41,12 @@ pub struct RecipeArguments {
     /// FE program
     #[arg(value_name = "PROGRAM", value_parser = recipes())]
     pub program: String,
-    /// How to print.
+    /// Options of printing.
     #[command(flatten)]
     pub printing: Printing,
 }
 
-/// Names of the programs that there are recipes for.
+/// Returns the names of the programs with recipes.
 fn recipes() -> clap::builder::PossibleValuesParser {
     RECIPES.iter().map(|recipe| PossibleValue::new(recipe.program)).collect::<Vec<_>>().into()
 }

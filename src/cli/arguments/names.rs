@@ -1,4 +1,4 @@
-//! Options whose values are called by their names: what the help says of each.
+//! Parsers of options whose values are names, with the help of each value.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexbody_body::basis::BasisKind;
@@ -7,7 +7,7 @@ use flexbody_cluster::Solver;
 use flexbody_eigen::{Accuracy, FactorChoice, Precision};
 use flexbody_study::trade::ReferenceChoice;
 
-/// A parser of the names of `all`; the help shows them with what `about` says of each.
+/// Returns a parser of the names of `all`; the help shows each name with the text of `about`.
 fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     all: [T; N],
     name: fn(T) -> &'static str,
@@ -18,7 +18,7 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
     PossibleValuesParser::new(shown).map(move |text| called(text).expect("one of the possible values"))
 }
 
-/// Kinds of bases.
+/// Returns the parser of the bases.
 pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
     one_of(BasisKind::ALL, BasisKind::name, |kind| match kind {
         BasisKind::Free => "Free-surface modes, computed here",
@@ -37,7 +37,7 @@ pub(super) fn basis() -> impl TypedValueParser<Value = BasisKind> {
     })
 }
 
-/// Promises about the modes.
+/// Returns the parser of the accuracies.
 pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
     one_of(Accuracy::ALL, Accuracy::name, |accuracy| match accuracy {
         Accuracy::Fast => "Residual 1e-6, completeness may be not proved",
@@ -48,7 +48,7 @@ pub(super) fn accuracy() -> impl TypedValueParser<Value = Accuracy> {
     })
 }
 
-/// Precisions of the factor.
+/// Returns the parser of the precisions of the factor.
 pub(super) fn factor() -> impl TypedValueParser<Value = FactorChoice> {
     one_of(FactorChoice::ALL, FactorChoice::name, |factor| match factor {
         FactorChoice::Auto => "Whichever fits and is faster",
@@ -57,7 +57,7 @@ pub(super) fn factor() -> impl TypedValueParser<Value = FactorChoice> {
     })
 }
 
-/// Precisions of the file.
+/// Returns the parser of the precisions of the file.
 pub(super) fn storage() -> impl TypedValueParser<Value = Storage> {
     one_of(Storage::ALL, Storage::name, |storage| match storage {
         Storage::F64 => "64-bit floats",
@@ -65,7 +65,7 @@ pub(super) fn storage() -> impl TypedValueParser<Value = Storage> {
     })
 }
 
-/// Solvers of SLEPc.
+/// Returns the parser of the solvers of SLEPc.
 pub(super) fn solver() -> impl TypedValueParser<Value = Solver> {
     one_of(Solver::ALL, Solver::name, |solver| match solver {
         Solver::Mumps => "Krylov-Schur, shift-invert, on one factor of MUMPS",
@@ -75,7 +75,7 @@ pub(super) fn solver() -> impl TypedValueParser<Value = Solver> {
     })
 }
 
-/// What errors are measured against.
+/// Returns the parser of the references for errors.
 pub(super) fn reference() -> impl TypedValueParser<Value = ReferenceChoice> {
     one_of(ReferenceChoice::ALL, ReferenceChoice::name, |reference| match reference {
         ReferenceChoice::Full => "The largest body",

@@ -1,4 +1,4 @@
-//! Making HDF5 files whose bytes depend on nothing but what is in them.
+//! HDF5 files whose bytes depend only on their content.
 
 use super::names::by_utf8_name;
 use super::plugins::without_plugins;
@@ -8,20 +8,20 @@ use hdf5::types::VarLenUnicode;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
-/// Version of the HDF5 library.
+/// Returns the version of the HDF5 library.
 pub fn library_version() -> String {
     let (major, minor, release) = hdf5::library_version();
     format!("{major}.{minor}.{release}")
 }
 
-/// An empty file at a temporary `path`.
+/// Creates an empty file at a temporary `path`.
 pub fn create(path: &Path) -> hdf5::Result<hdf5::File> {
     without_plugins();
     by_utf8_name(path, |path| {
         hdf5::File::with_options()
-            // HDF5 1.8 is what the oldest readers in use know; its metadata blocks carry checksums. Nobody else
-            // knows the file, and a process started meanwhile would inherit a lock and hold it on the finished
-            // file.
+            // HDF5 1.8 is readable for the oldest readers in use; its metadata blocks have checksums. No lock: no other
+            // program knows the temporary file, and a process started meanwhile would inherit the lock and hold it on
+            // the finished file.
             .with_fapl(|p| p.libver_bounds(LibraryVersion::V18, LibraryVersion::V18).file_locking(false))
             // Time stamps would make equal bodies differ.
             .with_fcpl(|p| p.obj_track_times(false))
@@ -29,7 +29,7 @@ pub fn create(path: &Path) -> hdf5::Result<hdf5::File> {
     })
 }
 
-/// Makes a group that keeps the order of its members and attributes, and no time stamps.
+/// Creates a group that tracks the order of its members and attributes, without time stamps.
 pub fn make(parent: &hdf5::Group, name: &str) -> hdf5::Result<hdf5::Group> {
     parent
         .create_group_builder()

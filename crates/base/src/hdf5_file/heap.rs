@@ -1,10 +1,10 @@
-//! Checks the global heaps of an HDF5 file before the HDF5 library sees them.
+//! Check of the global heaps of an HDF5 file before the HDF5 library reads them.
 //!
-//! Texts of variable length lie in global heaps, the only metadata of our files without a checksum, and the
-//! library (2.2) trusts the sizes in them: an empty object 0 makes it loop for ever, a size near 2^64 makes
-//! it read beyond its buffer. The format (HDF5 File Format Specification, III.E): `GCOL`, version 1, three
-//! zero bytes, size of the collection (8 bytes); then objects: index (2), references (2), zero (4), size (8),
-//! data padded to 8 bytes; object 0 is the free space, its size includes its header and ends the collection.
+//! Texts of variable length are stored in global heaps, the only metadata of flex-body files without a checksum. The
+//! library (2.2) trusts the sizes in them: an empty object 0 causes an endless loop, and a size near 2^64 causes a read
+//! beyond the buffer. The format (HDF5 File Format Specification, III.E): `GCOL`, version 1, three zero bytes, size of
+//! the collection (8 bytes); then objects: index (2), references (2), zero (4), size (8), data padded to 8 bytes;
+//! object 0 is the free space, its size includes its header and ends the collection.
 
 use std::io::{Read, Result, Seek, SeekFrom};
 
@@ -12,12 +12,12 @@ const MAGIC: [u8; 8] = *b"GCOL\x01\0\0\0";
 const HEADER: u64 = 16;
 const BLOCK: usize = 1 << 20;
 
-/// Objects that are looked at, as a multiple of those that fit into the file: heaps do not overlap, and only bytes that
-/// happen to look like one are looked at again.
+/// Largest number of objects that are checked, as a multiple of those that fit into the file. Heaps do not overlap;
+/// only bytes that happen to look like a heap are checked repeatedly.
 const LOOKS: u64 = 4;
 
-/// Position of the first global heap whose objects do not fit into it, or whose objects have been looked at too often
-/// because heaps lie in each other; `None`: all are sound.
+/// Returns the position of the first broken global heap: its objects do not fit into it, or too many objects were
+/// checked because heaps are nested. Returns `None` if all heaps are sound.
 pub fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
     let end = file.seek(SeekFrom::End(0))?;
     let mut looks = LOOKS * end.div_ceil(HEADER);
@@ -29,14 +29,14 @@ pub fn first_broken(file: &mut (impl Read + Seek)) -> Result<Option<u64>> {
     Ok(None)
 }
 
-/// Positions of everything that looks like a collection.
+/// Returns the positions of everything that looks like a collection.
 fn collections(file: &mut (impl Read + Seek)) -> Result<Vec<u64>> {
     file.seek(SeekFrom::Start(0))?;
     let (mut found, mut window, mut start) = (Vec::new(), Vec::new(), 0u64);
     while file.by_ref().take(BLOCK as u64).read_to_end(&mut window)? > 0 {
         let hits = window.windows(MAGIC.len()).enumerate().filter(|(_, bytes)| *bytes == MAGIC);
         found.extend(hits.map(|(i, _)| start + i as u64));
-        // The end of this block may be the beginning of a match.
+        // A match may begin at the end of this block.
         let keep = window.len().saturating_sub(MAGIC.len() - 1);
         start += keep as u64;
         window.drain(..keep);
@@ -44,7 +44,8 @@ fn collections(file: &mut (impl Read + Seek)) -> Result<Vec<u64>> {
     Ok(found)
 }
 
-/// True if the objects of the collection at `position` fill it; false as well where no `looks` are left.
+/// Returns true if the objects of the collection at `position` fill it. Returns false if they do not, or if no `looks`
+/// are left.
 fn sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64) -> Result<bool> {
     let Some((_, size)) = header(file, position)? else { return Ok(false) };
     if size < HEADER || size > end - position {
@@ -69,8 +70,8 @@ fn sound(file: &mut (impl Read + Seek), position: u64, end: u64, looks: &mut u64
     Ok(true)
 }
 
-/// First two and last eight bytes of a header of 16 bytes: index (objects) and size; `None` at the end of the
-/// file.
+/// Returns the first two and the last eight bytes of a header of 16 bytes: index (objects) and size. Returns `None` at
+/// the end of the file.
 fn header(file: &mut (impl Read + Seek), position: u64) -> Result<Option<(u16, u64)>> {
     let mut bytes = [0; HEADER as usize];
     file.seek(SeekFrom::Start(position))?;
@@ -88,7 +89,7 @@ mod tests {
     use super::*;
     use std::io::Cursor;
 
-    /// A collection of 64 bytes at `position`: object 1 with `size` bytes, then free space of `free` bytes.
+    /// Returns a collection of 64 bytes at `position`: object 1 with `size` bytes, then free space of `free` bytes.
     fn file(position: usize, size: u64, free: u64) -> Cursor<Vec<u8>> {
         let mut bytes = vec![0u8; position + 64 + 32];
         bytes[position..position + 8].copy_from_slice(&MAGIC);
@@ -99,7 +100,7 @@ mod tests {
         Cursor::new(bytes)
     }
 
-    /// The layout above has its free space at 40 + 8 of the collection only for objects of 1 to 8 bytes.
+    /// The free space is at 40 + 8 of the collection only for objects of 1 to 8 bytes.
     #[test]
     fn sound_heaps_pass_wherever_they_lie() {
         for position in (BLOCK - 9..BLOCK + 3).chain([0, 1, 2 * BLOCK - 14, 3 * BLOCK]) {
@@ -120,7 +121,7 @@ mod tests {
         assert_eq!(first_broken(&mut Cursor::new(cut)).unwrap(), Some(100));
     }
 
-    /// Heaps in each other, every one of which ends where the file does: an object of each is the head of the next.
+    /// Nested heaps, all of which end at the end of the file: an object of each heap is the header of the next.
     #[test]
     fn heaps_that_lie_in_each_other_are_looked_at_a_few_times() {
         let count = 20_000u64;
@@ -130,7 +131,7 @@ mod tests {
             bytes.extend(MAGIC);
             bytes.extend((32 * (count - i) - 16).to_le_bytes());
         }
-        // Each is sound by itself; to look at every object of every heap would be two hundred million looks.
+        // Each heap is sound by itself; a check of every object of every heap would take two hundred million steps.
         assert!(first_broken(&mut Cursor::new(bytes)).unwrap().is_some());
     }
 }

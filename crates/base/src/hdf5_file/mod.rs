@@ -1,4 +1,4 @@
-//! HDF5 files: made so that equal contents give equal bytes, and read without believing what they declare.
+//! HDF5 files: written so that equal contents give equal bytes, and read without trust in their declarations.
 
 mod create;
 mod heap;

@@ -1,10 +1,10 @@
-//! Files whose names the HDF5 library cannot be given: those that are not UTF-8.
+//! Access to files whose names are not UTF-8, which the HDF5 library does not accept.
 
 use hdf5_metno::Result;
 use std::fs::File;
 use std::path::Path;
 
-/// Opens a file by `open`, which is given a name in UTF-8: that of the file, or of an open one.
+/// Opens a file by `open`, which receives a UTF-8 name: the path itself, or the name of an open descriptor.
 pub fn by_utf8_name<T>(path: &Path, open: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
     match path.to_str() {
         Some(_) => open(path),
@@ -12,11 +12,11 @@ pub fn by_utf8_name<T>(path: &Path, open: impl FnOnce(&Path) -> Result<T>) -> Re
     }
 }
 
-/// The name of an open file leads to the file whatever it is called.
+/// Opens the file by its descriptor, whose name is UTF-8 for any path.
 #[cfg(unix)]
 fn by_descriptor<T>(path: &Path, open: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
     use std::os::fd::AsRawFd;
-    // For writing where it may be: a file that is made exists by then, and is made empty.
+    // Open for writing if permitted: a file to be created exists at this point, and is truncated by `open`.
     let file = File::options().read(true).write(true).open(path).or_else(|_| File::open(path));
     let file = file.map_err(|e| format!("file cannot be opened: {e}"))?;
     open(Path::new(&format!("/dev/fd/{}", file.as_raw_fd())))

@@ -1,4 +1,4 @@
-//! Opening HDF5 files that may do harm.
+//! Safe opening of HDF5 files that may be damaged or malicious.
 
 use super::heap;
 use super::names::by_utf8_name;
@@ -10,14 +10,14 @@ use hdf5::file::Sizeof;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
-/// Opens an HDF5 file of an input whose texts can be read without harm; `what` it should be, and the code when it is
-/// not HDF5.
+/// Opens an HDF5 input file whose texts are safe to read. `what` names the expected file in messages; `foreign` is the
+/// code for a file that is not HDF5. Returns the file and its size in bytes.
 pub fn open_sound(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     note_read(path);
     open_kept(path, what, foreign)
 }
 
-/// Opens a file that the run keeps for itself and replaces, so that it does not count as read.
+/// Opens a file that the run itself writes and replaces, without recording it as an input.
 pub fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, u64)> {
     let unreadable = |code, why: String| {
         Error::from(Diagnostic::new(code, format!("cannot read the {what}: {why}")).in_file(path))
@@ -32,12 +32,12 @@ pub fn open_kept(path: &Path, what: &str, foreign: Code) -> Result<(hdf5::File, 
         return Err(unreadable(foreign, why));
     }
     without_plugins();
-    // Without a lock: no file of this program changes once it has its name, and some file systems know no
+    // No lock: files of this program do not change once they have their names, and some file systems do not support
     // locks.
     let opened =
         by_utf8_name(path, |path| hdf5::File::with_options().with_fapl(|p| p.file_locking(false)).open(path));
     let file = opened.map_err(|e| unreadable(foreign, e.to_string()))?;
-    // The check of the heaps knows 8-byte sizes only; nothing else is in use.
+    // The check of the heaps supports 8-byte sizes only, which all files in use have.
     let sizes = file.create_plist().and_then(|p| p.get_sizes());
     if !sizes.is_ok_and(|s| (s.sizeof_addr, s.sizeof_size) == (Sizeof::Bytes8, Sizeof::Bytes8)) {
         let why = "its addresses or sizes do not have 8 bytes".to_owned();

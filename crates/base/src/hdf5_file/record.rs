@@ -1,25 +1,24 @@
-//! Numbers and texts of an HDF5 file in a form that does not depend on how the file lays them out.
+//! Numbers and texts of an HDF5 file in a form that does not depend on their layout in the file.
 
 use super::value::{Stored, elements, storage, text};
 use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
 use hdf5_metno as hdf5;
 
-/// A dataset or an attribute: what it holds, whatever its chunks, its compression, and the byte order and
-/// string type of the file are.
+/// Content of a dataset or an attribute, independent of chunks, compression, byte order and string type of the file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// `float64`, `float32`, `int8` to `int64`, `uint8` to `uint64`, `text`.
+    /// Type: `float64`, `float32`, `int8` to `int64`, `uint8` to `uint64`, or `text`.
     pub kind: &'static str,
     /// Extents; empty for a single value.
     pub shape: Vec<usize>,
-    /// Numbers row-major and little-endian, texts in UTF-8.
+    /// Numbers in row-major order and little-endian, texts in UTF-8.
     pub bytes: Vec<u8>,
 }
 
-/// Why an entry has no record.
+/// Reason why an entry has no record.
 const OTHER_TYPE: &str = "it has a type that no flex-body file has";
 
-/// The record of a dataset of numbers, whose stored bytes count against `stored`.
+/// Returns the record of a dataset of numbers. Its stored bytes are subtracted from `stored`.
 pub fn dataset_record(dataset: &hdf5::Dataset, stored: &mut Stored) -> Result<Record, String> {
     let shape = dataset.get_shape().map_err(|e| e.to_string())?;
     let kind = descriptor(dataset)?;
@@ -27,7 +26,7 @@ pub fn dataset_record(dataset: &hdf5::Dataset, stored: &mut Stored) -> Result<Re
     numbers(dataset, &kind, shape)
 }
 
-/// The record of an attribute: a text, or numbers.
+/// Returns the record of an attribute: a text, or numbers.
 pub fn attribute_record(place: &hdf5::Location, name: &str) -> Result<Record, String> {
     let attribute = place.attr(name).map_err(|e| e.to_string())?;
     let shape = attribute.get_shape().map_err(|e| e.to_string())?;

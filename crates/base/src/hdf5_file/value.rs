@@ -1,6 +1,7 @@
-//! Single values out of an HDF5 file whose declarations may be false.
+//! Single values of an HDF5 file whose declarations may be wrong.
 //!
-//! `Ok(None)`: not there. `Err`: there, but not as expected; the text says `expected ..., found ...`.
+//! Functions return `Ok(None)` for a missing entry, and `Err` for an unexpected one; the text reads `expected ...,
+//! found ...`.
 
 use crate::memory::{left, or_go_without};
 use hdf5::dataset::Layout;
@@ -8,33 +9,33 @@ use hdf5::types::{FixedAscii, FixedUnicode, FloatSize, IntSize, TypeDescriptor, 
 use hdf5::{IndexType, IterationOrder, LinkType};
 use hdf5_metno as hdf5;
 
-/// Deflate cannot shrink data further than this.
+/// Largest compression ratio of deflate.
 const HIGHEST_COMPRESSION: u64 = 1032;
 
 /// Longest text attribute of fixed length: the limit of HDF5 for an attribute.
 const LONGEST_FIXED_TEXT: usize = 65536;
 
-/// Chunks may be larger than a small dataset, but the library reserves memory for one whole chunk.
+/// Number of elements up to which a chunk may exceed its dataset. The library reserves memory for one whole chunk.
 const SMALL_CHUNK: usize = 1 << 20;
 
-/// Bytes that the datasets read so far occupy: together they cannot exceed the file. Links that show the same
-/// data many times over end here.
+/// Bytes of the file that the datasets read so far do not account for. Together datasets cannot exceed the file, so
+/// that many links to one dataset are detected.
 #[derive(Debug)]
 pub struct Stored {
     left: u64,
 }
 
 impl Stored {
-    /// A file of this many bytes of which nothing was read yet.
+    /// Starts with a file of `file_bytes` of which nothing was read.
     pub fn new(file_bytes: u64) -> Self {
         Self { left: file_bytes }
     }
 }
 
-/// What [`open_group`] finds where no group is.
+/// Description of a missing group in the errors of [`open_group`].
 pub const NOTHING: &str = "nothing";
 
-/// Opens a group by its absolute path through hard links only: a file must not lead out of itself.
+/// Opens a group by its absolute path through hard links only, since links could lead to other files.
 pub fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> {
     let mut group = file.as_group().map_err(|e| e.to_string())?;
     for name in path.split('/').filter(|name| !name.is_empty()) {
@@ -46,7 +47,7 @@ pub fn open_group(file: &hdf5::File, path: &str) -> Result<hdf5::Group, String> 
     Ok(group)
 }
 
-/// Names of the members of a group, in creation order where the file tracks it.
+/// Returns the names of the members of a group, in creation order if the file tracks it.
 pub fn members(group: &hdf5::Group) -> Result<Vec<String>, String> {
     group
         .member_names_by(IndexType::CreationOrder, IterationOrder::Increasing)
@@ -54,7 +55,7 @@ pub fn members(group: &hdf5::Group) -> Result<Vec<String>, String> {
         .map_err(|e| format!("an unreadable member list ({e})"))
 }
 
-/// Names of the attributes, in creation order where the file tracks it.
+/// Returns the names of the attributes, in creation order if the file tracks it.
 pub fn attribute_names(place: &hdf5::Location) -> Result<Vec<String>, String> {
     place
         .attr_names_by(IndexType::CreationOrder, IterationOrder::Increasing)
@@ -75,7 +76,7 @@ fn has(group: &hdf5::Group, name: &str) -> Result<bool, String> {
     }
 }
 
-/// Opens a dataset of a group.
+/// Opens a dataset of a group; `None` if it does not exist.
 pub fn open_dataset(place: &hdf5::Group, name: &str) -> Result<Option<hdf5::Dataset>, String> {
     if !has(place, name).map_err(|found| format!("expected a dataset, found {found}"))? {
         return Ok(None);
@@ -83,11 +84,11 @@ pub fn open_dataset(place: &hdf5::Group, name: &str) -> Result<Option<hdf5::Data
     place.dataset(name).map(Some).map_err(|e| format!("expected a dataset, found {e}"))
 }
 
-/// Element types of datasets.
+/// Element type of datasets.
 pub trait Element: hdf5::H5Type + Copy + Default {
-    /// The type as HDF5 describes it.
+    /// Type in HDF5.
     const TYPE: TypeDescriptor;
-    /// The name of the type in messages.
+    /// Name of the type in messages.
     const NAME: &'static str;
 }
 
@@ -114,7 +115,7 @@ impl Element for i32 {
 /// Values in row-major order, and the extents.
 pub type Array<T> = (Vec<T>, Vec<usize>);
 
-/// Reads a dataset, with its extents. `fit` judges these and gives the number of elements.
+/// Reads a dataset with its extents. `fit` receives the extents, checks them and returns the number of elements.
 pub fn dataset<T: Element>(
     place: &hdf5::Group,
     name: &str,
@@ -138,16 +139,16 @@ pub fn dataset<T: Element>(
     Ok(Some((values, dims)))
 }
 
-/// Number of elements of an array with these extents.
+/// Returns the number of elements of an array with these extents.
 pub fn elements(dims: &[usize]) -> Result<usize, String> {
     let elements = dims.iter().try_fold(1usize, |product, &d| product.checked_mul(d));
-    // 2^48 values are beyond any memory; below it products with sizes of types cannot overflow.
+    // 2^48 values exceed any memory; below this number, products with sizes of types cannot overflow.
     elements
         .filter(|&e| e < 1 << 48)
         .ok_or_else(|| format!("expected a shape that fits into memory, found {dims:?}"))
 }
 
-/// Refuses data that lie in other files, and sizes that the stored bytes cannot hold.
+/// Refuses data in other files, and sizes that the stored bytes cannot hold.
 pub(super) fn storage(
     dataset: &hdf5::Dataset,
     elements: usize,
@@ -161,6 +162,7 @@ pub(super) fn storage(
         return Err("expected data inside the file, found references to other files".to_owned());
     }
     let bytes = dataset.storage_size();
+    // The values must be possible for the stored bytes, and fit into memory.
     let most = if layout == Layout::Chunked { bytes.saturating_mul(HIGHEST_COMPRESSION) } else { bytes };
     let unpacked = (elements as u64).saturating_mul(size as u64);
     if unpacked > most {
@@ -169,6 +171,7 @@ pub(super) fn storage(
     if left().is_some_and(|left| unpacked > left) {
         return Err(format!("expected an array that fits into memory, found {elements} values"));
     }
+    // All datasets together cannot be larger than the file.
     let Some(left) = stored.left.checked_sub(bytes) else {
         return Err(format!(
             "expected datasets that fit into the file, found {bytes} bytes more than it has"
@@ -191,7 +194,7 @@ fn attribute(
     name: &str,
     expected: &str,
 ) -> Result<Option<(hdf5::Attribute, TypeDescriptor)>, String> {
-    // A name that cannot be looked up is not there; a damaged attribute is seen when it is opened.
+    // A name that cannot be looked up does not exist; a damaged attribute fails when it is opened.
     if place.attr_info(name).is_err() && !attribute_names(place)?.iter().any(|n| n == name) {
         return Ok(None);
     }
@@ -203,7 +206,7 @@ fn attribute(
     Ok(Some((attribute, kind)))
 }
 
-/// Reads a text attribute of fixed or variable length.
+/// Reads a text attribute of fixed or variable length; `None` if it does not exist.
 pub fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>, String> {
     const EXPECTED: &str = "a text attribute";
     let Some((attribute, kind)) = attribute(place, name, EXPECTED)? else { return Ok(None) };
@@ -226,7 +229,7 @@ pub fn text(place: &hdf5::Location, name: &str) -> Result<Option<String>, String
         .map_err(|_| format!("expected {EXPECTED}, found bytes that are not UTF-8"))
 }
 
-/// Reads an integer attribute.
+/// Reads an integer attribute; `None` if it does not exist.
 pub fn int(place: &hdf5::Location, name: &str) -> Result<Option<i64>, String> {
     let Some((attribute, kind)) = attribute(place, name, "an integer attribute")? else { return Ok(None) };
     match kind {
@@ -237,7 +240,7 @@ pub fn int(place: &hdf5::Location, name: &str) -> Result<Option<i64>, String> {
     }
 }
 
-/// Reads a float attribute.
+/// Reads a float attribute; `None` if it does not exist.
 pub fn float(place: &hdf5::Location, name: &str) -> Result<Option<f64>, String> {
     let Some((attribute, kind)) = attribute(place, name, "a float attribute")? else { return Ok(None) };
     match kind {

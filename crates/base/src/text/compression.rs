@@ -1,4 +1,4 @@
-//! gzip and Zstandard around a text file, recognised by their first bytes whatever the file is called.
+//! gzip and Zstandard compression of text files, detected by their first bytes.
 
 use super::input_file::{InputFile, reading_error};
 use super::zstd_frames::ZstdFrames;
@@ -6,19 +6,19 @@ use crate::diagnostic::{Code, Diagnostic};
 use std::io::{BufRead, Read};
 use std::path::Path;
 
-/// How the bytes on disk are packed.
+/// Compression of the bytes on disk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Compression {
-    /// Not at all.
+    /// No compression.
     None,
-    /// gzip, one member or several (RFC 1952).
+    /// gzip, one or several members (RFC 1952).
     Gzip,
-    /// Zstandard, one frame or several (RFC 8878).
+    /// Zstandard, one or several frames (RFC 8878).
     Zstd,
 }
 
 impl Compression {
-    /// The compression that the first bytes tell.
+    /// Returns the compression that the first bytes indicate.
     pub fn of(bytes: &[u8]) -> Self {
         if bytes.starts_with(&[0x1f, 0x8b]) {
             Self::Gzip
@@ -29,7 +29,7 @@ impl Compression {
         }
     }
 
-    /// A stream of the unpacked bytes of what is `stored`.
+    /// Returns a stream of the decompressed bytes of `stored`.
     pub fn stream<'a>(self, stored: impl BufRead + Send + 'a) -> Box<dyn Read + Send + 'a> {
         match self {
             Self::None => Box::new(stored),
@@ -38,17 +38,17 @@ impl Compression {
         }
     }
 
-    /// A stream of the unpacked bytes of a file.
+    /// Returns a stream of the decompressed bytes of a file.
     pub fn stream_of<'a>(self, file: &'a InputFile) -> Box<dyn Read + Send + 'a> {
         match (file.loaded(), self) {
             (Some(bytes), _) => self.stream(bytes),
-            // Who takes large pieces needs no buffer between.
+            // Readers of large pieces need no buffer.
             (None, Self::None) => Box::new(file.reader()),
             (None, _) => self.stream(file.buffered()),
         }
     }
 
-    /// The first unpacked bytes, at most `limit` of them; fewer when the file is short or damaged.
+    /// Returns the first decompressed bytes, at most `limit`; fewer if the file is short or damaged.
     pub fn head(self, file: &InputFile, limit: usize) -> Vec<u8> {
         first_bytes(self.stream_of(file), limit)
     }
@@ -56,12 +56,13 @@ impl Compression {
 
 fn first_bytes(stream: impl Read, limit: usize) -> Vec<u8> {
     let mut head = Vec::new();
-    // A damaged stream gives what came before the damage; reading it in earnest reports it.
+    // A damaged stream yields the bytes before the damage; the actual read reports the error.
     let _ = stream.take(limit as u64).read_to_end(&mut head);
     head
 }
 
-/// FB102 for a compressed file whose reader takes it unpacked; `what` it is, as in "file of nodes".
+/// Returns FB102 for a compressed file whose reader does not support compression. `what` names the file, such as "file
+/// of nodes".
 pub fn refuse_packed(file: &InputFile, what: &str) -> Result<(), Diagnostic> {
     let kind = match Compression::of(file.bytes()) {
         Compression::None => return Ok(()),
@@ -72,7 +73,7 @@ pub fn refuse_packed(file: &InputFile, what: &str) -> Result<(), Diagnostic> {
     Err(Diagnostic::new(Code::FileFormatUnknown, message).in_file(file.path()).with_help("unpack it"))
 }
 
-/// FB103 for `path`, with the decoder's reason; the diagnostic of the file where reading it failed.
+/// Returns FB103 for `path` with the reason of the decoder, or the diagnostic of the file if reading it failed.
 pub fn broken(path: &Path, error: &std::io::Error) -> Diagnostic {
     if let Some(diagnostic) = reading_error(error) {
         return diagnostic;

@@ -1,8 +1,8 @@
-//! Input files: read into memory as a whole, or from begin to end by those who take them piece by piece.
+//! Input files, read into memory as a whole or as a stream.
 //!
-//! Inputs are never mapped into memory: another program may cut such a file off at any moment (an FE program that
-//! starts again does), and touching a page that is gone ends the process. The fingerprint is taken of the bytes that
-//! are read, while they are read; a file that changed meanwhile is refused.
+//! Inputs are never mapped into memory: another program may truncate a file at any moment (an FE program that is
+//! restarted does), and access to a missing page ends the process. The fingerprint is computed from the bytes while
+//! they are read; a file that changes meanwhile is refused.
 
 use crate::diagnostic::{Code, Diagnostic};
 use crate::memory::{left, or_go_without, refuse_beyond};
@@ -14,45 +14,45 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::time::SystemTime;
 
-/// Bytes at the start of a file that are read when it is opened, from which its format is recognised.
+/// Number of bytes that are read when a file is opened, to detect its format.
 const HEAD_BYTES: usize = 4096;
 
-/// Bytes that a decoder of a compressed file is given at a time.
+/// Buffer size for a decoder of a compressed file, in bytes.
 const DECODER_BYTES: usize = 1 << 17;
 
-/// An opened input file. Its bytes are those on disk (compressed files: as stored).
+/// Opened input file. Its bytes are those on disk (compressed files: as stored).
 #[derive(Debug)]
 pub struct InputFile {
     path: PathBuf,
     file: File,
     state: FileState,
     head: Vec<u8>,
-    /// All bytes, where they were asked for.
+    /// All bytes, once they have been loaded.
     whole: OnceLock<Result<Vec<u8>, Diagnostic>>,
     sha256: OnceLock<String>,
 }
 
 impl InputFile {
-    /// Opens a regular file that is not empty and reads it into memory. Of an HDF5 file only the begin is read: the
-    /// HDF5 library reads the rest.
+    /// Opens a regular, non-empty file and reads it into memory. Of an HDF5 file only the beginning is read: the HDF5
+    /// library reads the rest.
     ///
     /// # Errors
-    /// FB101 when it does not exist, is no regular file or may not be read; FB106 when it has no bytes; FB132 when it
-    /// changes while it is read; FB601 when it does not fit the memory.
+    /// FB101 if the file does not exist, is not regular or may not be read; FB106 if it is empty; FB132 if it changes
+    /// while it is read; FB601 if it does not fit into the memory.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Diagnostic> {
         let file = Self::open_unread(path)?;
         file.load()?;
         Ok(file)
     }
 
-    /// Opens a file of which only the begin is read, until [`Self::load`] is called.
+    /// Opens a file and reads only its beginning, until [`Self::load`] is called.
     ///
     /// # Errors
     /// FB101, FB106, FB132.
     pub fn open_unread(path: impl AsRef<Path>) -> Result<Self, Diagnostic> {
         let path = path.as_ref();
         let unreadable = |what: String| Diagnostic::new(Code::FileUnreadable, what).in_file(path);
-        // Opening a pipe would wait for its writer, so ask what it is first.
+        // Check the type first: opening a pipe would wait for its writer.
         let metadata = std::fs::metadata(path).map_err(|e| unreadable(reason(&e)))?;
         if metadata.is_dir() {
             return Err(unreadable("this is a folder, not a file".into()));
@@ -79,7 +79,7 @@ impl InputFile {
         Ok(opened)
     }
 
-    /// Reads all bytes into memory, unless the file is HDF5 or they are there.
+    /// Reads all bytes into memory, unless the file is HDF5 or already loaded.
     ///
     /// # Errors
     /// FB101, FB132, FB601.
@@ -98,7 +98,7 @@ impl InputFile {
         };
         refuse(left())?;
         let mut bytes = Vec::new();
-        // One more than there should be: the end of the file is seen without growing.
+        // One byte more than expected: the end of the file is detected without growing the buffer.
         let size = usize::try_from(length).unwrap_or(usize::MAX).saturating_add(1);
         if or_go_without(|| bytes.try_reserve_exact(size)).is_err() {
             refuse(Some(0))?;
@@ -108,50 +108,51 @@ impl InputFile {
         Ok(bytes)
     }
 
-    /// Gives the memory of the bytes back, where nobody needs them any more.
+    /// Releases the memory of the bytes.
     pub fn forget_bytes(&mut self) {
         self.whole = OnceLock::new();
     }
 
-    /// Path of the file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Bytes that were read, at least one: all of them, of an HDF5 file or one that was not loaded those at the begin.
+    /// Returns the bytes that were read, at least one: all of them, or the beginning of an HDF5 file or one that was
+    /// not loaded.
     pub fn bytes(&self) -> &[u8] {
         self.loaded().unwrap_or(&self.head)
     }
 
-    /// Returns all bytes where they are in memory.
+    /// Returns all bytes if they are in memory.
     pub fn loaded(&self) -> Option<&[u8]> {
         self.whole.get()?.as_deref().ok()
     }
 
-    /// The first bytes of the file, at most `limit`; fewer where the file is shorter or cannot be read.
+    /// Returns the first bytes of the file, at most `limit`; fewer if the file is shorter or cannot be read.
     pub fn first_bytes(&self, limit: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
-        // Reading the file in earnest tells why it cannot be read.
+        // The actual read reports the reason of an error.
         let _ = self.reader().take(limit as u64).read_to_end(&mut bytes);
         bytes
     }
 
-    /// Number of bytes of the file.
+    /// Returns the number of bytes of the file.
     pub fn length(&self) -> u64 {
         self.state.length
     }
 
-    /// A reader of all bytes from begin to end, which takes the fingerprint of those that it gives.
+    /// Returns a reader of all bytes from the beginning, which computes the fingerprint.
     pub fn reader(&self) -> FileReader<'_> {
         FileReader { file: self, at: 0, hashed: Some(Fingerprint::default()) }
     }
 
-    /// A reader as [`Self::reader`] gives it, for decoders that take a few bytes at a time.
+    /// Returns a buffered reader, for decoders that read a few bytes at a time.
     pub fn buffered(&self) -> BufReader<FileReader<'_>> {
         BufReader::with_capacity(DECODER_BYTES, self.reader())
     }
 
-    /// SHA-256 of the bytes that were read, lowercase hex. A file of which not all was read is read once more.
+    /// Returns the SHA-256 of the file, lowercase hex. A file that was not read completely is read again.
     ///
     /// # Errors
     /// FB101, FB132.
@@ -165,18 +166,18 @@ impl InputFile {
         self.sha256.get().cloned().ok_or_else(|| self.changed("its length is another one"))
     }
 
-    /// The path of the file with its fingerprint and its state: enough to see later whether it changed.
+    /// Returns the path of the file with its fingerprint and its state, to detect later changes.
     ///
     /// # Errors
-    /// Every error of [`Self::sha256`].
+    /// The errors of [`Self::sha256`].
     pub fn seen(&self) -> Result<SeenFile, Diagnostic> {
         Ok(SeenFile { path: self.path.clone(), sha256: self.sha256()?, state: self.state })
     }
 
-    /// Refuses a file that is no longer the one that was opened, by length, time and number.
+    /// Refuses a file that has changed since it was opened, by length, modification time and inode.
     ///
     /// # Errors
-    /// FB132.
+    /// FB132 if the file has changed.
     pub fn refuse_changed(&self) -> Result<(), Diagnostic> {
         self.state.refuse_changed(&self.path)
     }
@@ -193,8 +194,8 @@ impl InputFile {
     }
 }
 
-/// True if a file that begins with `head` is HDF5: the signature stands at 0 or, after a user block (MATLAB
-/// writes one), at 512, 1024, 2048, ...
+/// Returns true if a file that begins with `head` is HDF5: the signature is at 0 or, after a user block (which MATLAB
+/// writes), at 512, 1024, 2048, ...
 pub fn is_hdf5(head: &[u8]) -> bool {
     let signed = |&at: &usize| head.get(at..).is_some_and(|rest| rest.starts_with(b"\x89HDF\r\n\x1a\n"));
     [0, 512, 1024, 2048].iter().any(signed)
@@ -202,17 +203,17 @@ pub fn is_hdf5(head: &[u8]) -> bool {
 
 const MEMORY_HELP: &str = "give the file in a compressed or binary form, or use a larger machine";
 
-/// The diagnostic of an error that reading an input file gave; `None` of an error of a decoder.
+/// Returns the diagnostic inside an error of reading an input file; `None` for an error of a decoder.
 pub fn reading_error(error: &std::io::Error) -> Option<Diagnostic> {
     error.get_ref()?.downcast_ref::<Failed>().map(|failed| failed.0.clone())
 }
 
-/// An error of reading that carries a diagnostic.
+/// Returns a read error that carries a diagnostic.
 pub fn failed(diagnostic: Diagnostic) -> std::io::Error {
     std::io::Error::other(Failed(diagnostic))
 }
 
-/// An error of reading with its diagnostic, on its way through decoders.
+/// Read error that carries its diagnostic through decoders.
 #[derive(Debug)]
 struct Failed(Diagnostic);
 
@@ -224,12 +225,12 @@ impl std::fmt::Display for Failed {
 
 impl std::error::Error for Failed {}
 
-/// The bytes of a file from begin to end. The end comes where the file ended when it was opened; another end is an
-/// error.
+/// Reader of a file from beginning to end. The end must be where the file ended when it was opened; otherwise reading
+/// fails.
 pub struct FileReader<'a> {
     file: &'a InputFile,
     at: u64,
-    /// Fingerprint of all bytes up to `at`; `None` after a jump.
+    /// Fingerprint of all bytes up to `at`; `None` after a seek.
     hashed: Option<Fingerprint>,
 }
 
@@ -257,7 +258,7 @@ impl Read for FileReader<'_> {
         if at == length
             && let Some(hashed) = self.hashed.take()
         {
-            // Whoever reads the same bytes finds the same.
+            // Another reader of these bytes computes an equal fingerprint.
             let _ = self.file.sha256.set(hashed.hex());
         }
         Ok(count)
@@ -279,7 +280,7 @@ impl Seek for FileReader<'_> {
     }
 }
 
-/// A file that was read.
+/// Record of a file that was read.
 #[derive(Debug, Clone)]
 pub struct SeenFile {
     /// Path of the file.
@@ -290,14 +291,16 @@ pub struct SeenFile {
 }
 
 impl SeenFile {
+    /// Refuses a file that has changed since it was read.
+    ///
     /// # Errors
-    /// FB132 for a file that is no longer the one that was read.
+    /// FB132 if the file has changed.
     pub fn refuse_changed(&self) -> Result<(), Diagnostic> {
         self.state.refuse_changed(&self.path)
     }
 }
 
-/// Length, time of the last change and number of a file.
+/// Length, modification time and inode of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct FileState {
     length: u64,
@@ -355,7 +358,7 @@ fn read_at(file: &File, buffer: &mut [u8], at: u64) -> std::io::Result<usize> {
     std::os::windows::fs::FileExt::seek_read(file, buffer, at)
 }
 
-/// The reason in words that do not depend on the operating system, where there are such.
+/// Returns the reason of an error, independent of the operating system if possible.
 fn reason(error: &std::io::Error) -> String {
     match error.kind() {
         ErrorKind::NotFound => "file does not exist".into(),
@@ -369,7 +372,7 @@ mod tests {
     use super::*;
     use crate::provenance::sha256_hex;
 
-    /// Changes a file; the time is later than that of the file.
+    /// Function that changes a file; the time is later than that of the file.
     type Change = fn(&Path, SystemTime);
 
     fn written(bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {

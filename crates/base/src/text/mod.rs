@@ -1,5 +1,5 @@
-//! Text files that people and programs write: read whole or in blocks, packed or not, with the line of everything that is
-//! wrong in them. Tables of columns, series of numbers and TOML documents; what they mean is known to who reads them.
+//! Text files that people and programs write: read whole or in blocks, compressed or not, with the line of every error.
+//! Tables of columns, series of numbers and TOML documents; their meaning is left to the callers.
 
 pub mod compression;
 pub mod input_file;

@@ -1,17 +1,18 @@
-//! Quotes in messages of files that other files name: a manifest may name any file of the machine, whose text is not
-//! to reach those who see the messages.
+//! Quotations in messages about files that other files name. A manifest may name any file of the machine, whose text
+//! must not reach readers of the messages.
 
 use crate::diagnostic::Diagnostic;
 use std::path::Path;
 
-/// Leaves out what a message quotes of a file that does not lie in the folder of `main` or below: `main` is the
-/// manifest, the scene or the deck that names it.
+/// Removes quotations from a message about a file outside the folder of `main` and its subfolders. `main` is the
+/// manifest, the scene or the deck that names the file.
 pub fn without_foreign_quotes(diagnostic: Diagnostic, main: &Path) -> Diagnostic {
     let is_foreign = diagnostic.file().is_some_and(|file| !lies_beside(file, main));
     if is_foreign { diagnostic.without_quotes() } else { diagnostic }
 }
 
-/// True if `file` lies in the folder of `main` or below, links followed, and where one of them cannot be found.
+/// Returns true if `file` lies in the folder of `main` or below, after following links, or if one of them cannot be
+/// found.
 fn lies_beside(file: &Path, main: &Path) -> bool {
     let (Ok(file), Ok(main)) = (file.canonicalize(), main.canonicalize()) else { return true };
     main.parent().is_none_or(|folder| file.starts_with(folder))

@@ -1,9 +1,8 @@
 //! Columns of numbers over time, as multibody programs and spreadsheets write them.
 //!
-//! Fields are separated by semicolons, tabs, commas or blanks. Lines that begin with `#`, `%` or `!` are
-//! comments. The names of the columns stand in the first line that is no comment and has no number, or in the
-//! last comment before the first row where that has as many fields; a line below the names without any number
-//! has units, which are not read.
+//! Fields are separated by semicolons, tabs, commas or blanks. Lines that begin with `#`, `%` or `!` are comments. The
+//! column names are in the first line that is not a comment, if it has no number, or in the last comment before the
+//! first row, if it has as many fields. A line below the names without any number holds units, which are not read.
 
 use super::input_file::InputFile;
 use super::table::printable;
@@ -13,19 +12,19 @@ use std::borrow::Cow;
 /// Number of bad rows that are reported one by one.
 const SHOWN: usize = 5;
 
-/// Rows that there must be.
+/// Smallest number of rows.
 const LEAST_ROWS: usize = 2;
 
-/// Distance of two rows, relative to the largest time of a table, below which only rounding may tell them apart: times that
-/// are summed up over ten thousand steps are off by this.
+/// Distance of two rows, relative to the largest time of a table, below which they may differ by rounding only: times
+/// that are summed over ten thousand steps have this error.
 const ROUNDING: f64 = 1e-12;
 
-/// Part of the usual distance of rows that rows within [`ROUNDING`] of each other lie apart at the least: dates in seconds
-/// have rows every millisecond.
+/// Smallest distance of rows within [`ROUNDING`] of each other, relative to the usual distance of rows, that is still
+/// accepted: dates in seconds may have rows every millisecond.
 const UNUSUAL: f64 = 1e-3;
 
-/// The first row that is no further from the one before than rounding of their times; `None` where there is none. Between
-/// such rows a history would change at a rate that nobody has given.
+/// Returns the first row whose time differs from the one before by rounding only; `None` if there is none. Between such
+/// rows a history would change at an arbitrary rate.
 ///
 /// * `times`: ascending.
 pub fn closer_than_rounding(times: &[f64]) -> Option<usize> {
@@ -43,31 +42,31 @@ pub fn closer_than_rounding(times: &[f64]) -> Option<usize> {
     times.windows(2).position(|pair| is_close(pair[1] - pair[0], usual)).map(|row| row + 1)
 }
 
-/// A column of a file, by its name or by its place.
+/// Column of a file, by its name or its number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum ColumnKey {
-    /// Its name in the file, with or without the unit in brackets behind it.
+    /// Name in the file, with or without the unit in brackets after it.
     Name(String),
-    /// Its place, from 1.
+    /// Number, from 1.
     Number(usize),
 }
 
 /// Columns of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
-    /// Ascending times, two at least.
+    /// Ascending times, at least two.
     pub times: Vec<f64>,
-    /// As many values of every column that was asked for.
+    /// Values of every requested column, one for each time.
     pub columns: Vec<Vec<f64>>,
-    /// The lines of the file that they stand in, from 1.
+    /// Line numbers of the rows in the file, from 1.
     pub lines: Vec<usize>,
 }
 
-/// Reads the column of times and other columns.
+/// Reads the time column and other columns.
 ///
 /// # Errors
-/// FB215 for columns that the file does not have, all of them; FB216 for rows that cannot be read, the first
-/// few and how many more, for times that do not ascend and for fewer than two rows.
+/// FB215 for all columns that the file does not have. FB216 for rows that cannot be read (the first few, and the number
+/// of others), for times that do not ascend and for fewer than two rows.
 pub fn read_series(
     file: &InputFile,
     time: &ColumnKey,
@@ -95,7 +94,7 @@ fn row_error(file: &InputFile, line: usize, message: String) -> Diagnostic {
     Diagnostic::new(Code::SeriesRow, message).in_file(file.path()).at_line(line)
 }
 
-/// What separates the fields of a line.
+/// Separator of the fields of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Separator {
     Byte(u8),
@@ -103,11 +102,11 @@ enum Separator {
 }
 
 impl Separator {
-    /// That of a line.
+    /// Returns the separator of a line.
     fn of(line: &[u8]) -> Self {
         let has = |byte: &u8| line.contains(byte);
         match [b';', b'\t', b','].into_iter().find(has) {
-            // Commas between digits of numbers that blanks separate are decimal commas.
+            // Commas between digits, in numbers separated by blanks, are decimal commas.
             Some(b',')
                 if Self::Blanks.split(line).iter().all(|field| is_plain_or_with_decimal_comma(field)) =>
             {
@@ -118,7 +117,7 @@ impl Separator {
         }
     }
 
-    /// Fields without blanks and quotes around them; what stands in quotes separates nothing.
+    /// Returns the fields without surrounding blanks and quotes. Separators inside quotes do not count.
     fn split(self, line: &[u8]) -> Vec<&[u8]> {
         let (mut fields, mut from, mut quoted) = (Vec::new(), 0, false);
         let separates = |byte: u8| match self {
@@ -151,7 +150,7 @@ fn unquoted(field: &[u8]) -> &[u8] {
     field.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).map_or(field, <[u8]>::trim_ascii)
 }
 
-/// A whole number, or one with digits on both sides of its only comma.
+/// Returns true for a whole number, or a number with digits on both sides of its only comma.
 fn is_plain_or_with_decimal_comma(field: &[u8]) -> bool {
     field.iter().all(u8::is_ascii_digit) && !field.is_empty() || has_decimal_comma(field)
 }
@@ -166,7 +165,7 @@ fn has_decimal_comma(field: &[u8]) -> bool {
         && number(&[whole, b".", fraction].concat()).is_some()
 }
 
-/// A number; exponents may have the letter D, as Fortran writes them.
+/// Parses a number. The exponent may have the letter D, as Fortran writes it.
 fn number(field: &[u8]) -> Option<f64> {
     let text: Cow<'_, [u8]> = match field.iter().any(|byte| matches!(byte, b'D' | b'd')) {
         true => field.iter().map(|&byte| if matches!(byte, b'D' | b'd') { b'e' } else { byte }).collect(),
@@ -175,7 +174,7 @@ fn number(field: &[u8]) -> Option<f64> {
     fast_float2::parse(text.as_ref()).ok()
 }
 
-/// Lines with their numbers, trimmed.
+/// Returns the lines with their numbers, trimmed.
 fn numbered(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
     bytes.split(|&byte| byte == b'\n').enumerate().map(|(at, line)| (at + 1, line.trim_ascii()))
 }
@@ -184,22 +183,23 @@ fn is_comment(line: &[u8]) -> bool {
     matches!(line.first(), Some(b'#' | b'%' | b'!'))
 }
 
-/// How the file is written: what separates fields, how many there are, and the names of the columns.
+/// Layout of the file: separator, number of fields, and names of the columns.
 struct Layout<'f> {
     separator: Separator,
     fields: usize,
     names: Vec<&'f [u8]>,
-    /// The line with the names, or the first row.
+    /// Line of the names, or the first row.
     line: usize,
-    /// The first line that may be a row.
+    /// First line that may be a row.
     first_row: usize,
 }
 
 impl<'f> Layout<'f> {
-    /// `None` without a line that is no comment.
+    /// Detects the layout; `None` if all lines are comments.
     fn of(bytes: &'f [u8]) -> Option<Self> {
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         let mut comment = None;
+        // First line that is not a comment, and the last comment before it.
         let mut lines = numbered(bytes).filter(|(_, line)| !line.is_empty());
         let (line, first) = lines.by_ref().find(|&(_, line)| {
             let found = is_comment(line);
@@ -215,7 +215,7 @@ impl<'f> Layout<'f> {
             let names = names.unwrap_or_default();
             return Some(Self { separator, fields: head.len(), names, line, first_row: line });
         }
-        // The rows tell better than names with blanks in them what separates.
+        // Rows show the separator more reliably than names, which may contain blanks.
         let below = lines.find(|(_, line)| !is_comment(line));
         let separator = below.map_or(separator, |(_, below)| match Separator::of(below) {
             Separator::Byte(byte) if first.contains(&byte) => Separator::Byte(byte),
@@ -227,14 +227,14 @@ impl<'f> Layout<'f> {
         Some(Self { separator, fields: head.len(), names: head, line, first_row })
     }
 
-    /// The lines of rows.
+    /// Returns the lines of the rows.
     fn rows(&self, bytes: &'f [u8]) -> impl Iterator<Item = (usize, &'f [u8])> + use<'f> {
         let first = self.first_row;
         let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
         numbered(bytes).filter(move |(at, line)| *at >= first && !line.is_empty() && !is_comment(line))
     }
 
-    /// Where the columns stand.
+    /// Returns the indices of the columns `keys`.
     fn places<'k>(
         &self,
         file: &InputFile,
@@ -254,7 +254,7 @@ impl<'f> Layout<'f> {
         if found.is_empty() { Ok(places) } else { Err(found) }
     }
 
-    /// Where a column stands; or a message and a help.
+    /// Returns the index of a column, or a message and a help.
     fn place(&self, key: &ColumnKey) -> Result<usize, (String, String)> {
         let name = match key {
             ColumnKey::Number(number) if (1..=self.fields).contains(number) => return Ok(number - 1),
@@ -268,6 +268,7 @@ impl<'f> Layout<'f> {
             let message = format!("there is no column `{}`: the columns have no names", printable(name));
             return Err((message, format!("give its number, 1 to {}", self.fields)));
         }
+        // The whole name first, then the name without its unit: "Fx [N]" is found by "Fx".
         let whole = |own: &[u8]| own == name;
         let without_unit = |own: &[u8]| before_unit(own) == name;
         for matches in [&whole as &dyn Fn(&[u8]) -> bool, &without_unit] {
@@ -285,7 +286,7 @@ impl<'f> Layout<'f> {
         Err((format!("there is no column `{}`", printable(name)), self.nearest(name)))
     }
 
-    /// The name that is nearest to one that is not there, and all names.
+    /// Returns a help with the most similar name, and all names.
     fn nearest(&self, name: &[u8]) -> String {
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).to_lowercase();
         let distance = |own: &&&[u8]| strsim::damerau_levenshtein(&text(name), &text(before_unit(own)));
@@ -296,7 +297,7 @@ impl<'f> Layout<'f> {
         }
     }
 
-    /// All columns.
+    /// Returns a help with all columns.
     fn all(&self) -> String {
         let names: Vec<String> = self.names.iter().map(|name| printable(name)).collect();
         match names.is_empty() {
@@ -306,7 +307,7 @@ impl<'f> Layout<'f> {
     }
 }
 
-/// The names in a comment with as many fields as the rows have.
+/// Returns the names in a comment, if it has as many fields as the rows.
 fn names_in(comment: &[u8], of_rows: Separator, fields: usize) -> Option<Vec<&[u8]>> {
     let text = comment.trim_ascii_start();
     let begin = text.iter().position(|byte| !matches!(byte, b'#' | b'%' | b'!' | b' ' | b'\t'))?;
@@ -315,7 +316,7 @@ fn names_in(comment: &[u8], of_rows: Separator, fields: usize) -> Option<Vec<&[u
     separators.into_iter().map(|separator| separator.split(text)).find(|names| names.len() == fields)
 }
 
-/// A name without what stands in brackets behind it.
+/// Returns a name without the unit in brackets after it.
 fn before_unit(name: &[u8]) -> &[u8] {
     let bracket = name.iter().position(|byte| matches!(byte, b'[' | b'('));
     let behind = matches!(name.last(), Some(b']' | b')'));
@@ -325,16 +326,16 @@ fn before_unit(name: &[u8]) -> &[u8] {
     }
 }
 
-/// Reads row by row.
+/// Reader of rows.
 struct SeriesReader<'r> {
     file: &'r InputFile,
     layout: &'r Layout<'r>,
-    /// Where the time stands, and the columns.
+    /// Index of the time column, then of the other columns.
     places: Vec<usize>,
     series: Series,
     shown: Vec<Diagnostic>,
     bad: usize,
-    /// The line of the first bad row that is only counted.
+    /// Line of the first bad row that is only counted.
     first_not_shown: Option<usize>,
 }
 
@@ -384,7 +385,7 @@ impl<'r> SeriesReader<'r> {
         Ok(())
     }
 
-    /// The number in a field.
+    /// Returns the number in a field.
     fn cell(&self, line: usize, place: usize, field: &[u8]) -> Result<f64, Diagnostic> {
         let told = |what: &str| {
             let column = match self.layout.names.get(place) {
@@ -403,7 +404,7 @@ impl<'r> SeriesReader<'r> {
         }
     }
 
-    /// Complaint about a row at the time of the one before, but for rounding.
+    /// Returns the diagnostic for a row whose time differs from the one before by rounding only.
     fn too_close(&self, row: usize) -> Diagnostic {
         let Series { times, lines, .. } = &self.series;
         let [before, time] = [times[row - 1], times[row]];
@@ -450,7 +451,7 @@ mod tests {
         read_series(&InputFile::open(&path).expect("a file"), &key(&time), &keys)
     }
 
-    /// The same two rows as different programs write them.
+    /// Two equal rows in the formats of different programs.
     #[test]
     fn every_way_of_writing_is_understood() {
         for (text, time, value) in [

@@ -8,21 +8,20 @@ use std::path::Path;
 /// Number of bad rows that are reported one by one.
 const SHOWN: usize = 5;
 
-/// A column that a table may have.
+/// Column that a table may have.
 #[derive(Debug, Clone, Copy)]
 pub struct Column {
-    /// Its name in lower case.
+    /// Name in lower case.
     pub name: &'static str,
-    /// Whether it must be there.
+    /// True if the column is required.
     pub required: bool,
 }
 
-/// A table with its header read. Fields of a row come in the order of `columns`; those of absent columns are
-/// empty.
+/// Table with its header read. The fields of a row are in the order of `columns`; those of missing columns are empty.
 pub struct Table<'a> {
     path: &'a Path,
     separator: Separator,
-    /// For each field of a line, the column it belongs to.
+    /// Index of the column of each field of a line.
     order: Vec<usize>,
     columns: usize,
     rest: &'a [u8],
@@ -39,8 +38,8 @@ impl<'a> Table<'a> {
     /// Reads the header: the first line that is neither blank nor a comment (`#`).
     ///
     /// # Errors
-    /// FB102 when it is compressed, FB106 when there is none, FB203 when it lacks a required column or has an
-    /// unknown one.
+    /// FB102 if the file is compressed, FB106 if it has no lines, FB203 if a required column is missing or a column is
+    /// unknown.
     pub fn open(file: &'a InputFile, columns: &[Column]) -> Result<Self, Diagnostic> {
         refuse_packed(file, "table")?;
         let path = file.path();
@@ -59,6 +58,7 @@ impl<'a> Table<'a> {
         let Some((header_line, header)) = lines.next() else {
             return Err(Diagnostic::new(Code::FileEmpty, "table has no lines").in_file(path));
         };
+        // Separator of the header, then its columns in their order.
         let separator = [b';', b'\t', b',']
             .into_iter()
             .find(|separator| header.contains(separator))
@@ -93,15 +93,15 @@ impl<'a> Table<'a> {
         Ok(Self { path, separator, order, columns: columns.len(), rest: lines.rest, header_line })
     }
 
-    /// Whether the table has the column at this place of the list given to [`Table::open`].
+    /// Returns true if the table has the column at this index of the list given to [`Table::open`].
     pub fn has(&self, column: usize) -> bool {
         self.order.contains(&column)
     }
 
-    /// Reads all rows by `read`, which is given the line number and one field per column.
+    /// Reads all rows with `read`, which receives the line number and one field per column.
     ///
     /// # Errors
-    /// The first few bad rows and how many more there are; FB204 when there is no row at all.
+    /// The first few bad rows and the number of others; FB204 if there is no row.
     pub fn rows<T>(
         &self,
         mut read: impl FnMut(usize, &[&'a [u8]]) -> Result<T, Diagnostic>,
@@ -142,7 +142,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Collects bad rows: the first few, and a count of the others.
+/// Collector of bad rows: keeps the first few, and counts the others.
 pub struct BadRows<'a> {
     path: &'a Path,
     shown: Vec<Diagnostic>,
@@ -150,12 +150,12 @@ pub struct BadRows<'a> {
 }
 
 impl<'a> BadRows<'a> {
-    /// Nothing is wrong yet in the file at `path`.
+    /// Creates an empty collector for the file at `path`.
     pub fn new(path: &'a Path) -> Self {
         Self { path, shown: Vec::new(), count: 0 }
     }
 
-    /// Adds what is wrong in a row.
+    /// Adds the error of a row.
     pub fn add(&mut self, diagnostic: Diagnostic) {
         self.count += 1;
         if self.shown.len() < SHOWN {
@@ -163,8 +163,10 @@ impl<'a> BadRows<'a> {
         }
     }
 
+    /// Ends the collection.
+    ///
     /// # Errors
-    /// When there is any.
+    /// All collected diagnostics, if there are any.
     pub fn finish(mut self) -> Result<(), Vec<Diagnostic>> {
         let more = self.count - self.shown.len();
         if more > 0 {
@@ -175,7 +177,7 @@ impl<'a> BadRows<'a> {
     }
 }
 
-/// Lines that are neither blank nor comments, trimmed, with their numbers.
+/// Iterator over lines that are neither blank nor comments, trimmed, with their numbers.
 struct Lines<'a> {
     rest: &'a [u8],
     number: usize,
@@ -199,7 +201,7 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 impl Separator {
-    /// Fields without blanks and quotes around them.
+    /// Returns the fields without surrounding blanks and quotes.
     fn split(self, line: &[u8]) -> impl Iterator<Item = &[u8]> {
         line.split(move |&b| match self {
             Self::Byte(separator) => b == separator,
@@ -213,21 +215,21 @@ impl Separator {
     }
 }
 
-/// A whole number; `3.0` and `3e0` as numerical tools write it count too.
+/// Parses a whole number. `3.0` and `3e0`, as numerical tools write them, are accepted.
 pub fn integer(field: &[u8]) -> Option<i64> {
-    // Up to 18 digits alone, as nearly all fields are.
+    // Fast path for up to 18 digits, as in nearly all fields.
     if (1..=18).contains(&field.len()) && field.iter().all(u8::is_ascii_digit) {
         return Some(field.iter().fold(0, |number, digit| 10 * number + i64::from(digit - b'0')));
     }
     let text = std::str::from_utf8(field).ok()?;
     text.parse().ok().or_else(|| {
         let value = fast_float2::parse::<f64, _>(field).ok()?;
-        // 2^53: beyond it a float does not say which whole number was meant.
+        // Beyond 2^53 a float does not determine the whole number.
         (value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0).then_some(value as i64)
     })
 }
 
-/// Text of a file as it can be shown in a message.
+/// Returns text of a file in a form that can be shown in a message.
 pub fn printable(text: &[u8]) -> String {
     const SHOWN: usize = 60;
     let end = if text.len() > SHOWN { "..." } else { "" };

@@ -1,4 +1,4 @@
-//! Settings in TOML: reads tables and collects everything that is wrong with them, each with its line.
+//! Settings in TOML: reads tables and collects all errors, each with its line.
 
 use super::input_file::InputFile;
 use super::quotes::without_foreign_quotes;
@@ -10,16 +10,16 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// A table of a TOML document, with the places of its keys and values.
+/// Table of a TOML document, with the positions of its keys and values.
 pub type TomlTable<'t> = DeTable<'t>;
-/// A value of a TOML document, with its place.
+/// Value of a TOML document, with its position.
 pub type Value<'t> = Spanned<DeValue<'t>>;
 
-/// Reads `path`, a `kind` of file, by `walk`, which returns `None` only with something in `found`. `syntax`
-/// is the code of what is not as it should be.
+/// Reads `path`, a file of the given `kind`, with `walk`, which may return `None` only if `found` has an entry.
+/// `syntax` is the code of violations.
 ///
 /// # Errors
-/// FB101, FB106 when it cannot be read; everything that was found, in the order of lines.
+/// FB101, FB106 if the file cannot be read; all findings, in the order of lines.
 pub fn read_toml<T>(
     path: &Path,
     kind: &str,
@@ -37,7 +37,7 @@ pub fn read_toml<T>(
         let message = error.message().to_owned();
         tables.complain(syntax, error.span().unwrap_or(0..0), message);
     }
-    // After a syntax error the rest of the document is guesswork.
+    // After a syntax error the rest of the document is unreliable.
     let read = if errors.is_empty() { walk(&mut tables, document.get_ref()) } else { None };
     match read {
         Some(read) if tables.found.is_empty() => Ok(read),
@@ -45,12 +45,12 @@ pub fn read_toml<T>(
     }
 }
 
-/// The line (from 1) of the byte at `offset`.
+/// Returns the line (from 1) of the byte at `offset`.
 fn line_at(text: &[u8], offset: usize) -> usize {
     1 + text[..offset.min(text.len())].iter().filter(|&&b| b == b'\n').count()
 }
 
-/// Places of the line ends of a text, ascending.
+/// Positions of the line ends of a text, ascending.
 struct LineEnds(Vec<usize>);
 
 impl LineEnds {
@@ -58,25 +58,25 @@ impl LineEnds {
         Self(memchr::memchr_iter(b'\n', text.as_bytes()).collect())
     }
 
-    /// The line (from 1) of the byte at `offset`.
+    /// Returns the line (from 1) of the byte at `offset`.
     fn line_at(&self, offset: usize) -> usize {
         1 + self.0.partition_point(|end| *end < offset)
     }
 }
 
-/// Reads tables and collects what is wrong with them.
+/// Reader of tables that collects errors.
 pub struct Walk<'a> {
-    /// The file that is read.
+    /// File that is read.
     pub path: &'a Path,
     text: &'a str,
     syntax: Code,
     line_ends: LineEnds,
-    /// Everything that is wrong so far.
+    /// All findings so far.
     pub found: Vec<Diagnostic>,
 }
 
 impl Walk<'_> {
-    /// Returns the findings in the order of lines, the first of them where there are many.
+    /// Returns the findings in the order of lines, up to a limit.
     fn told(mut self) -> Vec<Diagnostic> {
         /// Largest number of findings that are listed.
         const SHOWN: usize = 200;
@@ -90,14 +90,14 @@ impl Walk<'_> {
         self.found.into_iter().map(|one| without_foreign_quotes(one, self.path)).collect()
     }
 
-    /// SHA-256 of the file.
+    /// Returns the SHA-256 of the file.
     pub fn fingerprint(&self) -> String {
         let mut all = Fingerprint::default();
         all.update(self.text.as_bytes());
         all.hex()
     }
 
-    /// A finding about the text at `span`.
+    /// Returns a diagnostic about the text at `span`.
     pub fn at(&self, code: Code, span: Range<usize>, message: String) -> Diagnostic {
         let line = self.line_ends.line_at(span.start);
         Diagnostic::new(code, message).in_file(self.path).at_line(line)
@@ -108,12 +108,12 @@ impl Walk<'_> {
         self.found.push(self.at(code, span, message));
     }
 
-    /// Complains that something is not as the file's contract says.
+    /// Adds a violation of the file's format.
     pub fn wrong(&mut self, span: Range<usize>, message: String) {
         self.complain(self.syntax, span, message);
     }
 
-    /// Complains about every key that is not in `known`, naming the nearest that is.
+    /// Adds a diagnostic for every key that is not in `known`, with the most similar known key.
     pub fn known_keys(&mut self, table: &TomlTable, place: &str, known: &[&str]) {
         for key in table.keys() {
             let name = key.get_ref().as_ref();
@@ -141,7 +141,7 @@ impl Walk<'_> {
         self.wrong(value.span(), message);
     }
 
-    /// A table and where it stands.
+    /// Returns a table and its position; `None` if it is missing or has another type.
     pub fn table<'t, 'i>(
         &mut self,
         table: &'t TomlTable<'i>,
@@ -157,7 +157,7 @@ impl Walk<'_> {
         }
     }
 
-    /// A string that is not empty.
+    /// Returns a non-empty string; `None` if it is missing or invalid.
     pub fn string(&mut self, table: &TomlTable, key: &str) -> Option<String> {
         let value = table.get(key)?;
         match value.get_ref() {
@@ -173,7 +173,7 @@ impl Walk<'_> {
         }
     }
 
-    /// A number that must be there; `span` is that of its table.
+    /// Returns a required number. `span` is the position of its table.
     pub fn number(&mut self, table: &TomlTable, key: &str, span: &Range<usize>) -> Option<f64> {
         let Some(value) = table.get(key) else {
             self.wrong(span.clone(), format!("key `{key}` is missing"));
@@ -187,13 +187,13 @@ impl Walk<'_> {
     }
 }
 
-/// The integer that `value` is, in any base that TOML has; `None` of other types and beyond 64 bits.
+/// Returns the integer of `value`, in any base of TOML; `None` for other types and beyond 64 bits.
 pub fn integer(value: &Value) -> Option<i64> {
     let number = value.get_ref().as_integer()?;
     i64::from_str_radix(number.as_str(), number.radix()).ok()
 }
 
-/// The number that `value` is, integers included; `None` of other types.
+/// Returns the number of `value`, integers included; `None` for other types.
 pub fn real(value: &Value) -> Option<f64> {
     match value.get_ref() {
         DeValue::Float(number) => number.as_str().parse().ok(),

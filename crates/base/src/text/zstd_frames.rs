@@ -1,4 +1,4 @@
-//! The unpacked bytes of Zstandard frames, one after the other (RFC 8878).
+//! Decompressed bytes of consecutive Zstandard frames (RFC 8878).
 
 use super::input_file::{failed, reading_error};
 use ruzstd::decoding::errors::{FrameDecoderError, ReadFrameHeaderError};
@@ -6,11 +6,10 @@ use ruzstd::decoding::{BlockDecodingStrategy, FrameDecoder};
 use std::error::Error;
 use std::io::{self, BufRead, ErrorKind, Read};
 
-/// Reads all frames of a file, skips those that are to be skipped, and compares the checksum of each that has
-/// one.
+/// Reader of all frames of a file. It skips skippable frames, and verifies the checksum of each frame that has one.
 pub(super) struct ZstdFrames<R: BufRead> {
     stored: R,
-    /// The open frame.
+    /// Frame that is being read.
     frame: Option<FrameDecoder>,
 }
 
@@ -19,7 +18,7 @@ impl<R: BufRead> ZstdFrames<R> {
         Self { stored, frame: None }
     }
 
-    /// Opens the next frame with contents; there is none at the end of the file.
+    /// Opens the next frame with content; `None` at the end of the file.
     fn open(&mut self) -> io::Result<Option<FrameDecoder>> {
         while !self.stored.fill_buf()?.is_empty() {
             let mut frame = FrameDecoder::new();
@@ -41,7 +40,7 @@ impl<R: BufRead> ZstdFrames<R> {
     }
 }
 
-/// Leaves a frame that was read to its end.
+/// Verifies the checksum of a frame that was read to its end.
 fn close(frame: &FrameDecoder) -> io::Result<()> {
     let stored = frame.get_checksum_from_data();
     if stored.is_some() && stored != frame.get_calculated_checksum() {
@@ -72,7 +71,7 @@ impl<R: BufRead> Read for ZstdFrames<R> {
     }
 }
 
-/// An error of the decoder as one of the file: that it ends too early, or what is wrong with it.
+/// Converts an error of the decoder to one of the file: unexpected end, or the reason of the damage.
 fn of_file(error: impl Into<Box<dyn Error + Send + Sync>>) -> io::Error {
     let error = error.into();
     let mut cause: Option<&(dyn Error + 'static)> = Some(&*error);

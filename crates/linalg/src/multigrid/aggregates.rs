@@ -1,10 +1,10 @@
-//! Groups of neighbouring nodes that become one node of the next coarser level (Vanek, Mandel and Brezina,
+//! Groups of neighbouring nodes, each of which becomes one node of the next coarser level (Vanek, Mandel and Brezina,
 //! Computing 56 (1996) 179, section 5.1).
 
-/// A node that belongs to no group yet.
+/// Marks a node without a group.
 const FREE: u32 = u32::MAX;
 
-/// Strongly coupled neighbours of each node, without itself, with the strength.
+/// Strongly coupled neighbours of each node, without the node itself, with the strength of the coupling.
 pub(super) struct Strong {
     pointers: Vec<usize>,
     neighbours: Vec<(u32, f32)>,
@@ -24,11 +24,12 @@ impl Strong {
     }
 }
 
-/// The group of each node, and their number. A node whose neighbours are all free makes a group with them;
-/// the others join the group that they are coupled to most strongly; what touches no group makes its own.
+/// Returns the group of each node, and the number of groups. A node whose neighbours are all free forms a group with
+/// them. Other nodes join the neighbouring group with the strongest coupling. Nodes that touch no group form their own.
 pub(super) fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
     let n = strong.pointers.len() - 1;
     let (mut group, mut count) = (vec![FREE; n], 0u32);
+    // Groups of a node and its free neighbours.
     for node in 0..n {
         let around = strong.around(node);
         let all_free = || around.iter().all(|&(other, _)| group[other as usize] == FREE);
@@ -38,6 +39,7 @@ pub(super) fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
             count += 1;
         }
     }
+    // Remaining nodes join the group of their strongest neighbour.
     let first = group.clone();
     for (node, own) in group.iter_mut().enumerate().filter(|(_, own)| **own == FREE) {
         let grouped = strong.around(node).iter().filter(|(other, _)| first[*other as usize] != FREE);
@@ -45,6 +47,7 @@ pub(super) fn aggregates(strong: &Strong) -> (Vec<u32>, usize) {
             *own = first[other as usize];
         }
     }
+    // Nodes without a neighbouring group form new groups.
     for node in 0..n {
         if group[node] == FREE {
             group[node] = count;

@@ -1,29 +1,29 @@
-//! Sparse matrices of small dense blocks in single precision, applied to [`WIDTH`] columns at a time. Every row
-//! is one sum in storage order: the same bits on any number of threads.
+//! Sparse matrices of small dense blocks in single precision, multiplied by [`WIDTH`] columns at a time. Every row is
+//! one sum in storage order, so that the bits do not depend on the number of threads.
 
 use pulp::bytemuck::cast_slice;
 use pulp::{Arch, Scalar, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Columns that are worked on together. Matrices are read once for all of them: with 8 columns each takes a third
-/// longer; 32 leave more of them empty than they gain.
+/// Number of columns that are processed together; the matrix is read once for all of them. With 8, each column takes a
+/// third longer; with 32, the loss by unused columns exceeds the gain.
 pub(super) const WIDTH: usize = 16;
 
-/// The rows of a node in [`WIDTH`] columns.
+/// Rows of a node in [`WIDTH`] columns.
 pub(super) type Rows<const R: usize> = [[f32; WIDTH]; R];
 
-/// Pseudo-random numbers between -1/2 and 1/2: where iterations start.
+/// Returns pseudo-random numbers between -1/2 and 1/2, the start of iterations.
 pub(super) fn noise(k: usize) -> f32 {
     ((k.wrapping_mul(2_654_435_761) >> 9) & 0xffff) as f32 / 65536.0 - 0.5
 }
 
-/// The entries of a row: columns, ascending, with their blocks.
+/// Entries of a row: columns, ascending, with their blocks.
 pub(super) type Entries<const R: usize, const C: usize> = Vec<(u32, [[f32; C]; R])>;
 
-/// Block rows per parallel task.
+/// Number of block rows per parallel task.
 const NODES: usize = 512;
 
-/// A matrix of blocks with `R` rows and `C` columns.
+/// Matrix of blocks with `R` rows and `C` columns.
 #[derive(Debug, Clone)]
 pub(super) struct BlockMatrix<const R: usize, const C: usize> {
     pointers: Vec<usize>,
@@ -32,7 +32,7 @@ pub(super) struct BlockMatrix<const R: usize, const C: usize> {
 }
 
 impl<const R: usize, const C: usize> BlockMatrix<R, C> {
-    /// The rows one after the other, copied by all threads.
+    /// Builds the matrix from its rows, copied by all threads.
     pub(super) fn from_rows(rows: Vec<Entries<R, C>>) -> Self {
         let mut pointers = vec![0];
         pointers.extend(rows.iter().scan(0, |end, row| {
@@ -61,13 +61,13 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         self.pointers.len() - 1
     }
 
-    /// Columns and blocks of a row.
+    /// Returns columns and blocks of a row.
     pub(super) fn row(&self, row: usize) -> impl Iterator<Item = (usize, &[[f32; C]; R])> {
         let range = self.pointers[row]..self.pointers[row + 1];
         self.columns[range.clone()].iter().map(|&column| column as usize).zip(&self.blocks[range])
     }
 
-    /// The transpose of a matrix with `n` block columns.
+    /// Returns the transpose of a matrix with `n` block columns.
     pub(super) fn transposed(&self, n: usize) -> BlockMatrix<C, R> {
         let mut pointers = vec![0usize; n + 1];
         self.columns.iter().for_each(|&column| pointers[column as usize + 1] += 1);
@@ -88,7 +88,7 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
         BlockMatrix { pointers, columns, blocks }
     }
 
-    /// What `make` makes of each row, by its number, and of its rows of A x.
+    /// Returns `make(node, rows of A x)` for every block row.
     pub(super) fn apply(
         &self,
         x: &[Rows<C>],
@@ -101,7 +101,7 @@ impl<const R: usize, const C: usize> BlockMatrix<R, C> {
 }
 
 impl<const B: usize> BlockMatrix<B, B> {
-    /// (A - theta M) x with a theta for each column; `mass` are the entries of M beside the blocks of A.
+    /// Returns (A - theta M) x with a theta for each column. `mass` holds the entry of M for each block of A.
     pub(super) fn apply_pencil(&self, mass: &[f32], theta: &[f32; WIDTH], x: &[Rows<B>]) -> Vec<Rows<B>> {
         let arch = Arch::new();
         let made = |row: usize| arch.dispatch(Dispatched(PencilProduct { a: self, mass, theta, row, x }));
@@ -109,7 +109,7 @@ impl<const B: usize> BlockMatrix<B, B> {
     }
 }
 
-/// [`BlockMatrix::apply`] for one row.
+/// Work of [`BlockMatrix::apply`] for one row.
 struct RowProduct<'a, F, const R: usize, const C: usize> {
     matrix: &'a BlockMatrix<R, C>,
     row: usize,
@@ -117,17 +117,17 @@ struct RowProduct<'a, F, const R: usize, const C: usize> {
     make: &'a F,
 }
 
-/// A row of [`WIDTH`] columns as `N` vectors.
+/// Row of [`WIDTH`] columns as `N` vectors.
 type Row<S, const N: usize> = [<S as Simd>::f32s; N];
 
-/// The rows of nodes as vectors.
+/// Returns the rows of nodes as vectors.
 #[inline(always)]
 fn as_vectors<S: Simd, const N: usize, const C: usize>(x: &[Rows<C>]) -> &[[Row<S, N>; C]] {
     let x = cast_slice::<f32, S::f32s>(x.as_flattened().as_flattened());
     x.as_chunks::<N>().0.as_chunks::<C>().0
 }
 
-/// The vectors of a node as its rows.
+/// Returns the vectors of a node as its rows.
 #[inline(always)]
 fn as_rows<S: Simd, const N: usize, const R: usize>(vectors: &[Row<S, N>; R]) -> Rows<R> {
     let mut rows = [[0.0; WIDTH]; R];
@@ -135,18 +135,18 @@ fn as_rows<S: Simd, const N: usize, const R: usize>(vectors: &[Row<S, N>; R]) ->
     rows
 }
 
-/// What is made with `N` vectors for each row.
+/// Computation with `N` vectors for each row.
 trait ByVectors {
     type Made;
 
     fn make<S: Simd, const N: usize>(self, simd: S) -> Self::Made;
 }
 
-/// With the vectors of the machine.
+/// Runs a computation with the vectors of the machine.
 struct Dispatched<T>(T);
 
-// Neither a closure, which is compiled apart from the function that has the instruction set, nor loops over the
-// columns, which the compiler cuts into vectors of several lengths.
+// Dispatches a structure with explicit vectors: a closure would be compiled outside the function that has the
+// instruction set, and the compiler cuts loops over the columns into vectors of several lengths.
 impl<T: ByVectors> WithSimd for Dispatched<T> {
     type Output = T::Made;
 
@@ -175,10 +175,10 @@ where
     }
 }
 
-/// Vectors that sums may take, of the 16 of most machines.
+/// Number of vector registers for sums, of the 16 of most machines.
 const REGISTERS: usize = 12;
 
-/// The product of a row. Short rows have several sums, which do not wait for each other.
+/// Returns the product of a row. Short rows use several independent sums to hide the latency.
 #[inline(always)]
 fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
     simd: S,
@@ -209,7 +209,7 @@ fn row_times<S: Simd, const N: usize, const R: usize, const C: usize>(
     total
 }
 
-/// [`BlockMatrix::apply_pencil`] for one row.
+/// Work of [`BlockMatrix::apply_pencil`] for one row.
 struct PencilProduct<'a, const B: usize> {
     a: &'a BlockMatrix<B, B>,
     mass: &'a [f32],

@@ -1,23 +1,25 @@
-//! From one level to the next coarser one: the motions of each group, smoothed, and P'AP.
+//! Construction of the next coarser level: smoothed motions P of the groups, and P'AP.
 
 use super::aggregates::{Strong, aggregates};
 use super::blocks::{BlockMatrix, Entries};
 use rayon::prelude::*;
 
-/// Nodes, and groups, per parallel task.
+/// Number of nodes per parallel task.
 const NODES: usize = 256;
+/// Number of groups per parallel task.
 const GROUPS: usize = 16;
 
-/// Part of its length below which a motion of a group depends on those before it.
+/// Length of a motion of a group after orthogonalisation, relative to its full length, up to which it counts as
+/// dependent.
 const DEPENDENT: f64 = 1e-5;
 
-/// Part of its diagonal entry below which a pivot of a node's own block counts as none.
+/// Size of a pivot of a node's diagonal block, relative to its diagonal entry, up to which it counts as zero.
 const NO_PIVOT: f64 = 1e-10;
 
-/// A block in double precision.
+/// Block in double precision.
 pub(super) type Block<const R: usize, const C: usize> = [[f64; C]; R];
 
-/// A symmetric matrix that a level is built from, block row by block row.
+/// Symmetric matrix from which a level is built, block row by block row.
 pub(super) trait SymmetricBlocks<const B: usize>: Sync {
     fn nodes(&self) -> usize;
 
@@ -43,10 +45,10 @@ pub(super) fn narrow<const R: usize, const C: usize>(block: &Block<R, C>) -> [[f
     block.map(|row| row.map(|value| value as f32))
 }
 
-/// Motions of each node: its rows in the columns of what costs next to no energy.
+/// Motions of each node: its rows of the near-null-space vectors.
 pub(super) type Motions<const B: usize, const C: usize> = Vec<Block<B, C>>;
 
-/// The matrix in single precision.
+/// Returns the matrix in single precision.
 pub(super) fn stored<const B: usize>(a: &impl SymmetricBlocks<B>) -> BlockMatrix<B, B> {
     let row = |node: usize| {
         let mut row = Vec::new();
@@ -56,7 +58,7 @@ pub(super) fn stored<const B: usize>(a: &impl SymmetricBlocks<B>) -> BlockMatrix
     BlockMatrix::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
 }
 
-/// The block of each node on the diagonal.
+/// Returns the diagonal block of each node.
 pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block<B, B>> {
     let own = |node: usize| {
         let mut own = [[0.0; B]; B];
@@ -70,10 +72,11 @@ pub(super) fn diagonal<const B: usize>(a: &impl SymmetricBlocks<B>) -> Vec<Block
     (0..a.nodes()).into_par_iter().with_min_len(NODES).map(own).collect()
 }
 
-/// The inverse of a symmetric positive definite matrix, by its Cholesky factor; `None` of any other.
+/// Returns the inverse of a symmetric positive definite matrix by its Cholesky factor; `None` for any other matrix.
 pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     let mut l = [[0.0; B]; B];
     for j in 0..B {
+        // Cholesky factor L, column by column.
         let pivot = a[j][j] - l[j][..j].iter().map(|x| x * x).sum::<f64>();
         if pivot.is_nan() || pivot <= NO_PIVOT * a[j][j] {
             return None;
@@ -84,6 +87,7 @@ pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
             l[i][j] = rest / l[j][j];
         }
     }
+    // L^-1, and A^-1 = L^-T L^-1.
     let mut lower = [[0.0; B]; B];
     for j in 0..B {
         lower[j][j] = 1.0 / l[j][j];
@@ -96,7 +100,7 @@ pub(super) fn inverse<const B: usize>(a: &Block<B, B>) -> Option<Block<B, B>> {
     Some(std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j))))
 }
 
-/// Neighbours whose block is more than `least` of the blocks on the diagonal, in the Frobenius norm.
+/// Returns the neighbours whose coupling block exceeds `least` relative to the diagonal blocks, in the Frobenius norm.
 pub(super) fn strong_couplings<const B: usize>(
     a: &impl SymmetricBlocks<B>,
     diagonal: &[Block<B, B>],
@@ -117,14 +121,14 @@ pub(super) fn strong_couplings<const B: usize>(
     Strong::from_rows((0..a.nodes()).into_par_iter().with_min_len(NODES).map(row).collect())
 }
 
-/// The groups of a level, with an orthonormal basis of the motions of each.
+/// Groups of a level, with an orthonormal basis of the motions of each.
 pub(super) struct Aggregates<const B: usize, const C: usize> {
     pub count: usize,
     /// Group of each node.
     of_node: Vec<u32>,
-    /// Of each node, its rows of the basis of its group.
+    /// Rows of each node in the basis of its group.
     basis: Motions<B, C>,
-    /// The motions of the groups in these bases.
+    /// Motions of the groups, expressed in these bases.
     pub motions: Motions<C, C>,
 }
 
@@ -133,6 +137,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         let (of_node, count) = aggregates(strong);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
         of_node.iter().enumerate().for_each(|(node, &own)| members[own as usize].push(node as u32));
+        // Orthonormalise the motions of each group.
         let found: Vec<(Motions<B, C>, Block<C, C>)> = members
             .par_iter()
             .with_min_len(GROUPS)
@@ -145,7 +150,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         Self { count, of_node, basis, motions: found.into_iter().map(|(_, own)| own).collect() }
     }
 
-    /// The mass of each group, along its motions, from those of the nodes.
+    /// Returns the mass matrix of each group along its motions, from the masses of the nodes.
     pub(super) fn masses(&self, nodes: &[Block<B, B>]) -> Vec<Block<C, C>> {
         let mut masses = vec![[[0.0; C]; C]; self.count];
         for ((&group, basis), mass) in self.of_node.iter().zip(&self.basis).zip(nodes) {
@@ -157,7 +162,7 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
         masses
     }
 
-    /// (1 - omega D^-1 A) times the basis of the groups.
+    /// Returns the smoothed prolongation (1 - omega D^-1 A) times the basis of the groups.
     pub(super) fn smoothed(
         &self,
         a: &impl SymmetricBlocks<B>,
@@ -184,8 +189,8 @@ impl<const B: usize, const C: usize> Aggregates<B, C> {
     }
 }
 
-/// Motions of some nodes made orthonormal, by Gram-Schmidt taken twice, and the coefficients of the given ones
-/// in them. What depends on those before it becomes zero.
+/// Orthonormalises the motions of some nodes by Gram-Schmidt, applied twice. Returns the basis, and the coefficients of
+/// the given motions in it. Motions that depend on earlier ones become zero.
 fn orthonormal<const B: usize, const C: usize>(mut own: Motions<B, C>) -> (Motions<B, C>, Block<C, C>) {
     let mut coefficients = [[0.0; C]; C];
     let product = |own: &Motions<B, C>, i: usize, j: usize| -> f64 {
@@ -209,7 +214,7 @@ fn orthonormal<const B: usize, const C: usize>(mut own: Motions<B, C>) -> (Motio
     (own, coefficients)
 }
 
-/// P'AP, by A P first. `empty` is what rows of it that nothing moves have on the diagonal.
+/// Returns P'AP, computed from A P. `empty` is the diagonal entry of rows that no motion reaches.
 pub(super) fn galerkin<const B: usize, const C: usize>(
     a: &impl SymmetricBlocks<B>,
     p: &BlockMatrix<B, C>,
@@ -217,6 +222,7 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
     empty: f32,
 ) -> BlockMatrix<C, C> {
     let count = r.n_rows();
+    // Rows of A P, then rows of P' (A P).
     let forces = |sums: &mut Sums<B, C>, node: usize| {
         a.visit(node, |column, block| {
             p.row(column).for_each(|(group, own)| add_product(sums.at(group as u32), block, &wide(own)));
@@ -242,7 +248,7 @@ pub(super) fn galerkin<const B: usize, const C: usize>(
     BlockMatrix::from_rows(groups.map_init(|| Sums::new(count), row).collect())
 }
 
-/// c += a b.
+/// Adds a b to c.
 #[inline(always)]
 fn add_product<const R: usize, const S: usize, const C: usize>(
     c: &mut Block<R, C>,
@@ -258,9 +264,9 @@ fn add_product<const R: usize, const S: usize, const C: usize>(
     }
 }
 
-/// The blocks of a row while they are summed.
+/// Sums of the blocks of one row.
 struct Sums<const R: usize, const C: usize> {
-    /// Place of each column among the blocks, from 1; 0 of those that have none.
+    /// Index of each column among the blocks, from 1; 0 for a column without a block.
     places: Vec<u32>,
     blocks: Vec<(u32, Block<R, C>)>,
 }
@@ -279,7 +285,7 @@ impl<const R: usize, const C: usize> Sums<R, C> {
         &mut self.blocks[*place as usize - 1].1
     }
 
-    /// The entries that `of` makes of the sums, in ascending order; no sums are left.
+    /// Returns the entries that `of` computes from the sums, in ascending order of columns, and clears the sums.
     fn take(&mut self, of: impl Fn(u32, &Block<R, C>) -> [[f32; C]; R]) -> Entries<R, C> {
         self.blocks.iter().for_each(|(column, _)| self.places[*column as usize] = 0);
         self.blocks.sort_unstable_by_key(|(column, _)| *column);
@@ -307,7 +313,7 @@ mod tests {
 
     #[test]
     fn motions_of_a_group_are_combinations_of_its_basis() {
-        // A translation, a rotation, and their sum, of three nodes on a line.
+        // Translation, rotation and their sum, for three nodes on a line.
         let motions: Motions<2, 3> =
             (0..3).map(|k| [[1.0, 0.0, 1.0], [0.0, f64::from(k), f64::from(k)]]).collect();
         let (basis, coefficients) = orthonormal(motions.clone());

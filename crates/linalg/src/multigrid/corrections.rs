@@ -1,7 +1,7 @@
-//! Corrections of approximate modes: conjugate gradients for (K - theta M) t = r on what is M-orthogonal to the
-//! mode itself, with cycles as preconditioner (the correction equation of Sleijpen and van der Vorst, SIAM J.
-//! Matrix Anal. Appl. 17 (1996) 401). [`Deflation`] keeps off the modes below and treats those above, so that
-//! K - theta M is positive definite on what is left.
+//! Corrections of approximate modes: conjugate gradients for (K - theta M) t = r in the M-orthogonal complement of the
+//! mode itself, with multigrid cycles as preconditioner (the correction equation of Sleijpen and van der Vorst, SIAM J.
+//! Matrix Anal. Appl. 17 (1996) 401). [`Deflation`] removes the modes below and handles those above, so that K - theta
+//! M is positive definite on the rest.
 
 use super::blocks::{BlockMatrix, Rows, WIDTH};
 use super::deflation::Deflation;
@@ -11,70 +11,70 @@ use faer::MatMut;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Nodes per parallel task.
+/// Number of nodes per parallel task.
 const NODES: usize = 512;
 
-/// Steps that a column is waited for at the most.
+/// Largest number of steps for which other columns wait for a column.
 const MOST_STEPS: usize = 6;
 
-/// Part of its error that a first step is expected to leave.
+/// Part of the error that the first step is expected to leave.
 const LEFT_AT_FIRST: f64 = 0.2;
 
-/// Part of the error below which single precision gains nothing more.
+/// Part of the error below which single precision allows no further gain.
 const NOTHING_LEFT: f64 = 1e-4;
 
-/// What is asked of a correction.
+/// Goal of a correction.
 #[derive(Debug, Clone, Copy)]
 pub struct Aim {
-    /// The pair that is corrected, by its number among those that are [near](super::Near).
+    /// Index of the corrected pair among the modes [near](super::Near) it.
     pub pair: usize,
-    /// Part of the error of the correction that may be left.
+    /// Part of the error of the correction that may remain.
     pub left: f64,
 }
 
-/// K + tau M and M in units of single precision.
+/// K + tau M and M, scaled to single precision.
 pub(super) struct SmallPencil<'a, const B: usize> {
     /// (K + tau M) / size.
     pub a: &'a BlockMatrix<B, B>,
-    /// M / heaviest, beside the blocks of `a`.
+    /// M / heaviest, one entry for each block of `a`.
     pub mass: &'a [f32],
     pub tau: f64,
-    /// heaviest / size.
+    /// Ratio heaviest / size.
     pub ratio: f64,
 }
 
-/// The equations of corrections.
+/// Correction equations of a set of approximate pairs.
 pub(super) struct Corrections<'a, F, const B: usize> {
     pub pencil: SmallPencil<'a, B>,
-    /// Solves with `a`, roughly.
+    /// Approximate solution with `a` by one multigrid cycle.
     pub cycle: F,
     pub deflation: Deflation<'a>,
-    /// The eigenvalues of the pairs.
+    /// Eigenvalues of the pairs.
     pub eigenvalues: &'a [f64],
 }
 
-/// A column that is worked on.
+/// Column in work.
 #[derive(Debug, Clone, Copy)]
 struct Slot {
     column: usize,
     aim: Aim,
     steps: usize,
-    /// r'z at first, and last.
+    /// r'z of the first and of the last step.
     first: f64,
     last: f64,
-    /// True when the aim is reached, or not waited for any more.
+    /// True if the goal is reached, or the column is no longer waited for.
     is_reached: bool,
-    /// True when more steps gain anything.
+    /// True if further steps gain nothing.
     is_at_end: bool,
 }
 
-/// Columns in work, and those that wait.
+/// Active columns (one per SIMD lane) and the queue of pending ones.
 struct Work<'a, const B: usize> {
-    /// The forces, which their corrections replace.
+    /// Forces, which are replaced by their corrections.
     columns: Vec<&'a mut [f64]>,
     waiting: std::iter::Rev<Range<usize>>,
     slots: [Option<Slot>; WIDTH],
-    /// What is unbalanced yet, the solution so far, the direction of the last step.
+    /// Residual, solution so far, and last search direction.
     r: Vec<Rows<B>>,
     t: Vec<Rows<B>>,
     p: Vec<Rows<B>>,
@@ -84,9 +84,9 @@ impl<F, const B: usize> Corrections<'_, F, B>
 where
     F: Fn(&[Rows<B>]) -> Vec<Rows<B>>,
 {
-    /// Replaces each force, of about unit size, by its correction. Columns work beside each other; those that
-    /// have reached their aim go on as long as others are waited for, since that costs nothing. The columns of
-    /// cycles that it took.
+    /// Replaces each force, of about unit size, by its correction. Columns are processed side by side. Columns that
+    /// have reached their goal continue as long as others are waited for, since this costs nothing. Returns the number
+    /// of columns of cycles.
     pub(super) fn solve(&self, aims: &[Aim], forces: MatMut<'_, f64>) -> u64 {
         let mut work = Work::new(self.pencil.a.n_rows(), forces);
         let mut columns = 0;
@@ -102,9 +102,10 @@ where
         }
     }
 
-    /// A step of conjugate gradients for all columns in work.
+    /// Makes one step of conjugate gradients for all active columns.
     fn step(&self, work: &mut Work<'_, B>) {
         let pairs = work.slots.map(|slot| slot.map(|slot| slot.aim.pair));
+        // Precondition and project the residual, update the direction, step along it.
         let mut z = (self.cycle)(&work.r);
         self.deflation.project(&mut z, &pairs);
         let rz = products(&work.r, &z);
@@ -114,7 +115,7 @@ where
         work.advance(&q, &rz, &pq);
     }
 
-    /// (K - theta M) p / size.
+    /// Returns (K - theta M) p / size.
     fn applied(&self, p: &[Rows<B>], pairs: &[Option<usize>; WIDTH]) -> Vec<Rows<B>> {
         let SmallPencil { a, mass, tau, ratio } = self.pencil;
         let theta =
@@ -126,15 +127,16 @@ where
 impl<'a, const B: usize> Work<'a, B> {
     fn new(nodes: usize, forces: MatMut<'a, f64>) -> Self {
         let columns: Vec<_> = forces.col_iter_mut().map(contiguous_mut).collect();
-        // The highest first, which take the most steps.
+        // The highest pairs first, which take the most steps.
         let waiting = (0..columns.len()).rev();
         let [r, t, p] = [(); 3].map(|()| vec![[[0.0; WIDTH]; B]; nodes]);
         Self { columns, waiting, slots: [None; WIDTH], r, t, p }
     }
 
-    /// Gives free slots to columns that wait.
+    /// Fills free slots with waiting columns.
     fn fill(&mut self, aims: &[Aim]) {
         let Self { columns, waiting, slots, r, t, p } = self;
+        // Assign one waiting column to each free slot.
         let mut fresh: Vec<(usize, &[f64])> = Vec::new();
         for (w, slot) in slots.iter_mut().enumerate().filter(|(_, slot)| slot.is_none()) {
             let Some(column) = waiting.next() else { break };
@@ -153,6 +155,7 @@ impl<'a, const B: usize> Work<'a, B> {
         if fresh.is_empty() {
             return;
         }
+        // Start from t = 0: the residual is the force, in single precision.
         let blocks = r.par_iter_mut().zip(t).zip(p).enumerate().with_min_len(NODES);
         blocks.for_each(|(node, ((r, t), p))| {
             for &(w, force) in &fresh {
@@ -164,7 +167,7 @@ impl<'a, const B: usize> Work<'a, B> {
         });
     }
 
-    /// The direction of the next step: p <- z + beta p.
+    /// Computes the next search direction: p <- z + beta p.
     fn turn(&mut self, z: &[Rows<B>], rz: &[f64; WIDTH]) {
         let mut beta = [0.0f32; WIDTH];
         for ((slot, &rz), beta) in self.slots.iter_mut().zip(rz).zip(&mut beta) {
@@ -174,7 +177,7 @@ impl<'a, const B: usize> Work<'a, B> {
                 slot.first = rz;
             } else {
                 *beta = (rz / slot.last) as f32;
-                // As it will be after this step, if it gains what the one before did.
+                // Estimate of the error after this step, if it gains as much as the step before.
                 left = (rz / slot.first).sqrt() * (rz / slot.last).sqrt();
             }
             slot.last = rz;
@@ -182,7 +185,7 @@ impl<'a, const B: usize> Work<'a, B> {
             slot.is_reached |= left <= slot.aim.left || slot.steps >= MOST_STEPS;
             slot.is_at_end = left <= NOTHING_LEFT;
         }
-        // What is no number is left out.
+        // A column with NaN gets a zero direction.
         let is_number = rz.map(f64::is_finite);
         self.p.par_iter_mut().zip(z).with_min_len(NODES).for_each(|(p, z)| {
             for b in 0..B {
@@ -193,7 +196,7 @@ impl<'a, const B: usize> Work<'a, B> {
         });
     }
 
-    /// The step along p, with q = (K - theta M) p: a column whose matrix shows itself indefinite ends.
+    /// Steps along p, with q = (K - theta M) p. A column whose matrix proves indefinite ends.
     fn advance(&mut self, q: &[Rows<B>], rz: &[f64; WIDTH], pq: &[f64; WIDTH]) {
         let mut alpha = [0.0f32; WIDTH];
         for (w, slot) in self.slots.iter_mut().enumerate() {
@@ -202,7 +205,7 @@ impl<'a, const B: usize> Work<'a, B> {
                 alpha[w] = (rz[w] / pq[w]) as f32;
                 continue;
             }
-            // What the cycle alone makes is a correction too.
+            // In the first step, the result of the cycle alone is a correction too.
             alpha[w] = f32::from(u8::from(slot.steps == 1));
             (slot.is_reached, slot.is_at_end) = (true, true);
         }
@@ -217,8 +220,8 @@ impl<'a, const B: usize> Work<'a, B> {
         });
     }
 
-    /// Hands out the columns that nothing more is gained for, those that have reached their aim where others
-    /// wait for their place, and all when all have.
+    /// Stores the columns that gain nothing more, those that have reached their goal if others wait for their slot, and
+    /// all columns if all have reached their goals.
     fn hand_out(&mut self) {
         let is_last = self.waiting.len() == 0 && self.slots.iter().flatten().all(|slot| slot.is_reached);
         let has_others = self.waiting.len() > 0;

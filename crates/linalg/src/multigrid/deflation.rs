@@ -1,20 +1,20 @@
-//! Projection off the modes that are there, in single precision.
+//! Deflation: projection off known modes, in single precision.
 
 use super::blocks::{Rows, WIDTH};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, MatRef, Par};
 use rayon::prelude::*;
 
-/// Rows per partial product.
+/// Number of rows per partial product.
 const ROWS: usize = 4096;
 
-/// Distance of two eigenvalues, beside one of them, up to which (K - theta M)-orthogonality to the other mode
-/// would divide by too little.
+/// Distance of two eigenvalues, relative to one of them, up to which only M-orthogonality is applied: (K - theta
+/// M)-orthogonality would divide by a small number.
 const NEAR: f64 = 0.1;
 
-/// The modes that corrections are kept apart from.
+/// Modes from which corrections are kept apart.
 pub struct Near<'a> {
-    /// Rigid modes, M-orthonormal, and M times them.
+    /// Rigid modes, M-orthonormal, and M times these.
     pub rigid: [MatRef<'a, f64>; 2],
     /// Approximate modes, M-orthonormal.
     pub modes: MatRef<'a, f64>,
@@ -22,19 +22,21 @@ pub struct Near<'a> {
     pub k_modes: MatRef<'a, f64>,
     /// M times the approximate modes.
     pub m_modes: MatRef<'a, f64>,
-    /// Their eigenvalues, ascending.
+    /// Eigenvalues of the approximate modes, ascending.
     pub eigenvalues: &'a [f64],
 }
 
-/// They, in single precision.
+/// Modes of a [`Near`], in single precision.
 pub(super) struct Deflation<'a> {
     rigid: usize,
     eigenvalues: &'a [f64],
-    /// Rigid and approximate modes, with a largest entry of one.
+    /// Rigid and approximate modes, scaled to a largest entry of one.
     x: Mat<f32>,
-    /// M times them, and K / `unit` times the approximate ones, divided by what `x` is multiplied by.
+    /// M times the modes, divided by the scale of `x`.
     mx: Mat<f32>,
+    /// K / `unit` times the approximate modes, divided by the scale of `x`.
     kx: Mat<f32>,
+    /// Scale of K: the highest eigenvalue.
     unit: f64,
 }
 
@@ -55,11 +57,11 @@ impl<'a> Deflation<'a> {
         }
     }
 
-    /// Makes each column z, which belongs to the pair given for it, with eigenvalue theta, M-orthogonal to the
-    /// rigid modes, to the mode of that pair and to those near it, and (K - theta M)-orthogonal to the other
-    /// modes: what is left to solve for is then right along them too, where M-orthogonality would leave out what
-    /// couples them to the correction (deflated conjugate gradients: Saad, Yeung, Erhel and Guyomarc'h, SIAM J.
-    /// Sci. Comput. 21 (2000) 1909).
+    /// Projects each column z, which belongs to the given pair with eigenvalue theta. It becomes M-orthogonal to the
+    /// rigid modes, to the mode of its pair and to modes near it, and (K - theta M)-orthogonal to the other modes. The
+    /// remaining equation is then also correct along the other modes, whereas M-orthogonality would drop their coupling
+    /// to the correction (deflated conjugate gradients: Saad, Yeung, Erhel and Guyomarc'h, SIAM J. Sci. Comput. 21
+    /// (2000) 1909).
     pub(super) fn project<const B: usize>(&self, z: &mut [Rows<B>], pairs: &[Option<usize>; WIDTH]) {
         let nodes = ROWS / B;
         let products = |(chunk, z): (usize, &[Rows<B>])| {
@@ -72,6 +74,7 @@ impl<'a> Deflation<'a> {
                 part
             })
         };
+        // Products with M X and K X, summed in fixed order; then subtract X times the coefficients.
         let parts: Vec<[Mat<f32>; 2]> = z.par_chunks(nodes).enumerate().map(products).collect();
         let sum = |block: usize, i: usize, w: usize| -> f64 {
             parts.iter().map(|part| f64::from(part[block][(i, w)])).sum()
@@ -94,7 +97,7 @@ impl<'a> Deflation<'a> {
     }
 }
 
-/// The columns of the blocks, each multiplied by what `scale` makes of its size; zeros for columns of zeros.
+/// Returns the columns of the blocks, each multiplied by `scale(size)`; zero for columns of size zero.
 fn narrow(blocks: &[MatRef<'_, f64>], sizes: &[f64], scale: impl Fn(f64) -> f64 + Sync) -> Mat<f32> {
     let columns: Vec<_> = blocks.iter().flat_map(|block| block.col_iter()).collect();
     let mut own = Mat::zeros(blocks[0].nrows(), columns.len());

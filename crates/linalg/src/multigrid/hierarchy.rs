@@ -1,4 +1,4 @@
-//! All levels: the cycle through them, and rough modes from the coarsest.
+//! Hierarchy of levels: the multigrid cycle, and rough modes from the coarsest level.
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use super::coarsening::{Block, Motions, SymmetricBlocks};
@@ -13,49 +13,49 @@ use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Rows up to which a level is solved with a dense factor.
+/// Largest number of rows of a level that is solved with a dense matrix.
 const BOTTOM: usize = 1500;
 
-/// Levels at the most: each has a tenth of the rows of the one above, or less.
+/// Largest number of levels. Each has at most about a tenth of the rows of the finer one.
 const MOST_LEVELS: usize = 10;
 
-/// Coupling beside the diagonal from which on neighbours count as strongly coupled: on the finest level, and
-/// on the others.
+/// Coupling, relative to the diagonal, above which neighbours on the finest level are strongly coupled.
 const STRONG: f64 = 0.02;
+/// Coupling, relative to the diagonal, above which neighbours on the coarser levels are strongly coupled.
 const STRONG_BELOW: f64 = 0.01;
 
-/// Inverse iterations that make the rough modes of the coarsest level.
+/// Number of inverse iterations for the rough modes of the coarsest level.
 const ROUGH_ROUNDS: usize = 6;
 
-/// Inverse iterations, by cycles, that improve them on each finer level but the finest.
+/// Number of inverse iterations, by cycles, for the rough modes on each level between the coarsest and the finest.
 const POLISHED: usize = 3;
 
-/// Nodes per parallel task.
+/// Number of nodes per parallel task.
 const NODES: usize = 1024;
 
-/// A hierarchy of levels, of nodes of any size.
+/// Hierarchy of levels, for nodes of any size.
 pub trait Levels {
-    /// The shift tau.
+    /// Returns the shift tau.
     fn shift(&self) -> f64;
 
-    /// The lowest modes of the coarsest level with the diagonal of M, improved on the levels up to the finest,
-    /// as vectors of that (N x `count`, or as many columns as the coarsest level has rows): a start for a
-    /// search. They are not orthonormal. `None` where they are linearly dependent.
+    /// Returns approximations of the lowest modes as a start of a search: the lowest modes of the coarsest level with
+    /// lumped masses, improved on the levels up to the finest (N x `count`, or as many columns as the coarsest level
+    /// has rows). The vectors are not orthonormal. Returns `None` if they are linearly dependent.
     fn rough_modes(&self, count: usize) -> Option<Mat<f64>>;
 
-    /// Replaces what approximate modes leave unbalanced, columns of about unit size, by corrections of the modes.
-    /// The columns of cycles that it took.
+    /// Replaces the residual forces of approximate modes, columns of about unit size, by corrections of the modes.
+    /// Returns the number of columns of cycles.
     fn correct(&self, near: &Near<'_>, aims: &[Aim], forces: MatMut<'_, f64>) -> u64;
 }
 
-/// Returns true when nodes with so many rows, and a body with so many rigid modes, can have levels.
+/// Returns true if a pencil with this block size, of a body with `rigid_modes` rigid modes, can have levels.
 pub fn can_have_levels(pencil: &Pencil<'_>, rigid_modes: usize) -> bool {
     matches!((pencil.block(), rigid_modes), (3, 6) | (2, 3))
 }
 
-/// The levels of K + tau M for the rigid modes of a body; `None` where there are none: nodes with rotations,
-/// a body in space that has not six rigid modes or one in the plane that has not three, a matrix whose blocks
-/// are not positive definite in single precision.
+/// Builds the levels of K + tau M for the `rigid` modes of a body. Returns `None` if that is not possible: nodes have
+/// rotations, a body in space does not have six rigid modes or one in the plane three, or diagonal blocks are not
+/// positive definite in single precision.
 pub fn levels(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>, tau: f64) -> Option<Box<dyn Levels>> {
     match (pencil.block(), rigid.ncols()) {
         (3, 6) => Some(Box::new(Hierarchy::<3, 6>::new(pencil, rigid, tau)?)),
@@ -64,25 +64,25 @@ pub fn levels(pencil: &Pencil<'_>, rigid: MatRef<'_, f64>, tau: f64) -> Option<B
     }
 }
 
-/// K + tau M, divided by its size, on levels of groups of nodes.
+/// Hierarchy for K + tau M, divided by the largest diagonal entry of K.
 #[derive(Debug)]
 struct Hierarchy<const B: usize, const C: usize> {
     fine: Level<B, C>,
     coarser: Vec<Level<C, C>>,
-    /// The inverse of the matrix of the coarsest level.
+    /// Inverse of the matrix of the coarsest level.
     inverse_of_bottom: Mat<f64>,
-    /// Masses of its groups.
+    /// Masses of the groups of the coarsest level.
     masses: Vec<Block<C, C>>,
-    /// M / `heaviest` beside the blocks of the finest level.
+    /// M / `heaviest`, one entry for each block of the finest level.
     mass: Vec<f32>,
     /// Largest diagonal entry of M.
     heaviest: f64,
-    /// Largest diagonal entry of K: divided by it, numbers stay within single precision in any units.
+    /// Largest diagonal entry of K. Division by it keeps numbers within single precision in any units.
     size: f64,
     tau: f64,
 }
 
-/// (K + tau M) / size, node by node.
+/// Matrix (K + tau M) / size, node by node.
 struct Shifted<'a, const B: usize> {
     pencil: &'a Pencil<'a>,
     tau: f64,
@@ -98,6 +98,7 @@ impl<const B: usize> SymmetricBlocks<B> for Shifted<'_, B> {
         let mut rows: [(&[u32], &[f64]); B] =
             std::array::from_fn(|b| self.pencil.stiffness().row(node * B + b));
         let (mut others, mut masses) = self.pencil.mass().row(node);
+        // Merge the ascending columns of the B rows of K and of the row of M.
         loop {
             let stiff = rows.iter().filter_map(|row| row.0.first()).min().map(|&column| column as usize / B);
             let heavy = others.first().map(|&other| other as usize);
@@ -128,7 +129,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
             return None;
         }
         let shifted = Shifted::<B> { pencil, tau, scale: 1.0 / size };
-        // In units of their own: only their ratios matter, to rough modes.
+        // Masses have a scale of their own: rough modes depend only on their ratios.
         let heaviest = largest(pencil.mass().diagonal());
         let scaled = |mass: f64| {
             let mut block = [[0.0; B]; B];
@@ -139,6 +140,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         let (fine, mut next) = Level::new(&shifted, &unit_motions(rigid), masses, STRONG)?;
         let mass = masses_beside(fine.matrix(), pencil.mass(), 1.0 / heaviest);
         let mut coarser = Vec::new();
+        // Coarsen until a dense inverse is cheap.
         while next.a.n_rows() * C > BOTTOM {
             if coarser.len() == MOST_LEVELS {
                 return None;
@@ -153,7 +155,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         Some(Self { fine, coarser, inverse_of_bottom, masses, mass, heaviest, size, tau })
     }
 
-    /// One cycle for (K + tau M) / size x = b.
+    /// Applies one cycle for (K + tau M) / size x = b.
     fn cycle(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
         self.fine.cycle(b, |coarse| self.coarse_cycle(&self.coarser, coarse))
     }
@@ -168,7 +170,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
         packed(combine(self.inverse_of_bottom.as_ref(), dense.as_ref()).as_ref())
     }
 
-    /// The lowest modes of the coarsest level, by inverse iterations from random vectors.
+    /// Returns the lowest modes of the coarsest level, by inverse iterations from random vectors.
     fn bottom_modes(&self, count: usize) -> Option<Mat<f64>> {
         let n = self.inverse_of_bottom.nrows();
         let mut x = Mat::from_fn(n, count.min(n), |i, j| f64::from(noise(i * count + j)));
@@ -177,6 +179,7 @@ impl<const B: usize, const C: usize> Hierarchy<B, C> {
                 let (group, own) = (i / C, &self.masses[i / C][i % C]);
                 (0..C).map(|c| own[c] * x[(group * C + c, j)]).sum()
             };
+            // M-orthonormalise by Cholesky of X'MX, then solve.
             let force = Mat::from_fn(n, x.ncols(), product);
             let l = dense_cholesky(gram(x.as_ref(), force.as_ref()))?;
             let orthonormal = solve_lower(&l, &force.transpose().to_owned()).transpose().to_owned();
@@ -212,7 +215,7 @@ impl<const B: usize, const C: usize> Levels for Hierarchy<B, C> {
     }
 }
 
-/// Entries of M, scaled, beside the blocks of a matrix that has one wherever M has an entry.
+/// Returns the scaled entries of M in the order of the blocks of `a`, which has a block wherever M has an entry.
 fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, scale: f64) -> Vec<f32> {
     let row = |node: usize| {
         let (others, values) = mass.row(node);
@@ -225,7 +228,7 @@ fn masses_beside<const B: usize>(a: &BlockMatrix<B, B>, mass: &SymmetricMatrix, 
     (0..a.n_rows()).into_par_iter().with_min_len(NODES).flat_map_iter(row).collect()
 }
 
-/// Columns with a largest entry of one, which stays within single precision; columns of zeros stay so.
+/// Scales columns to a largest entry of one, within the range of single precision. Zero columns stay zero.
 fn unit_columns(mut x: Mat<f64>) -> Mat<f64> {
     for mut column in x.col_iter_mut() {
         let size = column.norm_max();
@@ -236,7 +239,7 @@ fn unit_columns(mut x: Mat<f64>) -> Mat<f64> {
     x
 }
 
-/// Rigid modes node by node, each with a largest entry of one.
+/// Returns the rigid modes node by node, each scaled to a largest entry of one.
 fn unit_motions<const B: usize, const C: usize>(rigid: MatRef<'_, f64>) -> Motions<B, C> {
     let scale: [f64; C] = std::array::from_fn(|c| 1.0 / rigid.col(c).norm_max());
     let motion = |node: usize| -> [[f64; C]; B] {
@@ -245,7 +248,7 @@ fn unit_motions<const B: usize, const C: usize>(rigid: MatRef<'_, f64>) -> Motio
     (0..rigid.nrows() / B).map(motion).collect()
 }
 
-/// The matrix of a level, symmetric to the last bit.
+/// Returns the matrix of a level, exactly symmetric.
 fn dense<const C: usize>(a: &BlockMatrix<C, C>) -> Mat<f64> {
     let n = a.n_rows() * C;
     let mut dense = Mat::zeros(n, n);
@@ -261,7 +264,7 @@ fn dense<const C: usize>(a: &BlockMatrix<C, C>) -> Mat<f64> {
     Mat::from_fn(n, n, |i, j| 0.5 * (dense[(i, j)] + dense[(j, i)]))
 }
 
-/// What `work` makes of the columns of x, for `nodes` nodes.
+/// Applies `work` to the columns of x, [`WIDTH`] at a time; the result has `nodes` nodes.
 fn by_width<const R: usize, const S: usize>(
     x: &Mat<f64>,
     nodes: usize,
@@ -275,12 +278,12 @@ fn by_width<const R: usize, const S: usize>(
     y
 }
 
-/// Columns that are worked on together.
+/// Returns the ranges of columns that are processed together.
 fn widths(count: usize) -> impl Iterator<Item = Range<usize>> {
     (0..count).step_by(WIDTH).map(move |first| first..count.min(first + WIDTH))
 }
 
-/// Up to [`WIDTH`] columns, node by node; the missing ones are zero.
+/// Returns up to [`WIDTH`] columns, node by node; unused columns are zero.
 fn packed<const B: usize>(x: MatRef<'_, f64>) -> Vec<Rows<B>> {
     let rows = |node: usize| {
         let mut rows = [[0.0; WIDTH]; B];
@@ -306,8 +309,7 @@ mod tests {
     use super::*;
     use crate::{CscMatrix, symmetric_eigen};
 
-    /// Points of unit mass on a grid, with springs between neighbours, across the cells too: rigid motion
-    /// costs nothing.
+    /// Grid of points of unit mass, with springs between neighbours, also across the cells: rigid motion has no energy.
     struct Lattice {
         places: Vec<[f64; 3]>,
         stiffness: SymmetricMatrix,
@@ -375,7 +377,7 @@ mod tests {
         }
     }
 
-    /// One cycle for (K + tau M) x = b.
+    /// Applies one cycle for (K + tau M) x = b.
     fn solved(levels: &Hierarchy<3, 6>, b: &Mat<f64>) -> Mat<f64> {
         by_width(b, levels.fine.nodes(), |b| levels.cycle(&b)) * faer::Scale(1.0 / levels.size)
     }
@@ -396,7 +398,7 @@ mod tests {
             .chain([levels.inverse_of_bottom.nrows()])
             .collect();
         assert!(rows.len() == 3 && rows.is_sorted_by(|a, b| a > &(4 * b)), "{rows:?}");
-        // A width of columns and two that leave most of another empty.
+        // One full width of columns, and a second one with two columns.
         let mut x = noise(pencil.n(), WIDTH + 2);
         let products = gram(x.as_ref(), solved(&levels, &x).as_ref());
         let size = products.norm_max();
@@ -434,7 +436,7 @@ mod tests {
         let half = solve_lower(&l, &gk);
         let projected = solve_lower(&l, &half.transpose().to_owned());
         let found = symmetric_eigen(projected.as_ref()).expect("eigenvalues").values;
-        // The last ones of a block are its guards.
+        // The last columns of the block are guards.
         for k in 6..10 {
             assert!(found[k] < 1.5 * exact[k], "mode {k}: {} {}", found[k], exact[k]);
         }

@@ -1,4 +1,4 @@
-//! A level: its smoother and the way to the next coarser one.
+//! Level of the hierarchy: its smoother, and the transfer to the next coarser level.
 
 use super::blocks::{BlockMatrix, Rows};
 use super::coarsening::{
@@ -7,10 +7,11 @@ use super::coarsening::{
 };
 use super::smoother::Smoother;
 
-/// Factor of the smoothed prolongation beside the largest eigenvalue: the least energy of it.
+/// Factor of the prolongation smoother relative to the inverse of the largest eigenvalue: it gives the prolongation the
+/// least energy.
 const PROLONGATION: f64 = 4.0 / 3.0;
 
-/// A level with blocks of `B` rows, above one whose groups have `C` motions.
+/// Level with blocks of `B` rows, above a level whose groups have `C` motions.
 #[derive(Debug)]
 pub(super) struct Level<const B: usize, const C: usize> {
     smoother: Smoother<B>,
@@ -20,18 +21,18 @@ pub(super) struct Level<const B: usize, const C: usize> {
     masses: Vec<Block<B, B>>,
 }
 
-/// What the next coarser level is made of.
+/// Data from which the next coarser level is made.
 pub(super) struct Coarse<const C: usize> {
     pub a: BlockMatrix<C, C>,
     pub motions: Motions<C, C>,
-    /// Masses of the groups along their motions, as far as these are not smoothed.
+    /// Masses of the groups along their motions before smoothing.
     pub masses: Vec<Block<C, C>>,
 }
 
 impl<const B: usize, const C: usize> Level<B, C> {
-    /// From a matrix and the motions that cost next to no energy. Neighbours are strongly coupled from
-    /// `least_coupling` of the diagonal on. `None` where a node's own block is not positive definite, or the
-    /// next level would not be smaller.
+    /// Builds the level from a matrix and the motions of almost no energy. Neighbours are strongly coupled if their
+    /// coupling exceeds `least_coupling` relative to the diagonal. Returns `None` if a diagonal block is not positive
+    /// definite, or if the next level would not be smaller.
     pub(super) fn new(
         matrix: &impl SymmetricBlocks<B>,
         motions: &Motions<B, C>,
@@ -40,10 +41,12 @@ impl<const B: usize, const C: usize> Level<B, C> {
     ) -> Option<(Self, Coarse<C>)> {
         let diagonal = diagonal(matrix);
         let inverse: Vec<[[f64; B]; B]> = diagonal.iter().map(inverse).collect::<Option<_>>()?;
+        // Groups of strongly coupled nodes, with a basis of their motions.
         let groups = Aggregates::new(&strong_couplings(matrix, &diagonal, least_coupling), motions);
         if groups.count * C >= matrix.nodes() * B {
             return None;
         }
+        // Smoothed prolongation P, and the coarse matrix P'AP.
         let smoother = Smoother::new(stored(matrix), inverse.iter().map(narrow).collect())?;
         let p = groups.smoothed(matrix, &inverse, PROLONGATION / f64::from(smoother.largest));
         let r = p.transposed(groups.count);
@@ -60,7 +63,7 @@ impl<const B: usize, const C: usize> Level<B, C> {
         self.smoother.matrix()
     }
 
-    /// One symmetric cycle for A x = b: smoothing, the coarser levels by `solve_coarse`, smoothing.
+    /// Applies one symmetric cycle for A x = b: smoothing, the coarser levels by `solve_coarse`, smoothing.
     pub(super) fn cycle(
         &self,
         b: &[Rows<B>],
@@ -72,17 +75,17 @@ impl<const B: usize, const C: usize> Level<B, C> {
         self.smoother.smooth(b, &x)
     }
 
-    /// M x with the masses of the nodes.
+    /// Returns M x with the masses of the nodes.
     pub(super) fn with_mass(&self, x: &[Rows<B>]) -> Vec<Rows<B>> {
         x.iter().zip(&self.masses).map(|(x, mass)| mass_times(mass, x)).collect()
     }
 
-    /// P' x.
+    /// Returns P' x.
     pub(super) fn restricted(&self, x: &[Rows<B>]) -> Vec<Rows<C>> {
         self.r.apply(x, |_, rx| *rx)
     }
 
-    /// P y.
+    /// Returns P y.
     pub(super) fn prolonged(&self, coarse: &[Rows<C>]) -> Vec<Rows<B>> {
         self.p.apply(coarse, |_, px| *px)
     }

@@ -1,6 +1,6 @@
-//! Approximate solution with K + tau M without a factor of it: cycles of smoothed aggregation (Vanek, Mandel
-//! and Brezina, Computing 56 (1996) 179) whose coarser levels hold the rigid motions of groups of nodes.
-//! Single precision throughout; the same bits on any number of threads.
+//! Approximate solution with K + tau M without a factor, by cycles of smoothed aggregation (Vanek, Mandel and Brezina,
+//! Computing 56 (1996) 179). The coarser levels hold the rigid motions of groups of nodes. All numbers are in single
+//! precision; the bits do not depend on the number of threads.
 
 mod aggregates;
 mod blocks;

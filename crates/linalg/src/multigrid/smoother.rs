@@ -1,5 +1,5 @@
-//! The matrix of a level and the Chebyshev iteration that damps what a coarser level cannot see (Adams,
-//! Brezina, Hu and Tuminaro, J. Comput. Phys. 188 (2003) 593), preconditioned by the blocks of the nodes.
+//! Matrix of a level, with the Chebyshev iteration that damps the errors that a coarser level cannot represent (Adams,
+//! Brezina, Hu and Tuminaro, J. Comput. Phys. 188 (2003) 593), preconditioned by the diagonal blocks of the nodes.
 
 use super::blocks::{BlockMatrix, Rows, WIDTH, noise};
 use crate::symmetric_eigen;
@@ -7,27 +7,28 @@ use faer::Mat;
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 
-/// Nodes per parallel task.
+/// Number of nodes per parallel task.
 const NODES: usize = 1024;
 
-/// Lanczos steps that bound the spectrum, and by how much their result is raised.
+/// Number of Lanczos steps for the bound of the spectrum.
 const LANCZOS_STEPS: usize = 10;
+/// Factor by which the result of the Lanczos steps is raised to become an upper bound.
 const RAISED: f64 = 1.05;
 
-/// Lower end of the part of the spectrum that is damped, beside its upper end.
+/// Lower end of the damped part of the spectrum, relative to its upper end.
 const DAMPED_FROM: f64 = 0.12;
 
-/// A symmetric positive definite A with the inverses of its diagonal blocks.
+/// Symmetric positive definite A with the inverses of its diagonal blocks.
 #[derive(Debug)]
 pub(super) struct Smoother<const B: usize> {
     a: BlockMatrix<B, B>,
     inverse: Vec<[[f32; B]; B]>,
-    /// An upper bound, nearly, of the eigenvalues of D^-1 A.
+    /// Approximate upper bound of the eigenvalues of D^-1 A.
     pub largest: f32,
 }
 
 impl<const B: usize> Smoother<B> {
-    /// `None` where D^-1 A has no largest eigenvalue.
+    /// Creates the smoother; `None` if the largest eigenvalue of D^-1 A is not finite and positive.
     pub(super) fn new(a: BlockMatrix<B, B>, inverse: Vec<[[f32; B]; B]>) -> Option<Self> {
         let mut own = Self { a, inverse, largest: 0.0 };
         own.largest = (RAISED * own.largest_eigenvalue()?) as f32;
@@ -42,7 +43,7 @@ impl<const B: usize> Smoother<B> {
         &self.a
     }
 
-    /// D^-1 x of a node.
+    /// Returns D^-1 x of a node.
     #[inline(always)]
     fn divided(&self, node: usize, x: &Rows<B>) -> Rows<B> {
         let inverse = &self.inverse[node];
@@ -57,13 +58,13 @@ impl<const B: usize> Smoother<B> {
         y
     }
 
-    /// The largest eigenvalue of D^-1 A, nearly: Lanczos steps in the inner product of D, from a random vector
-    /// in each column.
+    /// Returns an approximation of the largest eigenvalue of D^-1 A, by Lanczos steps in the inner product of D from a
+    /// random vector in each column. `None` if it is not finite and positive.
     fn largest_eigenvalue(&self) -> Option<f64> {
         let start = |node: usize| -> Rows<B> {
             std::array::from_fn(|b| std::array::from_fn(|w| noise((node * B + b) * WIDTH + w)))
         };
-        // u = D v, and the one of the step before.
+        // u = D v of the current and of the previous step.
         let mut u: Vec<Rows<B>> = (0..self.nodes()).map(start).collect();
         let mut u_before = vec![[[0.0; WIDTH]; B]; u.len()];
         let (mut diagonals, mut lengths) = (Vec::new(), Vec::new());
@@ -76,7 +77,7 @@ impl<const B: usize> Smoother<B> {
             let mut next = self.a.apply(&v, |_, av| *av);
             let along = products(&v, &next);
             let own = along.map(|along| along as f32);
-            // The first has none before it.
+            // The first step has no predecessor.
             let before = length.map(|length| if diagonals.is_empty() { 0.0 } else { length as f32 });
             next.par_iter_mut().with_min_len(NODES).enumerate().for_each(|(node, next)| {
                 for b in 0..B {
@@ -89,6 +90,7 @@ impl<const B: usize> Smoother<B> {
             lengths.push(length);
             u_before = std::mem::replace(&mut u, next);
         }
+        // Largest eigenvalue of each tridiagonal matrix; the largest of all columns counts.
         let of_column = |w: usize| {
             let entry = |i: usize, j: usize| match i.abs_diff(j) {
                 0 => diagonals[i][w],
@@ -103,7 +105,7 @@ impl<const B: usize> Smoother<B> {
         (found.len() == WIDTH && largest > 0.0 && largest.is_finite()).then_some(largest)
     }
 
-    /// Two steps of the iteration for A x = b from x = 0.
+    /// Makes two steps of the iteration for A x = b from x = 0.
     pub(super) fn smoothed_from_zero(&self, b: &[Rows<B>]) -> Vec<Rows<B>> {
         let (arch, scale) = (Arch::new(), self.steps().first);
         let first = |(node, b)| arch.dispatch(FirstStep { smoother: self, scale, node, b });
@@ -111,7 +113,7 @@ impl<const B: usize> Smoother<B> {
         self.second_step(b, &x, |node| x[node])
     }
 
-    /// Two steps of the iteration for A x = b.
+    /// Makes two steps of the iteration for A x = b.
     pub(super) fn smooth(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
         let scale = self.steps().first;
         let once = self.a.apply(x, |node, ax| {
@@ -121,7 +123,7 @@ impl<const B: usize> Smoother<B> {
         self.second_step(b, &once, |node| minus(&once[node], &x[node]))
     }
 
-    /// x + kept d + turned D^-1 (b - A x) for the step d of each node that led to x.
+    /// Returns x + kept d + second D^-1 (b - A x), with the step d of each node that led to x.
     fn second_step(
         &self,
         b: &[Rows<B>],
@@ -136,7 +138,7 @@ impl<const B: usize> Smoother<B> {
         })
     }
 
-    /// Factors of the Chebyshev iteration on the part of the spectrum that is damped.
+    /// Returns the factors of the Chebyshev iteration on the damped part of the spectrum.
     fn steps(&self) -> Steps {
         let high = f64::from(self.largest);
         let low = DAMPED_FROM * high;
@@ -149,13 +151,13 @@ impl<const B: usize> Smoother<B> {
         }
     }
 
-    /// b - A x.
+    /// Returns b - A x.
     pub(super) fn residual(&self, b: &[Rows<B>], x: &[Rows<B>]) -> Vec<Rows<B>> {
         self.a.apply(x, |node, ax| minus(&b[node], ax))
     }
 }
 
-/// scale D^-1 b of a node.
+/// First step from zero: scale D^-1 b of a node.
 struct FirstStep<'a, const B: usize> {
     smoother: &'a Smoother<B>,
     scale: f32,
@@ -174,7 +176,7 @@ impl<const B: usize> WithSimd for FirstStep<'_, B> {
     }
 }
 
-/// Factors of the first step, of what is kept of it in the second, and of the second.
+/// Factor of the first step, of its repetition in the second step, and of the second correction.
 struct Steps {
     first: f32,
     kept: f32,
@@ -186,7 +188,7 @@ fn minus<const B: usize>(b: &Rows<B>, ax: &Rows<B>) -> Rows<B> {
     std::array::from_fn(|i| std::array::from_fn(|w| b[i][w] - ax[i][w]))
 }
 
-/// Products of the columns of two blocks: sums of fixed pieces, one after the other.
+/// Returns the products of the columns of two blocks, as sums over fixed pieces in fixed order.
 pub(super) fn products<const B: usize>(x: &[Rows<B>], y: &[Rows<B>]) -> [f64; WIDTH] {
     let piece = |(x, y): (&[Rows<B>], &[Rows<B>])| {
         let mut sums = [0.0; WIDTH];

@@ -1,5 +1,5 @@
-//! How what a body lacks answers to the forces that its motion leaves unbalanced: with inertia of its own,
-//! and together with the modes that the body has.
+//! Dynamic response of the truncated part of the model to the forces that the reduced motion leaves unbalanced, with
+//! the inertia of the static responses and their coupling to the modes of the body.
 
 use super::compressed::principal;
 use super::grid::Grid;
@@ -13,64 +13,69 @@ use flexbody_motion::scene::{Interpolation, Sample, Samples};
 use nalgebra::Vector1;
 use std::ops::Range;
 
-/// Part of the trace of E'K E below which a direction is rounding.
+/// Part of the trace of E'K E at or below which a direction counts as rounding. A larger value drops directions of
+/// little elastic energy.
 pub(super) const ROUNDING: f64 = 1e-12;
 
-/// The equations of the displacements Psi y + E z that the modes Psi of a body and static responses E, which
-/// are K-orthogonal to these, have under the forces whose static responses are E c(t), and under forces M Psi
-/// m_ff^-1 g(t), which do g to the modes.
+/// Equations of motion of the displacements Psi y + E z. Psi are the modes of a body and E static responses that are
+/// K-orthogonal to the modes. The loads are the forces whose static responses are E c(t), and the forces M Psi m_ff^-1
+/// g(t), whose modal forces are g.
 pub(super) struct Lacking {
-    /// K_ff and m_ff of the modes that follow (nf x nf); none of them: 0 x 0.
+    /// Stiffness K_ff and mass m_ff of the modes that respond (nf x nf). Both are 0 x 0 if no mode responds.
     pub modal_stiffness: Mat<f64>,
     pub modal_mass: Mat<f64>,
     pub damping: LackingDamping,
-    /// Psi'M E (nf x k).
+    /// Coupling mass Psi'M E of modes and responses (nf x k).
     pub shared_mass: Mat<f64>,
-    /// E'K E and E'M E (k x k).
+    /// Stiffness E'K E and mass E'M E of the responses (k x k).
     pub stiffness: Mat<f64>,
     pub mass: Mat<f64>,
 }
 
-/// Damping of the equations of all nodes.
+/// Damping in the equations of all nodes.
 pub(super) enum LackingDamping {
     /// Damping of the modes of the body, D_ff (nf x nf): D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M.
     OfModes(Mat<f64>),
-    /// Damping of the model: [Psi, E]'D [Psi, E] (nf + k square).
+    /// Damping of the model, projected on modes and responses: [Psi, E]'D [Psi, E] (nf + k square).
     OfModel(Mat<f64>),
 }
 
-/// Amplitudes (nf + k) x m: y of the modes, then z of the responses, at the instants.
+/// Amplitudes at all instants, with rates and accelerations. Each matrix is (nf + k) x m: y of the modes, then z of the
+/// responses.
 pub(super) struct Answer {
     pub value: Mat<f64>,
     pub rate: Mat<f64>,
     pub acceleration: Mat<f64>,
 }
 
-/// A motion of the modes and responses together with one frequency.
+/// Eigenmode of the system of modes and responses: an oscillator of unit stiffness with one natural frequency.
 #[derive(Debug, Clone, Copy)]
 struct Oscillator {
-    /// One over the square of its circular frequency.
+    /// Inverse square of the circular natural frequency.
     inertia: f64,
-    /// Twice its damping ratio over this frequency.
+    /// Twice the damping ratio over the circular natural frequency.
     damping: f64,
 }
 
 impl Lacking {
-    /// The motion
+    /// Integrates the equations of motion
     ///
     /// ```text
     /// [m_ff, Psi'M E; E'M Psi, E'M E] (y'', z'') + D (y', z') + (K_ff y, E'K E z)
     ///     = (g, E'K E c + E'M Psi m_ff^-1 g)
     /// ```
     ///
-    /// with c(t) and g(t) along cubic splines between the instants of `grid`, D being the damping of the
-    /// equations of all nodes, of which the diagonal counts in the own motions of the system. Each of these is
-    /// solved exactly. Where c changes slowly beside its frequency that is the static response; where it
-    /// changes as fast, or begins with a shock, the static response would be too small. What is missed drags
-    /// along modes that are no eigenvectors, by its inertia.
+    /// with c(t) and g(t) along cubic splines between the instants of `grid`. D is the damping of the equations of all
+    /// nodes; only its diagonal in the eigenmodes of the system is used. Each eigenmode is integrated exactly. If c
+    /// changes slowly compared with the natural frequency, the result is the static response. If c changes as fast or
+    /// begins with a shock, the static response would be too small. The truncated part also moves modes that are not
+    /// eigenvectors, through the coupling mass.
     ///
-    /// * `amplitudes`: c (k x m); `in_modes`: g (nf x m); `settled`: whether it starts in equilibrium, z = c,
-    ///   and else from zero.
+    /// * `amplitudes`: c (k x m).
+    /// * `in_modes`: g (nf x m).
+    /// * `settled`: true if the motion starts in equilibrium, z = c; false if it starts from zero.
+    ///
+    /// Returns `None` if a decomposition fails.
     pub(super) fn answered(
         &self,
         amplitudes: &Mat<f64>,
@@ -82,12 +87,14 @@ impl Lacking {
         let seen = self.seen_by_modes(&shapes)?;
         let dampings = self.dampings(&shapes, &seen);
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
+        // Modal forces of the eigenmodes: x'(E'K E c) from the responses, seen'g from the modes.
         let of_responses = shapes.as_ref().subrows(nf, k).to_owned();
         let forces = combine(self.stiffness.as_ref(), amplitudes.as_ref());
         let mut static_part = gram(of_responses.as_ref(), forces.as_ref());
         static_part += gram(seen.as_ref(), in_modes.as_ref());
         let zeros = || Mat::<f64>::zeros(shapes.ncols(), grid.times.len());
         let (mut value, mut rate, mut acceleration) = (zeros(), zeros(), zeros());
+        // Integrate each eigenmode, then transform back to y and z.
         for j in 0..shapes.ncols() {
             let own = Oscillator { inertia: inertias[j], damping: dampings[j] };
             let force: Vec<f64> = (0..grid.times.len()).map(|i| static_part[(j, i)]).collect();
@@ -99,9 +106,11 @@ impl Lacking {
         Some(Answer { value: back(value), rate: back(rate), acceleration: back(acceleration) })
     }
 
-    /// Motions with one frequency each, of unit stiffness, in columns, and their inertias.
+    /// Returns the eigenmodes, scaled to unit stiffness, in columns, and their inertias (inverse squares of the
+    /// circular frequencies).
     fn own_motions(&self) -> Option<(Mat<f64>, Vec<f64>)> {
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
+        // A basis of unit stiffness: L'^-1 for the modes (K_ff = L L'), principal directions for the responses.
         let (turned, roots) = principal(self.stiffness.clone(), ROUNDING, usize::MAX)?;
         let lower = dense_cholesky(self.modal_stiffness.clone())?;
         let of_modes = solve_upper(&lower, &Mat::identity(nf, nf));
@@ -110,6 +119,7 @@ impl Lacking {
             (false, false) => turned[(i - nf, j - nf)] / roots[j - nf],
             _ => 0.0,
         });
+        // The eigenvectors of the mass in that basis decouple both matrices.
         let mass = Mat::from_fn(nf + k, nf + k, |i, j| match (i < nf, j < nf) {
             (true, true) => self.modal_mass[(i, j)],
             (true, false) => self.shared_mass[(i, j - nf)],
@@ -121,7 +131,7 @@ impl Lacking {
         Some((combine(unit.as_ref(), own.vectors.as_ref()), own.values))
     }
 
-    /// m_ff^-1 Psi'M x of the own motions x: their part in the modes.
+    /// Returns the part of each eigenmode x in the modes, m_ff^-1 Psi'M x.
     fn seen_by_modes(&self, shapes: &Mat<f64>) -> Option<Mat<f64>> {
         let (nf, k) = (self.modal_mass.nrows(), self.mass.nrows());
         let lower = dense_cholesky(self.modal_mass.clone())?;
@@ -132,7 +142,8 @@ impl Lacking {
         Some(seen)
     }
 
-    /// x'D x of the own motions x; those of the modes act on the parts `seen` by these.
+    /// Returns the modal damping x'D x of each eigenmode x. Damping of the modes acts on `seen`, the part of x in the
+    /// modes.
     fn dampings(&self, shapes: &Mat<f64>, seen: &Mat<f64>) -> Vec<f64> {
         let (damping, parts) = match &self.damping {
             LackingDamping::OfModes(damping) => (damping, seen),
@@ -145,7 +156,7 @@ impl Lacking {
 }
 
 impl Oscillator {
-    /// Value, rate and acceleration at every instant of x with inertia x'' + damping x' + x = s(t).
+    /// Returns value, rate and acceleration at every instant of the solution of inertia x'' + damping x' + x = s(t).
     fn follow(self, force: &[f64], grid: &Grid, settled: bool) -> Vec<[f64; 3]> {
         let mut seen = Vec::with_capacity(force.len());
         let mut state = [if settled { force[0] } else { 0.0 }, 0.0];
@@ -181,12 +192,13 @@ impl Oscillator {
         seen.push(self.motion(now, third, state));
     }
 
-    /// Whether it has an inertia at all.
+    /// Returns true if the oscillator has inertia.
     fn moves(self) -> bool {
         self.inertia > 0.0
     }
 
-    /// The motion without oscillation under a force of these derivatives and the third: a polynomial.
+    /// Returns the particular solution, with its two derivatives, for a cubic force: a polynomial. `force` holds value,
+    /// first and second derivative; `third` is the third derivative.
     fn steady(self, force: [f64; 3], third: f64) -> [f64; 3] {
         let Self { inertia: b, damping: a } = self;
         let [s, s1, s2] = force;
@@ -198,12 +210,12 @@ impl Oscillator {
         ]
     }
 
-    /// Half the damping over the inertia: the rate at which an oscillation fades.
+    /// Returns the decay rate of a free oscillation: half the damping over the inertia.
     fn decay(self) -> f64 {
         0.5 * self.damping / self.inertia
     }
 
-    /// Value, rate and acceleration.
+    /// Returns value, rate and acceleration of the oscillator in the given state.
     fn motion(self, force: [f64; 3], third: f64, state: &[f64; 2]) -> [f64; 3] {
         if !self.moves() {
             return force;
@@ -214,7 +226,7 @@ impl Oscillator {
         [state[0], state[1], steady[2] - 2.0 * decay * speed - away / self.inertia]
     }
 
-    /// Value and rate after a step in which the third derivative of the force is constant.
+    /// Returns value and rate after a step in which the third derivative of the force is constant.
     fn after(self, now: [f64; 3], next: [f64; 3], third: f64, step: f64, state: [f64; 2]) -> [f64; 2] {
         if !self.moves() {
             return [next[0], next[1]];
@@ -239,7 +251,7 @@ mod tests {
         Grid { times, pieces: Vec::from([whole]) }
     }
 
-    /// No forces on the modes.
+    /// Returns modal forces that are zero.
     fn none(system: &Lacking, grid: &Grid) -> Mat<f64> {
         Mat::zeros(system.modal_mass.nrows(), grid.times.len())
     }
@@ -256,8 +268,7 @@ mod tests {
         }
     }
 
-    /// Two oscillators that share no coordinate, of circular frequencies 2 and 50, pushed along a ramp and by
-    /// a step.
+    /// Two uncoupled oscillators of circular frequencies 2 and 50, loaded by a ramp and by a step.
     #[test]
     fn oscillators_follow_ramps_and_steps() {
         let system = alone([4.0, 2500.0]);
@@ -280,8 +291,8 @@ mod tests {
         );
     }
 
-    /// A force that swings slowly beside the frequency of what answers: the second derivative of the spline
-    /// through it counts, and nothing rings.
+    /// The force oscillates slowly compared with the natural frequencies. The response has the acceleration of the
+    /// force's spline and does not ring.
     #[test]
     fn a_slow_swing_has_the_acceleration_of_a_swing() {
         let system = alone([1e4, 1e6]);
@@ -300,8 +311,8 @@ mod tests {
         }
     }
 
-    /// A damped mode, of mass 1, that a response drags along by the mass that they share: the equations hold,
-    /// as differences of the motion tell.
+    /// A mode of mass 1 is coupled to a response by their common mass. Finite differences of the motion satisfy the
+    /// equations.
     #[test]
     fn what_is_missed_moves_the_modes_by_its_inertia() {
         let one = |value: f64| Mat::full(1, 1, value);
@@ -334,7 +345,7 @@ mod tests {
             assert!(balance.iter().all(|left| left.abs() < 1e-5), "{i}: {balance:?}");
         }
         assert!((0..grid.times.len()).any(|i| value[(0, i)].abs() > 0.01), "the mode moves");
-        // With damping, of which the diagonal counts: what a Runge-Kutta method of order 4 makes of it.
+        // The reference values with damping come from a Runge-Kutta method of order 4.
         let damped = Lacking { damping: LackingDamping::OfModes(one(0.4)), ..system };
         let steady = Mat::full(1, grid.times.len(), 1.0);
         let pushed = damped.answered(&steady, &none(&damped, &grid), &grid, false).expect("a motion").value;

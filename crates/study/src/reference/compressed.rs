@@ -1,27 +1,28 @@
-//! Many forces as combinations of a few (proper orthogonal decomposition).
+//! Compression of many force vectors to a few by proper orthogonal decomposition.
 
 use faer::Mat;
 use flexbody_linalg::{combine, gram, symmetric_eigen};
 use flexbody_model::FeModel;
 
-/// Part of the sum of squares, weighted by the inverse of the diagonal of K, that may be left out.
+/// Part of the sum of squares (weighted by the inverse diagonal of K) that compression may drop. A larger value keeps
+/// fewer forces.
 const LEFT_OUT: f64 = 1e-12;
 
-/// Combinations at the most.
+/// Largest number of compressed forces. Memory and static responses grow with it.
 pub(super) const MOST_FORCES: usize = 32;
 
-/// A basis B (N x k) of forces F that is orthonormal where each row counts by one over the diagonal of K:
-/// about the energy that a force does work with at that row alone.
+/// Basis B (N x k) of forces F, orthonormal in the norm that weights each row by the inverse diagonal of K. This norm
+/// is about the energy of a force that acts at one row alone.
 pub(super) struct Compressed {
     pub basis: Mat<f64>,
-    /// Roots of these weights, and the basis times them.
+    /// Square roots of the row weights (N), and the basis multiplied by them (N x k).
     weights: Vec<f64>,
     weighted: Mat<f64>,
 }
 
 impl Compressed {
-    /// The first principal directions of `forces` (N x m). Nothing where the forces are zero, or beyond the
-    /// range of numbers.
+    /// Computes the first principal directions of `forces` (N x m). Returns `None` if the forces are zero or not
+    /// finite.
     pub(super) fn new(model: &FeModel, forces: &Mat<f64>) -> Option<Self> {
         let diagonal = model.stiffness().diagonal();
         let weights: Vec<f64> =
@@ -39,15 +40,16 @@ impl Compressed {
         Some(Self { basis, weights, weighted })
     }
 
-    /// C (k x m) with B C next to the `forces` F (N x m).
+    /// Returns C (k x m) such that B C is the best approximation of `forces` F (N x m) in the weighted norm.
     pub(super) fn amplitudes(&self, forces: &Mat<f64>) -> Mat<f64> {
         let weighted = Mat::from_fn(forces.nrows(), forces.ncols(), |i, j| self.weights[i] * forces[(i, j)]);
         gram(self.weighted.as_ref(), weighted.as_ref())
     }
 }
 
-/// Eigenvectors (m x k) of a Gram matrix and the roots of their eigenvalues, descending, up to the part
-/// `left_out` of their sum and at most `most`. `None` where there is nothing.
+/// Returns eigenvectors (m x k) of a Gram matrix and the square roots of their eigenvalues, in descending order. It
+/// stops when the remaining eigenvalues sum to at most `left_out` of the whole, or after `most` vectors. Returns `None`
+/// if the matrix is zero or not finite.
 pub(super) fn principal(gram: Mat<f64>, left_out: f64, most: usize) -> Option<(Mat<f64>, Vec<f64>)> {
     let eigen = symmetric_eigen(gram.as_ref())?;
     let sum: f64 = eigen.values.iter().map(|v| v.max(0.0)).sum();

@@ -1,4 +1,4 @@
-//! A body that is enriched for a scene until what it lacks of its model no longer counts.
+//! Enrichment of a body for a scene, until its truncation error is small compared with the tolerances.
 
 use super::estimate::{Estimate, PART_OF_FINE, PART_OF_REFERENCE, ReferenceError};
 use faer::Mat;
@@ -9,25 +9,28 @@ use flexbody_linalg::side_by_side;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{LoadCases, Scene};
 
-/// What a body still lacks, relative to the one before it, for its modes to be worth their cost: the first
-/// responses may leave most of what has inertia to those of the next round.
+/// Largest ratio of the truncation error to that of the previous round at which another round is made. The value is
+/// close to one because the first responses may leave most of the error from inertia to the next round. A smaller value
+/// gives up earlier.
 const WORTH: f64 = 0.9;
 
-/// How often a body is enriched at the most, and one that has to come close to the model.
+/// Largest number of enrichment rounds for an ordinary reference.
 const MOST_ROUNDS: usize = 4;
+/// Largest number of enrichment rounds for a reference that stands for the motion of all nodes.
 const MOST_ROUNDS_OF_FINE: usize = 12;
 
-/// How far a body is enriched.
+/// Settings of an enrichment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Enrichment {
-    /// Whether it can be enriched at all: what it lacks is estimated in any case.
+    /// True if the body may be enriched. The truncation error is estimated in any case.
     pub grows: bool,
-    /// Whether it has to come within [`PART_OF_FINE`] of the tolerances instead of [`PART_OF_REFERENCE`].
+    /// True if the truncation error must be within [`PART_OF_FINE`] of the tolerances, instead of
+    /// [`PART_OF_REFERENCE`].
     pub is_fine: bool,
 }
 
 impl Enrichment {
-    /// Part of the tolerances that the body may lack of its model.
+    /// Returns the part of the tolerances that the truncation error may take.
     pub fn enough(&self) -> f64 {
         if self.is_fine { PART_OF_FINE } else { PART_OF_REFERENCE }
     }
@@ -41,23 +44,27 @@ impl Enrichment {
     }
 }
 
-/// A body that is enriched for the load cases of a scene.
+/// Result of [`enrich`]: a body that is enriched for the load cases of a scene.
 #[derive(Debug, Clone)]
 pub struct Enriched<B> {
-    /// What the body was last made as.
+    /// Last result of the closure `make`.
     pub made: B,
-    /// For each load case the estimated errors of every body on the way, the last one that of `made`; empty where
-    /// nothing can be estimated.
+    /// Estimated errors of the body in every round, for each load case. The last entry belongs to `made`. A list is
+    /// empty if nothing can be estimated.
     pub rounds: Vec<Vec<ReferenceError>>,
 }
 
-/// Makes a body of `model` with `make`, which gets nodal forces (N x k) whose static responses the body shall
-/// have beside its modes, none at first. As long as the body lacks more than [`Enrichment::enough`] of the
-/// tolerances of a load case in its own motion, the forces that its motion leaves unbalanced at the nodes join
-/// these, while that pays in one of them. A case in which it no longer pays asks for nothing more.
+/// Makes a body of `model` and enriches it for the load cases.
+///
+/// `make` receives nodal forces (N x k) and returns a body whose basis contains their static responses beside its
+/// modes; the first call receives no forces. In every round the truncation error is estimated along the body's own
+/// motion. If the error in a load case exceeds [`Enrichment::enough`] of the tolerances, the forces that this motion
+/// leaves unbalanced are added. A load case whose error no longer decreases adds no more forces. The process ends if no
+/// case asks for more or if the last round improved no case. `body` returns the body of a result of `make`.
 ///
 /// # Errors
-/// Those of `make` and of [`trace`](flexbody_motion::scene::trace).
+/// The errors of `make` and of [`trace`](flexbody_motion::scene::trace); FB225 if both scene and model state a
+/// damping.
 pub fn enrich<B>(
     model: &FeModel,
     cases: &LoadCases,
@@ -82,10 +89,11 @@ pub fn enrich<B>(
         }
         let paid = asking.iter().zip(&estimates).any(|(case, own)| case.was_paid(own.as_ref()));
         if let (Some(earlier), false) = (poorer.take(), paid) {
-            // A shock excites modes without end: no number of responses follows it.
+            // A shock excites modes of every frequency: no number of responses suffices.
             made = earlier;
             break;
         }
+        // Collect the forces that each case asks for.
         let mut wanted = vec![loads];
         for (case, estimate) in asking.iter_mut().zip(estimates) {
             wanted.extend(estimate.and_then(|estimate| case.hear(estimate, enough)));
@@ -100,19 +108,18 @@ pub fn enrich<B>(
     Ok(Enriched { made, rounds: asking.into_iter().map(|case| case.rounds).collect() })
 }
 
-/// What a load case has asked for so far.
+/// State of a load case during enrichment.
 #[derive(Debug, Clone, Default)]
 struct Asking {
     rounds: Vec<ReferenceError>,
-    /// Whether responses to its motion joined the last body.
+    /// True if responses to the motion of this case were added to the last body.
     asked: bool,
-    /// Whether responses to its motion did not pay.
+    /// True if added responses did not reduce the error of this case enough.
     gave_up: bool,
 }
 
 impl Asking {
-    /// Whether the last body, which has what this case asked for, lacks less than the one before it by as
-    /// much as pays.
+    /// Returns true if the last body contains forces of this case and its error decreased by enough.
     fn was_paid(&self, now: Option<&Estimate>) -> bool {
         match (self.rounds.last(), now) {
             (Some(before), Some(now)) if self.asked => !Self::in_vain(before, &now.error),
@@ -124,8 +131,8 @@ impl Asking {
         now.worst > WORTH * before.worst
     }
 
-    /// Notes what the body lacks, and answers the forces whose responses this case asks for where that is more
-    /// than `enough`.
+    /// Records the estimated error. Returns the forces that this case asks for, if its error exceeds `enough` and
+    /// enrichment still helps.
     fn hear(&mut self, estimate: Estimate, enough: f64) -> Option<Mat<f64>> {
         let Estimate { error, missing } = estimate;
         self.gave_up |= self.asked && self.rounds.last().is_some_and(|before| Self::in_vain(before, &error));

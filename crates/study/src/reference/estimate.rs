@@ -1,4 +1,4 @@
-//! What a body lacks of the model that it was made of, estimated along its motion in a scene.
+//! Estimate of the truncation error of a body along its motion in a scene.
 
 use super::grid::Grid;
 use super::lack::{Lack, LackErrors, energy_scale};
@@ -17,60 +17,59 @@ use flexbody_motion::scene::{
     Instant, OutputErrors, Point, Scene, Stage, Trace, damped_once, instants, nodal_point, trace,
 };
 
-/// Part of the tolerances that the reference of a study may lack of the model without a word.
+/// Part of the tolerances that the truncation error of a study's reference may take without a warning.
 pub const PART_OF_REFERENCE: f64 = 0.1;
 
-/// The same of a reference that stands for the motion of all nodes.
+/// Part of the tolerances that the truncation error may take for a reference that stands for the motion of all nodes.
 pub const PART_OF_FINE: f64 = 0.01;
 
-/// Part of the tolerances that a body may lack of the model and still be a reference: others get the rest.
+/// Part of the tolerances that the truncation error of a reference may take at most. The candidates get the rest.
 pub const MOST_LACKING: f64 = 0.5;
 
-/// The elastic energy of what the body lacks, after so many responses of the motion joined it, is below this
-/// part of what is allowed.
+/// Part of the allowed error. The dominant responses leave an elastic energy whose square root is at most this part. A
+/// smaller value adds more responses in each round.
 const PART_OF_RESPONSES: f64 = 0.1;
 
-/// The reason why nothing is known of a motion that would have to be looked at too often.
+/// Reason given if following the motion would take too many instants.
 const TOO_MUCH: &str = "its motion has too many periods or breaks to follow them all";
 
-/// A mode that is lacking and would have less than this part of what the tolerances allow of the root of the elastic
-/// energy is not looked for.
+/// Part of the tolerances, as a root of the elastic energy, below which a resonance of a truncated mode is ignored.
 const PART_OF_RESONANCE: f64 = 0.05;
 
-/// What a body lacks of the model that it was made of, in a scene.
+/// Estimated truncation error of a body in a scene, relative to the model that it was made of.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReferenceError {
     /// Number of modes of the body.
     pub modes: usize,
-    /// Its errors against the motion of all nodes, estimated: the responses, with their inertia, to what the
-    /// equations of all nodes leave unbalanced along its motion, how these move the modes that it has, how
-    /// they turn a free body, and what a prescribed motion takes of them. Infinite where they are unknown.
+    /// Estimated errors against the motion of all nodes. The estimate contains the static responses (with inertia) to
+    /// the forces that the equations of all nodes leave unbalanced, the motion of the modes that these cause, the
+    /// rotation of a free body, and the reaction of a prescribed motion. Infinite if unknown.
     pub errors: OutputErrors,
-    /// The largest of them over its tolerance.
+    /// Largest error over its tolerance.
     pub worst: f64,
-    /// When the estimate of the elastic energy is largest.
+    /// Time of the largest estimated elastic energy.
     pub time: f64,
-    /// The reason why nothing is known of the errors; `None` where they are known.
+    /// Reason why the errors are unknown; `None` if they are known.
     pub unknown: Option<&'static str>,
-    /// Effect of the rigid interfaces of the body, which the model has as well where the errors are estimated; `None`
-    /// for a body without.
+    /// Effect of the rigid interfaces of the body; the errors are estimated with these interfaces rigid in the model
+    /// too. `None` for a body without rigid interfaces.
     pub coupling: Option<CouplingEffect>,
 }
 
-/// The difference that rigid interfaces make in a scene.
+/// Effect of rigid interfaces in a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CouplingEffect {
     /// Names of the interfaces that no mode of the body deforms.
     pub interfaces: Vec<String>,
-    /// Estimated errors of the body against the model whose interfaces deform: of its coupling and of the modes that it
-    /// lacks together.
+    /// Estimated errors of the body against the model with deformable interfaces: effect of the coupling and truncation
+    /// error together.
     pub errors: OutputErrors,
-    /// The largest of them over its tolerance.
+    /// Largest error over its tolerance.
     pub worst: f64,
 }
 
 impl CouplingEffect {
-    /// The remark about the effect of the coupling in `scene`.
+    /// Returns the remark about the effect of the coupling.
     fn remark(&self) -> Diagnostic {
         let names: Vec<String> = self.interfaces.iter().map(|name| format!("`{name}`")).collect();
         let percent = |error: f64| format!("{:.2} %", 100.0 * error);
@@ -96,24 +95,24 @@ impl CouplingEffect {
 }
 
 impl ReferenceError {
-    /// The errors of a body of so many modes of which nothing is known.
+    /// Returns unknown (infinite) errors of a body with `modes` modes.
     fn unknown(modes: usize, reason: &'static str) -> Self {
         let all = f64::INFINITY;
         let errors = OutputErrors { reaction: None, ..OutputErrors::all(Some(all)) };
         Self { modes, errors, worst: all, time: 0.0, unknown: Some(reason), coupling: None }
     }
 
-    /// Whether others may be measured against the body: against what is left of the tolerances.
+    /// Returns true if other bodies may be measured against this body, within the rest of the tolerances.
     pub fn is_reference(&self) -> bool {
         self.worst <= MOST_LACKING
     }
 
-    /// The remark about rigid interfaces that the body and the model it is compared with have in common.
+    /// Returns the remark about rigid interfaces that the body and the compared model have in common.
     pub fn coupling_remark(&self) -> Option<Diagnostic> {
         self.coupling.as_ref().map(CouplingEffect::remark)
     }
 
-    /// The warning about a body that lacks more than `enough` of the tolerances.
+    /// Returns a warning if the truncation error exceeds `enough` of the tolerances, or is unknown.
     pub fn warning(&self, scene: &Scene, enough: f64) -> Option<Diagnostic> {
         if self.worst <= enough {
             return None;
@@ -144,21 +143,22 @@ impl ReferenceError {
     }
 }
 
-/// An estimate, and what would improve the body.
+/// Estimate of the truncation error, with the forces that would improve the body.
 pub(super) struct Estimate {
     pub error: ReferenceError,
-    /// Nodal forces (N x k) whose static responses the body lacks most, so many as it takes to come within
-    /// what is allowed.
+    /// Nodal forces (N x k) whose static responses the body needs most. Their number is the smallest that leaves an
+    /// error within the allowed part.
     pub missing: Mat<f64>,
 }
 
 impl Estimate {
-    /// Estimates what `body`, made of `model`, lacks in `scene`. `allowed` is the part of the tolerances that
-    /// it may lack. `None` where nothing can be said: for a scene without a duration, and a body that is
-    /// carried through a motion of very many periods.
+    /// Estimates the truncation error of `body`, made of `model`, in `scene`. `allowed` is the part of the tolerances
+    /// that the error may take. Returns `None` if no estimate is possible: the scene has no duration, the body has
+    /// other rows than the model, or its nodal view cannot be built. A motion with too many periods or breaks gives an
+    /// unknown (infinite) error.
     ///
     /// # Errors
-    /// Those of [`trace`] and of static responses.
+    /// The errors of [`trace`] and of the static responses.
     pub(super) fn new(
         model: &FeModel,
         body: &FlexBody,
@@ -166,6 +166,7 @@ impl Estimate {
         allowed: f64,
         context: &Context<'_>,
     ) -> Result<Option<Self>> {
+        // Bring body, scene and model into one frame, and check that they match.
         let Some(duration) = scene.run.duration else { return Ok(None) };
         let stage = Stage::new(body, scene)?;
         let given = scene.requirements.damping.is_some();
@@ -181,6 +182,7 @@ impl Estimate {
         let of_model = model.damping().filter(|_| !given);
         let view = |coupled| NodalView::new(coupled, body, loads.clone(), carrier.as_ref(), of_model);
         let Some(own) = view(coupled) else { return Ok(None) };
+        // Simulate the motion and choose the instants at which the residual forces are evaluated.
         let (motion, _) = trace(body, scene, &context.unheard())?;
         let Some(grid) = Grid::new(body, scene, &motion, duration) else {
             let error = ReferenceError::unknown(body.n_modes(), TOO_MUCH);
@@ -191,6 +193,7 @@ impl Estimate {
         let looked_at = instants(body, &same_steps, &grid.times)?;
         let beside =
             Beside { body, scene, motion: &motion, grid: &grid, looked_at: &looked_at, watched: &watched };
+        // Estimate the error under the body's coupling, then against deformable interfaces.
         let mut estimate = beside.estimate(&own, allowed)?;
         let deforms = || view(CoupledModel::uncoupled(model));
         if let Some(view) = (!interfaces.is_empty()).then(deforms).flatten() {
@@ -201,7 +204,7 @@ impl Estimate {
     }
 }
 
-/// A motion of a body that is compared with that of a model.
+/// Motion of a body, compared with that of its model.
 struct Beside<'a> {
     body: &'a FlexBody,
     scene: &'a Scene,
@@ -209,16 +212,18 @@ struct Beside<'a> {
     grid: &'a Grid,
     /// The motion at the instants of the grid.
     looked_at: &'a [Instant],
-    /// Weights of the points whose deflections count.
+    /// Nodal weights of the points whose deflections count.
     watched: &'a [Mat<f64>],
 }
 
 impl Beside<'_> {
-    /// Estimates what the body lacks of the model of `view`.
+    /// Estimates the truncation error of the body against the model of `view`.
     fn estimate(&self, view: &NodalView<'_>, allowed: f64) -> Result<Estimate> {
         let &Self { body, scene, motion, grid, looked_at, watched } = self;
         let tolerance = &scene.requirements.tolerance;
         let least = tolerance.errors.stress.min(tolerance.errors.deflection);
+        // A resonance counts above a small part of the tolerances; a free body has no missing mode below the
+        // certificate.
         let question = Question {
             settled: scene.initial.settled,
             negligible: PART_OF_RESONANCE * least * energy_scale(motion),
@@ -236,7 +241,7 @@ impl Beside<'_> {
     }
 }
 
-/// Circular frequency below which all modes were proved to be in the body; zero where nothing was.
+/// Circular frequency below which the body has all modes by certificate; zero without a certificate.
 fn complete_below(body: &FlexBody) -> f64 {
     let certificate = body.certificate();
     if certificate.proved_modes.is_some() { not_negative(certificate.shift).sqrt() } else { 0.0 }

@@ -1,4 +1,4 @@
-//! The instants that a motion is looked at, to see what the body lacks along it.
+//! Instants at which the truncation error is evaluated along a motion.
 
 use super::compressed::MOST_FORCES;
 use flexbody_body::flex_body::FlexBody;
@@ -6,43 +6,45 @@ use flexbody_motion::scene::{Scene, Trace, fastest_history, liveliest_rate};
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Intervals at the least.
+/// Smallest number of intervals of a motion.
 const LEAST: usize = 120;
 
-/// Amplitudes of modes and forces at all instants at the most: about 1.5 GB with their rates, their accelerations
-/// and what is made of them.
+/// Largest number of amplitudes of modes and forces at all instants together: about 1.5 GB with their rates,
+/// accelerations and derived arrays. A larger value follows longer motions and needs more memory.
 const MOST_AMPLITUDES: usize = 15_000_000;
 
-/// Forces that amplitudes are needed of: those that are compressed, and as many again of inertia and resonances.
+/// Number of forces with amplitudes: the compressed forces, and as many again for inertia and resonances.
 const FORCES: usize = 2 * MOST_FORCES;
 
-/// Intervals in the period of the fastest motion that counts, and the fewest that show it: a spline through
-/// so many values of an oscillation has its second derivative to 2 %, and to 5 %.
+/// Intervals per period of the fastest motion that counts. The second derivative of a spline through an oscillation is
+/// then accurate to 2 %.
 const PER_PERIOD: f64 = 12.0;
+/// Smallest number of intervals per period: the second derivative of the spline is accurate to 5 %.
 const FEWEST_PER_PERIOD: f64 = 8.0;
 
-/// Intervals between two breaks at the least.
+/// Smallest number of intervals between two breaks.
 const PER_PIECE: usize = 3;
 
-/// Modes whose root of the elastic energy is below this part of the tolerances do not count.
+/// Modes count if the root of their elastic energy is at least this part of the tolerances.
 const COUNTS: f64 = 0.1;
 
-/// Stretches between breaks that are shorter than this part of the run are none.
+/// Stretches between breaks are ignored if they are shorter than this part of the run.
 const SHORTEST: f64 = 1e-9;
 
-/// How far before a break the motion is looked at, as a part of the stretch that ends there.
+/// Distance of the last instant of a stretch from the break after it, as a part of the last interval.
 const BEFORE: f64 = 1e-3;
 
-/// Instants of a motion, ascending, in pieces without a break.
+/// Instants of a motion in ascending order, in pieces without a break.
 pub(super) struct Grid {
     pub times: Vec<f64>,
-    /// Instants of every piece: the first is that of the break before it, the last lies just before the next.
+    /// Indices of the instants of every piece. The first instant is at the break before the piece, the last lies just
+    /// before the next break.
     pub pieces: Vec<Range<usize>>,
 }
 
 impl Grid {
-    /// For the `motion` of a `body`; `None` where it would take more instants than can be looked at to see all
-    /// oscillations and everything between two breaks.
+    /// Builds the grid for the `motion` of a `body`. Returns `None` if too many instants were needed to resolve all
+    /// oscillations and all stretches between breaks.
     pub(super) fn new(body: &FlexBody, scene: &Scene, motion: &Trace, duration: f64) -> Option<Self> {
         let frequency =
             (liveliest_rate(body, scene, motion, COUNTS) / TAU).max(fastest_history(scene, duration));
@@ -53,6 +55,7 @@ impl Grid {
         if for_periods > most as f64 || (PER_PIECE + 1) * stretches.len() > most {
             return None;
         }
+        // Distribute the intervals over the stretches by length.
         let intervals = wanted.clamp(LEAST as f64, most as f64);
         let (mut times, mut pieces) = (Vec::new(), Vec::new());
         for (start, end) in stretches {
@@ -67,13 +70,14 @@ impl Grid {
         Some(Self { times, pieces })
     }
 
-    /// About as many of the instants as there are at the least, evenly, and those where any of the `histories`, one
-    /// value for every instant, is largest: no blow is missed, however short it is.
+    /// Returns indices of about [`LEAST`] evenly spaced instants, and of the instants where one of the `histories` (one
+    /// value per instant) is largest. Short shocks are therefore included.
     pub(super) fn few(&self, histories: impl Iterator<Item = Vec<f64>>) -> Vec<usize> {
         self.telling(LEAST + 1, histories)
     }
 
-    /// The same with about `count` of the instants.
+    /// Returns indices of about `count` evenly spaced instants, and of the instants where one of the `histories` is
+    /// largest.
     pub(super) fn telling(&self, count: usize, histories: impl Iterator<Item = Vec<f64>>) -> Vec<usize> {
         let stride = self.times.len().div_ceil(count);
         let mut all: Vec<usize> = (0..self.times.len()).step_by(stride).collect();
@@ -87,7 +91,7 @@ impl Grid {
     }
 }
 
-/// The stretches between the breaks of a run.
+/// Returns the stretches between the breaks of a run, as start and end times.
 fn stretches(breaks: &[f64], duration: f64) -> Vec<(f64, f64)> {
     let mut ends = vec![0.0];
     for &time in breaks {

@@ -1,4 +1,4 @@
-//! The motion that a body lacks, and the errors that it makes.
+//! Truncated part of a motion, and the errors that it causes in the outputs.
 
 use super::answered::{Answer, Lacking, LackingDamping};
 use super::grid::Grid;
@@ -12,12 +12,12 @@ use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side};
 use flexbody_motion::scene::{Instant, OutputErrors, Peak, Scene, Trace, reaction_errors};
 use nalgebra::Vector3;
 
-/// Instants that displacements of all nodes and reactions are computed at: the largest of a vibration that is
-/// seen so often at any phase is missed by little.
+/// Number of instants at which nodal displacements and reactions are evaluated. With so many samples at arbitrary
+/// phase, little of a vibration's peak is missed.
 const SHOWN: usize = 480;
 
-/// The displacements X y(t) of all rows that a body lacks, with X = [Psi, E]: its modes, which what it lacks
-/// drags along, and the static responses that it has not.
+/// Displacements X y(t) of all rows that the body's own motion lacks, with X = [Psi, E]: the modes, which are moved by
+/// the truncated part, and the static responses outside the modes.
 pub(super) struct Lack<'a> {
     view: &'a NodalView<'a>,
     grid: &'a Grid,
@@ -26,21 +26,21 @@ pub(super) struct Lack<'a> {
     /// X (N x (nf + k)).
     columns: Mat<f64>,
     answer: Answer,
-    /// Which of the instants displacements of all nodes and reactions are computed at.
+    /// Indices of the instants at which nodal displacements and reactions are evaluated.
     shown: Vec<usize>,
-    /// K_ff and E'K E.
+    /// Stiffness K_ff of the modes and E'K E of the responses.
     modal_stiffness: Mat<f64>,
     energy: Mat<f64>,
 }
 
-/// Errors along the instants, and when that of the elastic energy is largest.
+/// Largest errors over the instants, and the time of the largest elastic energy.
 pub(super) struct LackErrors {
     pub errors: OutputErrors,
     pub time: f64,
 }
 
 impl<'a> Lack<'a> {
-    /// Of `body`, with the damping of its scene.
+    /// Computes the truncated part of the motion of `body`, with the damping of its scene.
     pub(super) fn new(
         view: &'a NodalView<'a>,
         body: &FlexBody,
@@ -54,6 +54,7 @@ impl<'a> Lack<'a> {
         let weighted = weigh(missed.responses.as_ref());
         let modal_stiffness = symmetric_part(body.invariants().modal_stiffness());
         let columns = side_by_side(&[view.vectors.as_ref(), missed.responses.as_ref()]);
+        // Assemble the equations of modes and responses.
         let system = Lacking {
             modal_stiffness: modal_stiffness.clone(),
             modal_mass: view.modal_mass.clone(),
@@ -65,12 +66,14 @@ impl<'a> Lack<'a> {
             stiffness: missed.energy.clone(),
             mass: symmetric_part(&gram(missed.responses.as_ref(), weighted.as_ref())),
         };
-        // Where nothing is lacking there is nothing to be solved; what has no solution is not small.
+        // Without truncated part the answer is zero. If the equations have no solution, the answer is NaN, so that no
+        // error appears small.
         let is_nothing = (0..k).all(|j| missed.energy[(j, j)] == 0.0) && missed.in_modes.is_all_finite();
         let unknown = || Mat::full(nf + k, grid.times.len(), if is_nothing { 0.0 } else { f64::NAN });
         let answer = system.answered(&missed.amplitudes, &missed.in_modes, grid, settled);
         let answer =
             answer.unwrap_or_else(|| Answer { value: unknown(), rate: unknown(), acceleration: unknown() });
+        // Evaluate outputs where any amplitude or acceleration is largest, besides even steps.
         let histories = [&answer.value, &answer.acceleration].into_iter().flat_map(|all| {
             (0..all.nrows()).map(move |row| (0..all.ncols()).map(|i| all[(row, i)]).collect::<Vec<f64>>())
         });
@@ -78,13 +81,13 @@ impl<'a> Lack<'a> {
         Self { view, grid, looked_at, columns, answer, shown, modal_stiffness, energy: missed.energy.clone() }
     }
 
-    /// z (k x m): the amplitudes of the responses.
+    /// Returns z (k x m), the amplitudes of the responses.
     pub(super) fn of_responses(&self) -> Mat<f64> {
         let nf = self.view.vectors.ncols();
         self.answer.value.as_ref().subrows(nf, self.energy.nrows()).to_owned()
     }
 
-    /// Errors relative to the motion of all nodes: that of the body, `motion`, with what it lacks.
+    /// Computes errors relative to the motion of all nodes, which is the `motion` of the body plus its truncated part.
     pub(super) fn errors(&self, scene: &Scene, motion: &Trace, watched: &[Mat<f64>]) -> LackErrors {
         let (stress, time) = self.stress(motion);
         let free = !scene.prescribes();
@@ -97,8 +100,8 @@ impl<'a> Lack<'a> {
         LackErrors { errors, time }
     }
 
-    /// sqrt(V(X y) / max V), with the elastic energy V, at its largest and when that is. What is missed is
-    /// K-orthogonal to the modes: its energy adds to theirs.
+    /// Returns the largest sqrt(V(X y) / max V), with the elastic energy V, and its time. The responses are
+    /// K-orthogonal to the modes, so that their energy adds to that of the modes.
     fn stress(&self, motion: &Trace) -> (f64, f64) {
         let nf = self.view.vectors.ncols();
         let y = &self.answer.value;
@@ -115,8 +118,8 @@ impl<'a> Lack<'a> {
         (lacking.value / largest.max(motion.resolution.root_energy), lacking.time)
     }
 
-    /// The largest displacement X y of the watched points, of all nodes without any, over the largest of
-    /// Psi q + X y.
+    /// Returns the largest displacement X y of the watched points over the largest of Psi q + X y. All nodes count if
+    /// no point is watched. Returns `None` if nothing moves.
     fn deflection(&self, motion: &Trace, watched: &[Mat<f64>]) -> Option<f64> {
         let (mut missed, mut whole) = (Vec::new(), Vec::new());
         for block in self.shown.chunks(BLOCK) {
@@ -131,7 +134,7 @@ impl<'a> Lack<'a> {
         (scale > 0.0).then(|| Peak::of(&times, missed).value / scale)
     }
 
-    /// Length of the longest displacement of the watched points, or of any node, of every column.
+    /// Returns, for every column, the largest displacement of the watched points, or of all nodes if none is watched.
     fn longest(&self, u: &Mat<f64>, watched: &[Mat<f64>]) -> Vec<f64> {
         if watched.is_empty() {
             return (0..u.ncols()).map(|i| self.view.model.longest_displacement(u.col_as_slice(i))).collect();
@@ -147,13 +150,13 @@ impl<'a> Lack<'a> {
         longest
     }
 
-    /// The angle that what is lacking turns a free body by.
+    /// Returns the largest angle by which the truncated part rotates a free body.
     fn attitude(&self) -> f64 {
         let turning = Turning::new(self.view, &self.columns);
         Peak::of(&self.grid.times, turning.angles(self.looked_at, &self.answer.value)).value
     }
 
-    /// Differences of the reaction of the nodes with and without what is lacking.
+    /// Returns the largest relative difference between the nodal reactions with and without the truncated part.
     fn reaction(&self, scene: &Scene, motion: &Trace) -> Option<f64> {
         let (mut own, mut whole) = (Vec::new(), Vec::new());
         let Answer { value, rate, acceleration } = &self.answer;
@@ -184,19 +187,19 @@ impl<'a> Lack<'a> {
     }
 }
 
-/// Some of the columns.
+/// Returns the given columns of a matrix.
 fn columns_at(a: &Mat<f64>, columns: &[usize]) -> Mat<f64> {
     Mat::from_fn(a.nrows(), columns.len(), |i, j| a[(i, columns[j])])
 }
 
-/// x'A x of every column.
+/// Returns x'A x for every column x.
 fn quadratics(a: &Mat<f64>, x: &Mat<f64>) -> Vec<f64> {
     let product = combine(a.as_ref(), x.as_ref());
     let of = |i: usize| (0..x.nrows()).map(|k| x[(k, i)] * product[(k, i)]).sum();
     (0..x.ncols()).map(of).collect()
 }
 
-/// Root of the largest elastic energy of a motion, or the least that counts.
+/// Returns the root of the largest elastic energy of a motion, at least the resolution of the motion.
 pub(super) fn energy_scale(motion: &Trace) -> f64 {
     let roots = motion.elastic.iter().map(|energy| energy.max(0.0).sqrt());
     Peak::of(&motion.time, roots).value.max(motion.resolution.root_energy)

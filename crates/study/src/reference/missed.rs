@@ -1,4 +1,4 @@
-//! The static responses that a body lacks along its motion, and which of them would improve it most.
+//! Static responses that the body does not contain along its motion, and the selection of the most important ones.
 
 use super::answered::ROUNDING;
 use super::compressed::{Compressed, principal};
@@ -16,42 +16,44 @@ use flexbody_linalg::{combine, gram, larger, not_negative, side_by_side, subtrac
 use flexbody_motion::scene::Instant;
 use nalgebra::Vector3;
 
-/// Responses that may join the body at once.
+/// Largest number of responses that are added to a body in one round.
 const MOST_RESPONSES: usize = 12;
 
-/// Largest part of the elastic energy of the responses, over the motion, whose inertia is answered too, and of how
-/// many of them at the most.
+/// Part of the elastic energy of the responses, summed over the motion, whose inertia forces may be left without a
+/// response.
 const INERTIA_LEFT_OUT: f64 = 1e-9;
+/// Largest number of combinations of responses whose inertia forces get a response.
 const MOST_OF_INERTIA: usize = 8;
 
-/// Factors of a frequency at which a response is looked for: it may be a natural frequency.
+/// Factors applied to a frequency at which a harmonic response is computed. The next factor is used if the frequency
+/// coincides with a natural frequency and the solution fails.
 const NUDGES: [f64; 3] = [1.0, 1.0003, 0.9996];
 
-/// Root of the elastic energy that a response must have beside those that are known, relative to its own, to be a new
-/// one.
+/// Smallest root of the elastic energy that a response must keep after projection on the known ones, relative to its
+/// full size, to be added.
 const NEW: f64 = 1e-4;
 
-/// Displacements E that a body lacks: static responses to the forces that its motion leaves unbalanced, those to
-/// the inertia of these responses, without which all that is lacking would move with one frequency for each force, and
-/// responses at the frequencies of resonances.
+/// Displacements E outside the modes of a body: static responses to the forces that its motion leaves unbalanced,
+/// responses to the inertia of these (without which each force would have one natural frequency only), and responses at
+/// the frequencies of resonances.
 pub(super) struct Missed {
-    /// B (N x k) with E = K^+ B.
+    /// Forces B (N x k) with E = K^+ B.
     pub forces: Mat<f64>,
-    /// c (k x m): the unbalanced forces are B c(t). Those of inertia and of resonances have none.
+    /// Amplitudes c (k x m) of the unbalanced forces B c(t). The rows that belong to inertia and resonances are zero.
     pub amplitudes: Mat<f64>,
-    /// g (nf x m): what the unbalanced forces do to the modes.
+    /// Modal forces g (nf x m) of the unbalanced forces.
     pub in_modes: Mat<f64>,
-    /// E (N x k), beside the modes; where something carries the body, with the point at rest that does.
+    /// Responses E (N x k), K-orthogonal to the modes. If a point carries the body, the point is at rest.
     pub responses: Mat<f64>,
-    /// E'K E.
+    /// Stiffness E'K E of the responses (k x k).
     pub energy: Mat<f64>,
 }
 
 impl Missed {
-    /// Of a body in the `motion` that it makes at the instants of `grid`.
+    /// Computes the responses for a body along `motion`, given at the instants of `grid`.
     ///
     /// # Errors
-    /// Those of [`free_static_responses_twice`] and [`oscillating_responses`].
+    /// The errors of [`free_static_responses_twice`] and [`oscillating_responses`].
     pub(super) fn new(
         view: &NodalView<'_>,
         body: &FlexBody,
@@ -60,6 +62,7 @@ impl Missed {
         question: &Question,
     ) -> Result<Self> {
         let model = view.model;
+        // Compress the unbalanced forces of a few instants, then get amplitudes at all instants.
         let few: Vec<Instant> = grid.few(histories(motion)).into_iter().map(|i| motion[i].clone()).collect();
         let compressed = Compressed::new(model, &view.residual(&few));
         let UnbalancedAmplitudes { in_modes, compressed: amplitudes } =
@@ -70,6 +73,7 @@ impl Missed {
             return Ok(Self { forces, amplitudes, in_modes, responses, energy: Mat::zeros(0, 0) });
         };
         let forces = compressed.basis;
+        // Static responses to the forces, and to the inertia of the first responses.
         let beside = Beside::new(view, &body.modes().eigenvalue);
         let (mut responses, mut energy) = (Mat::new(), Mat::new());
         let inertia = |static_responses: &Mat<f64>| {
@@ -79,6 +83,7 @@ impl Missed {
         };
         let first = body.modes().eigenvalue[0];
         let [_, of_inertia] = free_static_responses_twice(&view.coupled, forces.clone(), inertia, first)?;
+        // Harmonic responses at resonances of the forces.
         let resonances = resonances(grid, &amplitudes, &energy, question);
         let mut missed = Self { forces, amplitudes, in_modes, responses, energy };
         missed.add(&beside, of_inertia);
@@ -92,7 +97,7 @@ impl Missed {
         Ok(missed)
     }
 
-    /// Adds what the `forces` make the model do that oscillate at a circular frequency.
+    /// Adds the harmonic response of the model to `forces` at the circular frequency `rate`.
     fn add_resonance(&mut self, beside: &Beside<'_>, forces: Mat<f64>, rate: f64) -> Result<()> {
         let conditions = beside.view.held.as_ref().map(Held::conditions);
         for nudge in NUDGES {
@@ -106,7 +111,7 @@ impl Missed {
         Ok(())
     }
 
-    /// Adds responses to forces that have no amplitude of their own.
+    /// Adds responses to forces whose amplitudes are zero.
     fn add(&mut self, beside: &Beside<'_>, responses: Mat<f64>) {
         let more = beside.more(&self.responses, &self.energy, responses);
         let forces = beside.view.model.pencil().apply_stiffness(more.as_ref());
@@ -118,10 +123,11 @@ impl Missed {
         self.energy = beside.energy(&self.responses);
     }
 
-    /// The fewest forces B y (N x p) whose responses leave of E z(t), at every instant, no more than `enough`
-    /// of the root of the elastic energy. `moving`: z (k x m).
+    /// Returns the fewest forces B y (N x p) whose responses leave, at every instant, at most `enough` of the root of
+    /// the elastic energy of E z(t). `moving` is z (k x m).
     pub(super) fn dominant(&self, moving: &Mat<f64>, enough: f64) -> Mat<f64> {
         let none = || Mat::zeros(self.forces.nrows(), 0);
+        // Principal directions of the elastic energy.
         let Some((turned, roots)) = principal(self.energy.clone(), ROUNDING, usize::MAX) else {
             return none();
         };
@@ -131,6 +137,7 @@ impl Missed {
         };
         let w = Mat::from_fn(roots.len(), moving.ncols(), w);
         let covariance = combine(w.as_ref(), w.transpose().to_owned().as_ref());
+        // Principal directions of w over time; find the smallest number that leaves a small enough rest.
         let Some((directions, _)) = principal(covariance, 0.0, MOST_RESPONSES) else { return none() };
         let along = gram(directions.as_ref(), w.as_ref());
         let left = |count: usize, i: usize| -> f64 {
@@ -148,8 +155,8 @@ impl Missed {
     }
 }
 
-/// Histories along a motion whose largest values must not be overlooked: loads, accelerations of the frame, spins and
-/// accelerations of modes.
+/// Returns the histories whose largest values must be among the evaluated instants: loads, accelerations and spin of
+/// the frame, and accelerations of the modes.
 fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
     let history = |value: &dyn Fn(&Instant) -> f64| motion.iter().map(value).collect::<Vec<f64>>();
     let (loads, modes) = motion.first().map_or((0, 0), |first| (first.loads.len(), first.qdd.len()));
@@ -167,7 +174,7 @@ fn histories(motion: &[Instant]) -> impl Iterator<Item = Vec<f64>> + '_ {
     of_loads.chain(of_frame).chain(of_modes)
 }
 
-/// Displacements beside the modes of a body.
+/// Projection of displacements to the complement of the modes of a body.
 struct Beside<'v> {
     view: &'v NodalView<'v>,
     eigenvalues: &'v [f64],
@@ -180,31 +187,34 @@ impl<'v> Beside<'v> {
         Self { view, eigenvalues, stiff: view.model.pencil().apply_stiffness(view.vectors.as_ref()) }
     }
 
-    /// `responses` with what carries the body at rest, and without their part in the modes.
+    /// Returns `responses` with the carrying point at rest and without their part in the modes.
     fn of(&self, mut responses: Mat<f64>) -> Mat<f64> {
         if let Some(held) = &self.view.held {
             held.hold(&mut responses);
         }
-        // The part in the modes is that of rounding.
+        // Static responses have no part in the modes except rounding.
         let shared = gram(self.stiff.as_ref(), responses.as_ref());
         let part = Mat::from_fn(shared.nrows(), shared.ncols(), |p, j| shared[(p, j)] / self.eigenvalues[p]);
         subtract_combination(responses.as_mut(), self.view.vectors.as_ref(), part.as_ref());
         responses
     }
 
-    /// E'K E.
+    /// Returns E'K E.
     fn energy(&self, responses: &Mat<f64>) -> Mat<f64> {
         let weighted = self.view.model.pencil().apply_stiffness(responses.as_ref());
         symmetric_part(&gram(responses.as_ref(), weighted.as_ref()))
     }
 
-    /// The forces M E y of the few E y that have nearly all of the elastic energy of E c(t).
+    /// Returns the inertia forces M E y of the few combinations E y that have nearly all the elastic energy of E c(t).
     ///
-    /// * `responses`: E; `energy`: E'K E; `amplitudes`: c.
+    /// * `responses`: E.
+    /// * `energy`: E'K E.
+    /// * `amplitudes`: c.
     fn inertia(&self, responses: &Mat<f64>, energy: &Mat<f64>, amplitudes: &Mat<f64>) -> Mat<f64> {
         let Some((turned, roots)) = principal(energy.clone(), ROUNDING, usize::MAX) else {
             return Mat::zeros(responses.nrows(), 0);
         };
+        // Amplitudes scaled to the root of the elastic energy; their principal directions over time.
         let moving = gram(turned.as_ref(), amplitudes.as_ref());
         let moving = Mat::from_fn(roots.len(), moving.ncols(), |k, i| roots[k] * moving[(k, i)]);
         let covariance = combine(moving.as_ref(), moving.transpose().to_owned().as_ref());
@@ -216,10 +226,10 @@ impl<'v> Beside<'v> {
         self.view.part(self.view.model.pencil().apply_mass(few.as_ref())).forces
     }
 
-    /// What `further` responses add to `known` ones: K-orthogonal to these and to each other, of an energy as large
-    /// as the largest of these.
+    /// Returns the new directions that `further` adds to the `known` responses. They are K-orthogonal to the known
+    /// responses and to each other, and scaled to the largest energy of the known ones.
     ///
-    /// * `energy`: that of the known ones, E'K E.
+    /// * `energy`: E'K E of the known responses.
     fn more(&self, known: &Mat<f64>, energy: &Mat<f64>, further: Mat<f64>) -> Mat<f64> {
         let mut further = self.of(further);
         let own = self.energy(&further);
@@ -229,7 +239,7 @@ impl<'v> Beside<'v> {
         let unit = Mat::from_fn(turned.nrows(), roots.len(), |row, k| turned[(row, k)] / roots[k]);
         let orthonormal = combine(known.as_ref(), unit.as_ref());
         let weighted = self.view.model.pencil().apply_stiffness(orthonormal.as_ref());
-        // Twice: what they add may be small beside what they share.
+        // Orthogonalise twice: the new part may be small compared with the common part.
         for _ in 0..2 {
             let shared = gram(weighted.as_ref(), further.as_ref());
             subtract_combination(further.as_mut(), orthonormal.as_ref(), shared.as_ref());
@@ -237,7 +247,7 @@ impl<'v> Beside<'v> {
         let Some((turned, own)) = principal(self.energy(&further), 0.0, usize::MAX) else {
             return Mat::zeros(further.nrows(), 0);
         };
-        // What is left of all that was shared is rounding.
+        // A response without a new direction leaves rounding only.
         let kept = own.iter().take_while(|root| **root > NEW).count();
         let scaled = Mat::from_fn(turned.nrows(), kept, |row, k| turned[(row, k)] * roots[0] / own[k]);
         combine(further.as_ref(), scaled.as_ref())

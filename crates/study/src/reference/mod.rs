@@ -1,5 +1,5 @@
-//! The body that a study measures against: what it lacks of the model that it was made of, estimated along
-//! its motion, and a body that is enriched until that no longer counts; shapes made of its motion. No files.
+//! Reference body of a study: estimate of its truncation error along its motion, enrichment until this error is small,
+//! and bases made of the shapes of its motion. No files.
 
 mod answered;
 mod compressed;

@@ -1,4 +1,4 @@
-//! Bodies of the shapes that motions are made of, measured beside these motions.
+//! Bodies whose modes are made of the shapes of motions, and their errors in these motions.
 
 use super::motion_shapes::MotionShapes;
 use faer::Mat;
@@ -11,7 +11,7 @@ use flexbody_motion::scene::{
     LoadCases, Measure, OtherModes, OutputErrors, Scene, Stage, Trace, trace, trace_at,
 };
 
-/// The motions of a body in load cases, and what bodies of their shapes make of them.
+/// Motions of a reference body in load cases, and bodies whose modes are made of the shapes of these motions.
 pub struct MotionBodies<'m> {
     model: &'m FeModel,
     reference: &'m FlexBody,
@@ -19,7 +19,7 @@ pub struct MotionBodies<'m> {
     shapes: MotionShapes,
 }
 
-/// A scene with the motion of the reference in it.
+/// Scene with the motion of the reference in this scene.
 struct Case<'m> {
     scene: &'m Scene,
     /// The reference in the frame of the scene.
@@ -27,23 +27,24 @@ struct Case<'m> {
     motion: Trace,
 }
 
-/// The body of the fewest shapes with small enough errors.
+/// Body with the fewest shapes whose errors are small enough.
 pub struct Fewest<B> {
-    /// How many shapes it has.
+    /// Number of shapes.
     pub count: usize,
-    /// What it was made as.
+    /// Result of the closure `make` for this body.
     pub made: B,
-    /// Its errors in each case.
+    /// Largest errors in each load case.
     pub errors: Vec<OutputErrors>,
-    /// The largest of them over its tolerance, in each case.
+    /// Largest error over its tolerance, in each load case.
     pub worst: Vec<f64>,
 }
 
 impl<'m> MotionBodies<'m> {
-    /// Of the motions of `reference`, made of `model`, in `cases`. `None` where there are no shapes of them.
+    /// Simulates `reference`, made of `model`, in `cases` and computes the shapes of its motions. Returns `None` if
+    /// there are no shapes.
     ///
     /// # Errors
-    /// Those of [`trace`].
+    /// The errors of [`trace`] and of [`Stage::new`].
     pub fn new(
         model: &'m FeModel,
         reference: &'m FlexBody,
@@ -60,24 +61,26 @@ impl<'m> MotionBodies<'m> {
         Ok(shapes.map(|shapes| Self { model, reference, cases, shapes }))
     }
 
-    /// Numbers of shapes worth trying, ascending.
+    /// Returns the numbers of shapes that are candidates for a body, ascending.
     pub fn counts(&self) -> Vec<usize> {
         self.shapes.counts()
     }
 
-    /// The basis of the first `count` shapes.
+    /// Returns the basis of the first `count` shapes.
     pub fn basis(&self, count: usize) -> BasisChoice {
         self.shapes.basis(count)
     }
 
-    /// The fewest shapes, each number made with `make`, whose errors are in no case more than `most` of it
-    /// times the tolerances. More shapes are nearly always better: the numbers worth trying are tried in
-    /// turn, then twice as many each time, since reactions may take more than deformations; between the first
-    /// that is good enough and the one before it there is a bisection. `None` where none is, or bodies cannot
-    /// be compared.
+    /// Returns the body with the fewest shapes whose largest error, over its tolerance, is at most `most` in every load
+    /// case. `make` receives a number of shapes and returns a body; `body` returns the body of that result.
+    ///
+    /// The candidates are tested in ascending order, then doubled, since reactions may need more shapes than
+    /// deformations. Between the first sufficient number and the one before it the search bisects; errors nearly always
+    /// decrease with more shapes. Returns `None` if no number suffices, or if the bodies cannot be compared with the
+    /// reference.
     ///
     /// # Errors
-    /// Those of `make`, and of the simulation of what it made.
+    /// The errors of `make`, and of the simulation of the body that it returned.
     pub fn fewest<B>(
         &self,
         most: &[f64],
@@ -95,6 +98,7 @@ impl<'m> MotionBodies<'m> {
         };
         let is_enough = |own: &Fewest<B>| own.worst.iter().zip(most).all(|(worst, most)| worst <= most);
         let (mut too_few, mut found) = (0, None);
+        // Ascend to the first sufficient number, then bisect below it.
         for count in self.shapes.more_and_more() {
             let Some(own) = tried(count)? else { return Ok(None) };
             if is_enough(&own) {
@@ -114,22 +118,24 @@ impl<'m> MotionBodies<'m> {
         Ok(Some(found))
     }
 
-    /// The largest errors of the motion of `body` in each case; `None` where it cannot be compared with the
-    /// reference, or where a scene starts modes of that by their number.
+    /// Returns the largest errors of the motion of `body` in each load case. Returns `None` if the body cannot be
+    /// compared with the reference, or if a scene states initial values of modes, whose numbers refer to the
+    /// reference.
     fn errors(&self, measures: &[Measure<'_>], body: &FlexBody) -> Result<Option<Vec<OutputErrors>>> {
-        // Rigid motions that the frame of a scene adds to the modes have no stiffness.
+        // Rigid motions that the frame of a scene adds to the modes have no stiffness and do not matter here.
         let Some(shared) = body.stiffness_beside(self.reference, self.model) else { return Ok(None) };
         self.cases.iter().zip(measures).map(|(case, measure)| case.errors(measure, body, &shared)).collect()
     }
 }
 
 impl Case<'_> {
-    /// What the motion is measured by.
+    /// Returns the measure for errors relative to the reference motion.
     fn measure(&self) -> Measure<'_> {
         Measure::new(&self.staged, &self.motion)
     }
 
-    /// The largest errors of the motion of `body`, which shares the stiffness Psi'K Psi_r with the reference.
+    /// Returns the largest errors of the motion of `body`. `shared` is the stiffness Psi'K Psi_r that couples its modes
+    /// to those of the reference.
     fn errors(
         &self,
         measure: &Measure<'_>,

@@ -1,5 +1,5 @@
-//! Shapes made of motions: what a body does in a scene, or in several load cases, by as few shapes as that
-//! takes.
+//! Shapes made of motions: the deformation of a body in one or several load cases, spanned by as few shapes as
+//! possible.
 
 use super::compressed::principal;
 use faer::Mat;
@@ -11,36 +11,37 @@ use flexbody_linalg::{combine, dense_cholesky, gram, larger, side_by_side, solve
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{Scene, Stage, Trace};
 
-/// Parts of the tolerances that so many shapes may leave out of the motion, each a number of shapes worth
-/// trying: what a reduced body makes of its own motion may be better or worse than the best that its shapes
-/// allow.
+/// Parts of the tolerances that the shapes may leave out of the motion; each gives one candidate number of shapes.
+/// Several are needed because the motion of the reduced body may be more or less accurate than the best approximation
+/// by its shapes.
 const PARTS: [f64; 6] = [2.0, 1.0, 0.5, 0.25, 0.1, 0.03];
 
-/// Shapes at the most.
+/// Largest number of shapes.
 const MOST: usize = 120;
 
-/// The part of the sum of energies that no shape is made for.
+/// Part of the sum of energies for which no shape is made. A larger value gives fewer shapes.
 const LEFT_OUT: f64 = 1e-16;
 
-/// Principal directions of motions in elastic energy (proper orthogonal decomposition): with K_ff = L L' and
-/// y = L' q of the instants of a motion, over the largest |y| of that motion and what its scene allows, the
-/// eigenvectors u of the mean of y y' give the shapes Psi L'^-1 u. Of all sets of as many shapes the first r
-/// leave out the least of the elastic energy, on average over each motion.
+/// Principal directions of motions in elastic energy (proper orthogonal decomposition).
+///
+/// With K_ff = L L', y = L' q at the instants of a motion is divided by the largest |y| of that motion and by the
+/// tolerance of its scene. The eigenvectors u of the mean of y y' give the shapes Psi L'^-1 u. Of all sets of r shapes,
+/// the first r leave out the least elastic energy, on average over each motion.
 #[derive(Debug, Clone)]
 pub(super) struct MotionShapes {
-    /// N x k, rows and axes of the model.
+    /// Shapes (N x k), in rows and axes of the model.
     shapes: Mat<f64>,
-    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of its
-    /// motion, over what the scene of that motion allows, for r = 0 to k.
+    /// Largest root of the elastic energy that the first r shapes leave out, relative to the largest of its motion and
+    /// to the tolerance of its scene, for r = 0 to k.
     left: Vec<f64>,
 }
 
 impl MotionShapes {
-    /// Of motions of `body`, made of `model`, each with its scene. `None` where there are none, where the
-    /// body has other rows than the model, or where nothing deforms.
+    /// Computes the shapes of `motions` of `body`, made of `model`, each with its scene. Returns `None` if there are no
+    /// motions, if the body has other rows than the model, or if nothing deforms.
     ///
     /// # Errors
-    /// Those of [`Stage::new`].
+    /// The errors of [`Stage::new`].
     pub(super) fn new(
         model: &FeModel,
         body: &FlexBody,
@@ -53,6 +54,7 @@ impl MotionShapes {
         let (Some(vectors), Some(lower)) = (body.vectors_of(model), dense_cholesky(stiffness)) else {
             return Ok(None);
         };
+        // Sum the mean of y y' over all motions; its eigenvectors are the principal directions.
         let weighted: Vec<Mat<f64>> =
             motions.iter().map(|(scene, motion)| weighed(&lower, scene, motion)).collect();
         let mut sum = Mat::zeros(body.n_modes(), body.n_modes());
@@ -60,13 +62,14 @@ impl MotionShapes {
             sum += mean_of_products(weighted, &motion.time);
         }
         let Some((directions, _)) = principal(sum, LEFT_OUT, MOST) else { return Ok(None) };
+        // Transform back to shapes, and measure the energy that the first r shapes leave out.
         let all = side_by_side(&weighted.iter().map(Mat::as_ref).collect::<Vec<_>>());
         let left = left_out(&all, &directions);
         let combinations = solve_upper(&lower, &directions);
         Ok(Some(Self { shapes: combine(vectors.as_ref(), combinations.as_ref()), left }))
     }
 
-    /// Numbers of shapes worth trying, ascending.
+    /// Returns the numbers of shapes that are candidates for a body, ascending.
     pub(super) fn counts(&self) -> Vec<usize> {
         let most = self.shapes.ncols();
         let count = |part: f64| self.left.iter().position(|left| *left <= part).unwrap_or(most).max(1);
@@ -75,7 +78,7 @@ impl MotionShapes {
         counts
     }
 
-    /// These numbers, then twice as many each time up to all shapes.
+    /// Returns the candidate numbers, then doubled numbers up to all shapes.
     pub(super) fn more_and_more(&self) -> Vec<usize> {
         let (mut counts, most) = (self.counts(), self.shapes.ncols());
         while let Some(last) = counts.last().filter(|last| **last < most) {
@@ -84,24 +87,24 @@ impl MotionShapes {
         counts
     }
 
-    /// The basis of the first `count` shapes.
+    /// Returns the basis of the first `count` shapes.
     pub(super) fn basis(&self, count: usize) -> BasisChoice {
         BasisChoice::Imported(ImportedShapes::of_motion(self.shapes.as_ref().subcols(0, count).to_owned()))
     }
 }
 
-/// y of the instants of a motion, in columns: relative to the largest of it, over what its scene allows.
+/// Returns y at the instants of a motion, in columns, divided by its largest length and by the tolerance of the scene.
 fn weighed(lower: &Mat<f64>, scene: &Scene, motion: &Trace) -> Mat<f64> {
     let instants = Mat::from_fn(lower.nrows(), motion.q.len(), |j, i| motion.q[i][j]);
     let weighted = gram(lower.as_ref(), instants.as_ref());
     let largest = (0..weighted.ncols()).map(|i| weighted.col(i).norm_l2()).fold(0.0, larger);
     let tolerance = &scene.requirements.tolerance.errors;
     let unit = largest * tolerance.stress.min(tolerance.deflection);
-    // Of a body that stays rigid there is nothing to be left out.
+    // A body that stays rigid is not scaled.
     if unit > 0.0 { weighted * faer::Scale(unit.recip()) } else { weighted }
 }
 
-/// The mean over the time of a motion of y y', for the columns y of `weighted`.
+/// Returns the mean of y y' over the time of a motion, by the trapezoidal rule, for the columns y of `weighted`.
 fn mean_of_products(weighted: &Mat<f64>, time: &[f64]) -> Mat<f64> {
     let last = time.len() - 1;
     let whole = time[last] - time[0];
@@ -110,8 +113,7 @@ fn mean_of_products(weighted: &Mat<f64>, time: &[f64]) -> Mat<f64> {
     symmetric_part(&combine(weighted.as_ref(), shared.as_ref()))
 }
 
-/// The largest that the first r of the `directions` leave out of any of the columns of `weighted`, for every
-/// r.
+/// Returns, for every r, the largest length that the first r `directions` leave out of any column of `weighted`.
 fn left_out(weighted: &Mat<f64>, directions: &Mat<f64>) -> Vec<f64> {
     let parts = gram(directions.as_ref(), weighted.as_ref());
     let rests = weighted - directions * &parts;

@@ -1,4 +1,4 @@
-//! The unbalanced forces of very many instants at a cost that does not depend on the rows of the model.
+//! Unbalanced forces of many instants, at a cost that does not depend on the number of rows of the model.
 
 use super::compressed::Compressed;
 use super::residual::NodalView;
@@ -8,12 +8,11 @@ use flexbody_model::RigidAcceleration;
 use flexbody_motion::scene::Instant;
 use nalgebra::{Matrix3, Vector3};
 
-/// Instants that are computed together.
+/// Number of instants that are evaluated together. It limits the memory for the functions of time.
 const BLOCK: usize = 256;
 
-/// What is wanted of the forces of [`NodalView::unbalanced`], which are fixed nodal vectors F times products
-/// phi of the coordinates and velocities of the body: with S_a x = e_a x x, summed over the axes a and b,
-///
+/// Projection of the forces of [`NodalView::unbalanced`]. These forces are fixed nodal vectors F times products phi of
+/// the coordinates and velocities of the body: with S_a x = e_a x x, summed over the axes a and b,
 /// ```text
 /// r = sum f_l - K Psi q - D Psi q' - M Psi q'' - M R (V' - g, omega')
 ///     - M S_a Psi (omega'_a q + omega_a q') - S_a M Psi omega_a q' - S_a M R omega_a (V, omega)
@@ -23,26 +22,27 @@ const BLOCK: usize = 256;
 /// with V, V' - g and R of [`Inertia`](super::residual::Inertia), and the stiffness of inertia H, which is linear in
 /// V' - g, omega' and the products of omega.
 ///
-/// With P that takes forces to what they do to the modes and to amplitudes of compressed forces, P F is
-/// computed once, and P r = (P F) phi at every instant.
+/// P maps forces to modal forces and to amplitudes of compressed forces. P F is computed once; P r = (P F) phi then
+/// holds at every instant.
 pub(super) struct Projected<'v> {
     view: &'v NodalView<'v>,
-    /// P F, in the order of [`Projected::functions`].
+    /// P F, with columns in the order of [`Projected::functions`].
     matrix: Mat<f64>,
-    /// The axes about which the body may turn.
+    /// Axes about which the body may turn.
     turns: &'static [usize],
 }
 
-/// Amplitudes of the forces that are left unbalanced.
+/// Amplitudes of the unbalanced forces.
 pub(super) struct UnbalancedAmplitudes {
-    /// What they do to the modes (nf of every instant).
+    /// Modal forces (nf x instants).
     pub in_modes: Mat<f64>,
-    /// Of the compressed forces (k of every instant).
+    /// Amplitudes of the compressed forces (k x instants).
     pub compressed: Mat<f64>,
 }
 
 impl<'v> Projected<'v> {
-    /// Of forces that are compressed as those of a few instants were; nothing where these were none.
+    /// Projects the fixed vectors F. The forces are compressed by the basis of `compressed`; no amplitudes are computed
+    /// if there is none.
     pub(super) fn new(view: &'v NodalView<'v>, compressed: Option<&Compressed>) -> Self {
         let turns: &[usize] = if view.model.dimension() == 2 { &[2] } else { &[0, 1, 2] };
         let project = |forces: Mat<f64>| {
@@ -54,10 +54,12 @@ impl<'v> Projected<'v> {
         let weigh = |x: &Mat<f64>| rows.weigh(x.as_ref());
         let turned = |a: usize, x: &Mat<f64>| rows.turned(&Vector3::ith(a, 1.0), x);
         let project_inertia = |forces: Mat<f64>| project(rows.restrict(forces));
+        // The columns of F, term by term: loads, elastic, damping and inertia forces of the modes.
         let mut parts: Vec<Mat<f64>> = view.loads.iter().map(|load| project(-load)).collect();
         parts.push(project(view.model.pencil().apply_stiffness(view.vectors.as_ref())));
         parts.push(project(view.damped.clone()));
         parts.push(project(view.weighted.clone()));
+        // Inertia forces of rigid accelerations and of rotation.
         let heavy = weigh(&view.extended_rigid);
         parts.push(project_inertia(heavy.clone()));
         let [modes, weighted] = view.extended();
@@ -67,6 +69,7 @@ impl<'v> Projected<'v> {
             parts.extend(turns.iter().map(|&b| project_inertia(turned(b, &heavy_turned))));
             parts.push(project_inertia(heavy_turned));
         }
+        // Stiffness of inertia, for each unit acceleration.
         parts.extend(unit_accelerations(view).iter().map(|unit| {
             let mut forces = Mat::zeros(view.vectors.nrows(), view.vectors.ncols());
             for j in 0..forces.ncols() {
@@ -74,12 +77,12 @@ impl<'v> Projected<'v> {
             }
             project(forces)
         }));
-        // All of these are taken from the loads.
+        // All terms after the loads are subtracted from the loads.
         let matrix = -side_by_side(&parts.iter().map(Mat::as_ref).collect::<Vec<_>>());
         Self { view, matrix, turns }
     }
 
-    /// Along a motion, a column for every instant.
+    /// Returns the amplitudes along a motion, one column for every instant.
     pub(super) fn amplitudes(&self, motion: &[Instant]) -> UnbalancedAmplitudes {
         let (nf, rows) = (self.view.vectors.ncols(), self.matrix.nrows());
         let mut in_modes = Mat::zeros(nf, motion.len());
@@ -96,7 +99,7 @@ impl<'v> Projected<'v> {
         UnbalancedAmplitudes { in_modes, compressed }
     }
 
-    /// phi of every instant.
+    /// Returns phi at every instant, in the order of the columns of P F.
     fn functions(&self, motion: &[Instant]) -> Mat<f64> {
         let view = self.view;
         let free = view.along_model(motion, |now| view.free_acceleration(now));
@@ -108,11 +111,13 @@ impl<'v> Projected<'v> {
             let column = functions.col_as_slice_mut(i);
             let mut places = column.iter_mut();
             let mut put = |value: f64| *places.next().expect("as many functions as vectors") = value;
+            // The order is that of the columns of F: loads, elastic, damping and inertia forces.
             loads.iter().for_each(|load| load.col_as_slice(i).iter().for_each(|value| put(*value)));
             now.q.iter().chain(&now.qd).chain(&now.qdd).for_each(|value| put(*value));
             free.col_as_slice(i).iter().for_each(|value| put(*value));
             let (omega, rate): (Vector3<f64>, Vector3<f64>) =
                 (view.axes * now.omega, view.axes * now.omega_rate);
+            // Rotation about each axis.
             for &a in self.turns {
                 now.qd.iter().for_each(|qd| put(omega[a] * qd));
                 moving.col_as_slice(i).iter().for_each(|value| put(omega[a] * value));
@@ -121,6 +126,7 @@ impl<'v> Projected<'v> {
                 }
                 now.q.iter().zip(&now.qd).for_each(|(q, qd)| put(rate[a] * q + omega[a] * qd));
             }
+            // Stiffness of inertia: components of the rigid acceleration times q.
             let rigid = view.rigid_acceleration(now);
             for unit in &units {
                 let amount = rigid.linear.dot(&unit.linear)
@@ -133,8 +139,8 @@ impl<'v> Projected<'v> {
     }
 }
 
-/// Accelerations that those of every rigid motion are sums of, where rotations of nodes carry mass: three linear
-/// ones, three angular ones and the six symmetric products of two axes, of unit length as matrices.
+/// Returns unit accelerations that span the accelerations of every rigid motion: three linear, three angular, and the
+/// six symmetric products of two axes (matrices of unit length). Empty if nodal rotations carry no mass.
 fn unit_accelerations(view: &NodalView<'_>) -> Vec<RigidAcceleration> {
     if !view.rows.have_directors() {
         return Vec::new();
@@ -152,7 +158,7 @@ fn unit_accelerations(view: &NodalView<'_>) -> Vec<RigidAcceleration> {
     linear.chain(angular).chain(products).collect()
 }
 
-/// The rows of one matrix above those of another, which may have none.
+/// Stacks two matrices: `upper` above `lower`, which may have no rows.
 fn above(upper: &Mat<f64>, lower: &Mat<f64>) -> Mat<f64> {
     let (first, all) = (upper.nrows(), upper.nrows() + lower.nrows());
     Mat::from_fn(all, upper.ncols(), |i, j| if i < first { upper[(i, j)] } else { lower[(i - first, j)] })
@@ -170,7 +176,7 @@ mod tests {
     use flexbody_model::FeModel;
     use flexbody_motion::scene::{Point, nodal_point};
 
-    /// Some instants of no motion in particular, with elastic forces as large as those of inertia.
+    /// Returns random instants, with elastic forces as large as the inertia forces.
     fn instants(eigenvalues: &[f64]) -> Vec<Instant> {
         let modes = eigenvalues.len();
         let value = |i: usize, j: usize| uniform(7, i as u64, j as u64);
@@ -191,7 +197,7 @@ mod tests {
         (0..BLOCK + 3).map(at).collect()
     }
 
-    /// A body that turns about the normal of its plane.
+    /// Removes all rotation except that about the normal of the plane.
     fn in_plane(mut motion: Vec<Instant>) -> Vec<Instant> {
         for now in &mut motion {
             for axial in [&mut now.omega, &mut now.omega_rate] {
@@ -205,8 +211,8 @@ mod tests {
         (a - b).norm_max() / b.norm_max()
     }
 
-    /// Solids, nodal rotations, the plane; free and carried: the same as the forces at all nodes, instant by
-    /// instant.
+    /// The projection equals the forces at all nodes, instant by instant: solids, nodal rotations, a plane model; free
+    /// and carried.
     #[test]
     fn amplitudes_are_those_of_the_forces_at_all_nodes() {
         for (name, carried) in [

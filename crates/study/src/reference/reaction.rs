@@ -1,4 +1,4 @@
-//! What a prescribed motion takes, of the displacements of all nodes.
+//! Reaction of a prescribed motion, from the displacements of all nodes.
 
 use super::residual::{Displacements, Inertia, NodalView};
 use faer::{Mat, MatRef};
@@ -7,22 +7,23 @@ use flexbody_motion::scene::Instant;
 use nalgebra::Vector3;
 
 impl NodalView<'_> {
-    /// Force and torque about the origin of the frame, axes of the model, that a motion of the frame as in
-    /// `motion` takes of the nodes with the displacements `field`, at every instant: with the momenta
-    /// p = R_t'w and h = (R_r + B(u))'w,
+    /// Returns the reaction at every instant: force and torque about the origin of the frame, axes of the model, that
+    /// the motion of the frame in `motion` requires with the nodal displacements `field`. With the momenta p = R_t'w
+    /// and h = (R_r + B(u))'w,
     ///
     /// ```text
     /// p' + omega x p - F,    h' + omega x h + V x p - tau
     /// ```
     ///
-    /// (theory 6.17, without the elastic forces, which balance each other). Directors turn to second order: what
-    /// they carry of mass is moved by their rotations against each other, theta' x (theta' x e_a) and so on.
+    /// (theory 6.17, without the elastic forces, which balance each other). Directors turn to second order: their
+    /// rotations also move their mass against each other, theta' x (theta' x e_a) and so on.
     pub(super) fn reactions(
         &self,
         motion: &[Instant],
         field: &Displacements,
     ) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let Inertia { u, ud, momentum, change } = self.inertia_of_turned(motion, field);
+        // Resultants of momentum, its change and the loads.
         let momenta = self.resultants(self.extended_rigid.as_ref(), &momentum);
         let changes = self.resultants(self.extended_rigid.as_ref(), &change);
         let loads = self.resultants(self.rigid.as_ref(), &self.loads_of(motion));
@@ -35,14 +36,14 @@ impl NodalView<'_> {
             let force = changes[i].0 + omega.cross(&p);
             let turning = changes[i].1 + self.rows.moment(u, change) + self.rows.moment(ud, w);
             let about_centre = turning + omega.cross(&h) + velocity.cross(&p);
-            // Where rigid motions are about the centre of mass, the force acts there.
+            // Rigid motions about the centre of mass give torques about that centre: transfer the force to the origin.
             let torque = about_centre + self.centre.cross(&force);
             (force - loads[i].0, torque - loads[i].1 - shifts[i])
         };
         (0..motion.len()).map(at).collect()
     }
 
-    /// Force and torque, about the point that the `rigid` motions are about, of `forces`, column by column.
+    /// Returns force and torque, about the reference point of the `rigid` motions, of each column of `forces`.
     fn resultants(&self, rigid: MatRef<'_, f64>, forces: &Mat<f64>) -> Vec<(Vector3<f64>, Vector3<f64>)> {
         let all = gram(rigid, forces.as_ref());
         let of = |i: usize| match self.model.dimension() {
@@ -52,7 +53,7 @@ impl NodalView<'_> {
         (0..forces.ncols()).map(of).collect()
     }
 
-    /// Torque of the loads by what the displacements `u` shift them, at every instant.
+    /// Returns the torque that the loads gain by the displacements `u` of their points, at every instant.
     fn shifts(&self, motion: &[Instant], u: &Mat<f64>) -> Vec<Vector3<f64>> {
         let mut torques = vec![Vector3::zeros(); motion.len()];
         for (at, unit) in self.loads.iter().enumerate() {
@@ -64,7 +65,7 @@ impl NodalView<'_> {
         torques
     }
 
-    /// Displacement of the point with the unit loads `unit`, axes of the model, of every column.
+    /// Returns the displacement of the point with the unit loads `unit`, axes of the model, for every column.
     pub(super) fn moved(&self, unit: MatRef<'_, f64>, displacements: MatRef<'_, f64>) -> Vec<Vector3<f64>> {
         let d = self.model.dimension();
         let moved = gram(unit.subcols(0, d), displacements);
@@ -72,8 +73,8 @@ impl NodalView<'_> {
         (0..moved.ncols()).map(of).collect()
     }
 
-    /// Displacements Psi q + X y of all rows at some instants, with their rates and accelerations: `columns`
-    /// are X, `amplitudes` y, y' and y''.
+    /// Returns the displacements Psi q + X y of all rows at the given instants, with rates and accelerations. `columns`
+    /// is X, `amplitudes` are y, y' and y''.
     pub(super) fn field(
         &self,
         motion: &[Instant],

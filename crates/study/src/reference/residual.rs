@@ -1,4 +1,4 @@
-//! The forces that the equations of all nodes leave unbalanced in the motion of a body.
+//! Forces that the equations of all nodes leave unbalanced in the motion of a body.
 
 use super::held::Held;
 use faer::{Mat, MatRef};
@@ -12,79 +12,79 @@ use flexbody_motion::dynamics::NodalPoint;
 use flexbody_motion::scene::Instant;
 use nalgebra::{Matrix3, Vector3};
 
-/// Instants that are computed together.
+/// Number of instants that are evaluated together. It limits the memory for nodal vectors.
 pub(super) const BLOCK: usize = 32;
 
-/// A body in its frame, seen from the rows of its model.
+/// A body in its frame, expressed in the rows of its model.
 pub(super) struct NodalView<'m> {
     pub model: &'m FeModel,
-    /// The model that answers forces: under the couplings of the body, or without.
+    /// Model whose response to forces is computed: with the couplings of the body, or without.
     pub coupled: CoupledModel<'m>,
-    /// Psi (N x nf), M Psi and D Psi, rows and axes of the model.
+    /// Modes Psi (N x nf), M Psi and D Psi, in rows and axes of the model.
     pub vectors: Mat<f64>,
     pub weighted: Mat<f64>,
     pub damped: Mat<f64>,
-    /// m_ff = Psi'M Psi, and its Cholesky factor.
+    /// Modal mass m_ff = Psi'M Psi, and its Cholesky factor.
     pub modal_mass: Mat<f64>,
     lower: Mat<f64>,
-    /// D_ff of the modes.
+    /// Damping D_ff of the modes.
     pub modal_damping: Mat<f64>,
-    /// Damping of the model, unless the scene replaces it.
+    /// Damping of the model; `None` if the scene replaces it.
     damping: Option<&'m Damping<SymmetricMatrix>>,
-    /// Whether the body has stiffness that depends on the motion, which nodes do not have.
+    /// True if the body has stiffness that depends on its motion, which the nodal equations do not have.
     stiffens: bool,
     /// Rigid motions about the origin of the frame (N x 6, in the plane N x 3), axes of the model.
     pub rigid: Mat<f64>,
-    /// The rows that inertia acts on, the modes there and M times these where they are not the rows of the model,
-    /// and rigid motions about their centre.
+    /// Rows that inertia acts on (extended rows if nodal rotations carry mass).
     pub rows: InertialRows<'m>,
+    /// Modes in the extended rows and M times these; `None` if inertia acts on the rows of the model.
     extended: Option<[Mat<f64>; 2]>,
+    /// Rigid motions of the rows that inertia acts on, about their centre.
     pub extended_rigid: Mat<f64>,
-    /// Where that centre is from the origin of the frame, axes of the model.
+    /// Position of that centre relative to the origin of the frame, axes of the model.
     pub centre: Vector3<f64>,
     /// Axes of the frame in the model.
     pub axes: Matrix3<f64>,
-    /// Nodal forces of unit forces and torques where each load of the scene acts (N x 6, in the plane N x 3).
+    /// Nodal forces of unit forces and torques at the point of each load of the scene (N x 6, in the plane N x 3).
     pub loads: Vec<Mat<f64>>,
-    /// What carries the body.
+    /// Point that carries the body; `None` for a free body.
     pub held: Option<Held>,
 }
 
-/// Forces that are left unbalanced.
+/// Unbalanced forces, split into a nodal and a modal part.
 pub(super) struct Unbalanced {
-    /// At the nodes, beside what they do to the modes (N of every instant).
+    /// Nodal forces without their modal part (N x instants).
     pub forces: Mat<f64>,
-    /// What they do to the modes (nf of every instant).
+    /// Modal forces (nf x instants).
     pub in_modes: Mat<f64>,
 }
 
-/// Displacements of all rows of the model with their rates and accelerations, relative to the frame (N of every instant).
+/// Displacements of all rows of the model with their rates and accelerations, relative to the frame (N x instants).
 pub(super) struct Displacements {
     pub u: Mat<f64>,
     pub ud: Mat<f64>,
     pub udd: Mat<f64>,
 }
 
-/// Inertia of the rows that it acts on ([`InertialRows`]) at every instant, gravity as an acceleration that is not
-/// there. Where rotations of nodes carry mass, V = 0 and V' - g is a = V' + omega x V - g, both of the centre of
-/// mass.
+/// Inertia of the rows that it acts on ([`InertialRows`]) at every instant. Gravity enters as a negative acceleration.
+/// If nodal rotations carry mass, V = 0 and V' - g is a = V' + omega x V - g, both of the centre of mass.
 pub(super) struct Inertia {
-    /// The displacements u and rates u' there.
+    /// Displacements u and rates u' of these rows.
     pub u: Mat<f64>,
     pub ud: Mat<f64>,
-    /// w = M (R (V, omega) + omega x u + u').
+    /// Momentum w = M (R (V, omega) + omega x u + u').
     pub momentum: Mat<f64>,
-    /// M (R (V' - g, omega') + omega' x u + omega x u' + u'').
+    /// Inertia forces M (R (V' - g, omega') + omega' x u + omega x u' + u'').
     pub change: Mat<f64>,
 }
 
 impl<'m> NodalView<'m> {
-    /// `body`, with the damping of its scene, which was made of `model` and is carried by the point
-    /// `carrier`; `None` when it has other rows, modes that depend on each other, or is carried by a point
-    /// without an orientation.
+    /// Builds the view of `body`, which has the damping of its scene and may be carried by the point `carrier`. Returns
+    /// `None` if the body has other rows than its model, if its modes are linearly dependent, or if the carrier has no
+    /// orientation.
     ///
-    /// * `coupled`: the model under the couplings of `body`.
-    /// * `damping`: that of the model, unless the scene replaces it by that of `body`.
+    /// * `coupled`: the model that the body was made of, with the couplings to be assumed.
+    /// * `damping`: damping of the model; `None` if the model has none or the scene replaces it.
     pub(super) fn new(
         coupled: CoupledModel<'m>,
         body: &FlexBody,
@@ -133,12 +133,13 @@ impl<'m> NodalView<'m> {
         Some(view)
     }
 
-    /// r = f - K u - D u' - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with
-    /// w = M (R (V, omega) + omega x u + u') and u = Psi q (theory 6.9 to 6.13), a column for every
-    /// instant, parted into g = Psi'r and r - M Psi m_ff^-1 g, of which what carries the body takes the
-    /// resultants. g vanishes but for what the equations of the body take as approximate; of geometric
-    /// stiffness, which nodes do not have, nothing is counted.
+    /// Returns r = f - K u - D u' - omega x w - M (R (V', omega') + omega' x u + omega x u' + u'') with w = M (R (V,
+    /// omega) + omega x u + u') and u = Psi q (theory 6.9 to 6.13), one column for every instant. The forces are split
+    /// into g = Psi'r and r - M Psi m_ff^-1 g; the resultants of the latter act on the carrying point, if there is one.
+    /// g vanishes except for approximations in the equations of the body. Geometric stiffness is not included, since
+    /// the nodal equations do not have it.
     pub(super) fn unbalanced(&self, motion: &[Instant]) -> Unbalanced {
+        // Inertia and Coriolis forces, with the stiffness of inertia if nodal rotations carry mass.
         let own = |of: fn(&Instant) -> &Vec<f64>| self.displacements(motion, of);
         let field = Displacements { u: own(|now| &now.q), ud: own(|now| &now.qd), udd: own(|now| &now.qdd) };
         let Inertia { momentum, mut change, .. } = self.inertia(motion, &field);
@@ -150,13 +151,14 @@ impl<'m> NodalView<'m> {
                 self.rows.add_second_order(&rigid, field.u.col_as_slice(i), taken.col_as_slice_mut(i));
             }
         }
+        // Elastic and damping forces; the loads minus all of these are unbalanced.
         taken += self.model.pencil().apply_stiffness(field.u.as_ref());
         let rates = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| motion[i].qd[j]);
         taken += combine(self.damped.as_ref(), rates.as_ref());
         self.part(self.loads_of(motion) - taken)
     }
 
-    /// Parts forces as those that are left unbalanced: what they do to the modes, and the rest.
+    /// Splits forces into modal forces and the nodal rest.
     pub(super) fn part(&self, mut forces: Mat<f64>) -> Unbalanced {
         let mut in_modes = gram(self.vectors.as_ref(), forces.as_ref());
         subtract_combination(forces.as_mut(), self.weighted.as_ref(), self.over_mass(&in_modes).as_ref());
@@ -170,7 +172,7 @@ impl<'m> NodalView<'m> {
         Unbalanced { forces, in_modes }
     }
 
-    /// The forces of [`NodalView::unbalanced`] beside what they do to the modes, few instants at a time.
+    /// Returns the nodal part of [`NodalView::unbalanced`], evaluated in blocks of instants.
     pub(super) fn residual(&self, motion: &[Instant]) -> Mat<f64> {
         let mut residual = Mat::zeros(self.vectors.nrows(), motion.len());
         for first in (0..motion.len()).step_by(BLOCK) {
@@ -180,19 +182,20 @@ impl<'m> NodalView<'m> {
         residual
     }
 
-    /// m_ff^-1 x.
+    /// Returns m_ff^-1 x.
     pub(super) fn over_mass(&self, x: &Mat<f64>) -> Mat<f64> {
         solve_upper(&self.lower, &solve_lower(&self.lower, x))
     }
 
-    /// D Psi, as the equations of all nodes have it: that of the model, else that of the modes on the nodes
-    /// (theory 6.15).
+    /// Returns D Psi in the equations of all nodes: with the damping matrix of the model if it has one, else with the
+    /// modal damping distributed to the nodes (theory 6.15).
     fn damping_of_modes(&self) -> Mat<f64> {
         self.damped_by_model(self.vectors.as_ref())
             .unwrap_or_else(|| combine(self.weighted.as_ref(), self.over_mass(&self.modal_damping).as_ref()))
     }
 
-    /// D x with the damping of the model by mass and stiffness or by a matrix; `None` where it has none of these.
+    /// Returns D x with the mass- and stiffness-proportional damping or the damping matrix of the model; `None` if the
+    /// model has neither.
     pub(super) fn damped_by_model(&self, x: MatRef<'_, f64>) -> Option<Mat<f64>> {
         let pencil = self.model.pencil();
         match self.damping? {
@@ -210,17 +213,17 @@ impl<'m> NodalView<'m> {
         }
     }
 
-    /// The inertia of the displacements `field` while the frame moves as in `motion`.
+    /// Returns the inertia of the displacements `field` in a frame that moves as in `motion`.
     fn inertia(&self, motion: &[Instant], field: &Displacements) -> Inertia {
         self.inertia_of(motion, [&field.u, &field.ud, &field.udd].map(|x| self.rows.extend(x).into_owned()))
     }
 
-    /// The same with nodes that turn to second order, as momenta have it.
+    /// Returns the inertia of the displacements `field` with directors that turn to second order, as momenta require.
     pub(super) fn inertia_of_turned(&self, motion: &[Instant], field: &Displacements) -> Inertia {
         self.inertia_of(motion, self.rows.extend_turned([&field.u, &field.ud, &field.udd]))
     }
 
-    /// The inertia of displacements, rates and accelerations of the rows that it acts on.
+    /// Returns the inertia for displacements, rates and accelerations of the rows that inertia acts on.
     fn inertia_of(&self, motion: &[Instant], [u, ud, udd]: [Mat<f64>; 3]) -> Inertia {
         let omega = |i: usize| self.axes * motion[i].omega;
         let mut velocity = self.rigid_part(motion, |now| self.rigid_velocity(now)) + &ud;
@@ -232,13 +235,13 @@ impl<'m> NodalView<'m> {
         Inertia { u, ud, momentum: weigh(&velocity), change: weigh(&acceleration) }
     }
 
-    /// (V, omega) of [`Inertia`], axes of the frame.
+    /// Returns (V, omega) of [`Inertia`], axes of the frame.
     pub(super) fn rigid_velocity(&self, now: &Instant) -> (Vector3<f64>, Vector3<f64>) {
         let velocity = if self.rows.have_directors() { Vector3::zeros() } else { now.velocity };
         (velocity, now.omega)
     }
 
-    /// (V' - g, omega') of [`Inertia`], axes of the frame.
+    /// Returns (V' - g, omega') of [`Inertia`], axes of the frame.
     pub(super) fn free_acceleration(&self, now: &Instant) -> (Vector3<f64>, Vector3<f64>) {
         let mut linear = now.velocity_rate - now.gravity;
         if self.rows.have_directors() {
@@ -248,13 +251,13 @@ impl<'m> NodalView<'m> {
         (linear, now.omega_rate)
     }
 
-    /// The acceleration of the undeformed body about the centre of mass, axes of the model.
+    /// Returns the acceleration of the undeformed body about the centre of mass, axes of the model.
     pub(super) fn rigid_acceleration(&self, now: &Instant) -> RigidAcceleration {
         let (linear, angular) = self.free_acceleration(now);
         RigidAcceleration::new(self.axes * linear, self.axes * angular, &(self.axes * now.omega))
     }
 
-    /// The modes in the rows that inertia acts on, and the mass times these.
+    /// Returns the modes in the rows that inertia acts on, and the mass times these.
     pub(super) fn extended(&self) -> [&Mat<f64>; 2] {
         match &self.extended {
             Some([modes, weighted]) => [modes, weighted],
@@ -262,13 +265,13 @@ impl<'m> NodalView<'m> {
         }
     }
 
-    /// Psi q, or with the rates or accelerations in place of q.
+    /// Returns Psi q at the given instants. `of` returns q, its rate or its acceleration.
     pub(super) fn displacements(&self, motion: &[Instant], of: impl Fn(&Instant) -> &Vec<f64>) -> Mat<f64> {
         let q = Mat::from_fn(self.vectors.ncols(), motion.len(), |j, i| of(&motion[i])[j]);
         combine(self.vectors.as_ref(), q.as_ref())
     }
 
-    /// R (linear, angular) of the rows that inertia acts on, given along the axes of the frame.
+    /// Returns R (linear, angular) in the rows that inertia acts on. `of` returns the vectors in axes of the frame.
     fn rigid_part(
         &self,
         motion: &[Instant],
@@ -278,7 +281,7 @@ impl<'m> NodalView<'m> {
         combine(self.extended_rigid.as_ref(), amplitudes.as_ref())
     }
 
-    /// A linear and an angular vector in the coordinates of the model, a column for every instant.
+    /// Returns a linear and an angular vector in axes of the model, one column for every instant.
     pub(super) fn along_model(
         &self,
         motion: &[Instant],
@@ -298,7 +301,7 @@ impl<'m> NodalView<'m> {
         both
     }
 
-    /// Nodal forces of the loads of the scene.
+    /// Returns the nodal forces of the loads of the scene.
     pub(super) fn loads_of(&self, motion: &[Instant]) -> Mat<f64> {
         let mut forces = Mat::zeros(self.vectors.nrows(), motion.len());
         for (at, columns) in self.loads.iter().enumerate() {
@@ -307,7 +310,7 @@ impl<'m> NodalView<'m> {
         forces
     }
 
-    /// Force and torque of one of the loads, as many of their components as act on its point.
+    /// Returns force and torque of load `at`, with the components that act on its point.
     pub(super) fn load_amplitudes(&self, motion: &[Instant], at: usize) -> Mat<f64> {
         let amplitudes = self.along_model(motion, |now| now.loads[at]);
         amplitudes.as_ref().subrows(0, self.loads[at].ncols()).to_owned()

@@ -1,4 +1,4 @@
-//! The frequencies at which forces drive what a body lacks beyond their static responses.
+//! Frequencies at which forces excite the truncated modes beyond their static responses.
 
 use super::compressed::principal;
 use super::grid::Grid;
@@ -8,52 +8,54 @@ use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 
-/// Frequencies at the most.
+/// Largest number of resonances.
 const MOST: usize = 4;
 
-/// Combinations of forces that are looked at, and the part of the sum of their squares that is not.
+/// Largest number of force combinations whose spectrum is computed.
 const MOST_COMBINATIONS: usize = 8;
+/// Part of the sum of squares of the combinations that may be dropped.
 const LEFT_OUT: f64 = 1e-12;
 
-/// A spectrum rises over what is around it by this factor where it has a resonance: that of a step is level, and noise
-/// rises so far now and then.
+/// Smallest ratio of a spectral line to the median around it at which the line counts as a resonance. The spectrum of a
+/// step is smooth; noise reaches this ratio now and then.
 const PEAK: f64 = 3.0;
 
-/// What is around a frequency: from this part of it to one over this part.
+/// Neighbourhood of a frequency, as a ratio: from this part of the frequency to the frequency over this part.
 const AROUND: f64 = 0.7;
 
-/// Lines of the spectrum beside a resonance that belong to it.
+/// Number of spectral lines on each side of a resonance that belong to it.
 const WIDTH: usize = 6;
 
-/// Instants of the uniform series at the most.
+/// Largest number of instants of the uniform series.
 const MOST_INSTANTS: usize = 1 << 20;
 
-/// The motion whose forces are looked at for resonances, and the size of one that counts.
+/// Criteria of a search for resonances.
 pub(super) struct Question {
     /// True if the motion starts in equilibrium.
     pub settled: bool,
-    /// Root of the elastic energy that does not count.
+    /// Root of the elastic energy below which a resonance is negligible.
     pub negligible: f64,
-    /// Circular frequency below which the body lacks no mode.
+    /// Circular frequency below which no mode of the model is truncated.
     pub complete_below: f64,
 }
 
-/// A frequency with much of the forces.
+/// Frequency at which the forces have much energy.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Resonance {
     /// Circular frequency.
     pub rate: f64,
-    /// Amplitudes of the forces that are in phase with each other, and of those a quarter of a period later (k x 2).
+    /// Amplitudes of the forces in phase and a quarter period later (k x 2).
     pub amplitudes: Mat<f64>,
 }
 
-/// Frequencies at which forces with the amplitudes c(t) drive an oscillator of unit static response so far that its
-/// elastic energy is not negligible, strongest first.
+/// Returns the frequencies, strongest first, at which forces with the amplitudes c(t) excite an oscillator of unit
+/// static response to an elastic energy that is not negligible.
 ///
-/// An oscillator x'' + w^2 x = w^2 c without damping swings about its static response by the integral of c' cos w (t -
-/// s) ds: at most by |C'(w)|, the Fourier transform of c' over the run, a step at its beginning with it.
+/// An undamped oscillator x'' + w^2 x = w^2 c oscillates about its static response by the integral of c' cos w (t - s)
+/// ds. This is at most |C'(w)|, the Fourier transform of c' over the run, including a step at the beginning.
 ///
-/// * `amplitudes`: c (k x m) at the instants of `grid`; `energy`: E'K E of their static responses (k x k).
+/// * `amplitudes`: c (k x m) at the instants of `grid`.
+/// * `energy`: E'K E of their static responses (k x k).
 pub(super) fn resonances(
     grid: &Grid,
     amplitudes: &Mat<f64>,
@@ -64,6 +66,7 @@ pub(super) fn resonances(
     let Some(duration) = grid.times.last().copied().filter(|last| *last > 0.0) else { return Vec::new() };
     let count = (2 * grid.times.len()).next_power_of_two().min(MOST_INSTANTS);
     let step = duration / count as f64;
+    // Spectrum of the force increments: the root of the elastic energy at each line.
     let combinations = combinations(amplitudes, energy);
     let mut level = vec![0.0f64; count + 1];
     for j in 0..combinations.nrows() {
@@ -72,12 +75,14 @@ pub(super) fn resonances(
         level.iter_mut().zip(&lines).for_each(|(level, line)| *level += line.norm_sqr());
     }
     level.iter_mut().for_each(|level| *level = (0.5 * *level).sqrt());
+    // Local maxima above the negligible level and above the complete range, strongest first.
     let rate = |line: usize| TAU * line as f64 / (2.0 * duration);
     let first = (complete_below / rate(1)).ceil().max(1.0) as usize;
     let mut peaks: Vec<usize> = (first.max(1)..count / 2)
         .filter(|&line| level[line] > negligible && level[line] >= level[line - 1].max(level[line + 1]))
         .collect();
     peaks.sort_by(|&a, &b| level[b].total_cmp(&level[a]));
+    // Keep maxima that are apart from each other and well above their neighbourhood.
     let mut chosen: Vec<usize> = Vec::new();
     for line in peaks {
         let is_apart = chosen.iter().all(|other| other.abs_diff(line) > WIDTH);
@@ -95,7 +100,8 @@ pub(super) fn resonances(
     chosen.into_iter().map(resonance).collect()
 }
 
-/// Combinations of the amplitudes in the root of the elastic energy of their static responses, those that have most.
+/// Returns the dominant combinations of the amplitudes, scaled to the root of the elastic energy of their static
+/// responses.
 fn combinations(amplitudes: &Mat<f64>, energy: &Mat<f64>) -> Mat<f64> {
     let none = || Mat::zeros(0, amplitudes.ncols());
     let Some((turned, roots)) = principal(energy.clone(), 0.0, usize::MAX) else { return none() };
@@ -108,8 +114,8 @@ fn combinations(amplitudes: &Mat<f64>, energy: &Mat<f64>) -> Mat<f64> {
     }
 }
 
-/// Increments of `values`, linear between the instants, over `count` equal steps; the value at the start is one where
-/// the motion does not start in equilibrium.
+/// Returns the increments of `values`, linear between the instants, over `count` equal steps. Unless the motion starts
+/// in equilibrium, the initial value is part of the first increment.
 fn increments(grid: &Grid, values: &[f64], step: f64, count: usize, settled: bool) -> Vec<f64> {
     let mut at = 0;
     let mut value = |time: f64| {
@@ -129,7 +135,8 @@ fn increments(grid: &Grid, values: &[f64], step: f64, count: usize, settled: boo
     increments
 }
 
-/// Fourier transform of a series, with as many zeros after it: lines at half the frequency of one period in all.
+/// Returns the Fourier transform of a series padded with as many zeros: the line spacing is half of one period over the
+/// series.
 fn spectrum(series: &[f64]) -> Vec<Complex<f64>> {
     let mut lines: Vec<Complex<f64>> = series.iter().map(|value| Complex::new(*value, 0.0)).collect();
     lines.resize(2 * series.len(), Complex::default());
@@ -138,7 +145,7 @@ fn spectrum(series: &[f64]) -> Vec<Complex<f64>> {
     lines
 }
 
-/// The median of a spectrum around a line.
+/// Returns the median of the spectrum around a line, without the lines that belong to it.
 fn around(level: &[f64], line: usize) -> f64 {
     let from = (AROUND * line as f64) as usize;
     let to = ((line as f64 / AROUND) as usize).max(line + 2 * WIDTH).min(level.len() - 1);
@@ -148,8 +155,8 @@ fn around(level: &[f64], line: usize) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::INFINITY)
 }
 
-/// Fourier transform of the increments of every amplitude at the circular frequency `rate`, real and imaginary part,
-/// the larger of which is of size one.
+/// Returns the Fourier transform of the increments of every amplitude at the circular frequency `rate`: real and
+/// imaginary part, scaled so that the largest entry is one.
 fn transform(grid: &Grid, amplitudes: &Mat<f64>, rate: f64, settled: bool) -> Mat<f64> {
     let mut parts = Mat::<f64>::zeros(amplitudes.nrows(), 2);
     let mut add = |row: usize, increment: f64, time: f64| {
@@ -190,8 +197,8 @@ mod tests {
         all.into_iter().map(|resonance| resonance.rate / TAU).collect()
     }
 
-    /// A sine of a thousandth beside a ramp drives an oscillator of its frequency by a thousandth of pi times the
-    /// number of its periods; a step and a ramp have no resonance, and neither has what is too small to count.
+    /// A sine of amplitude 1e-3 beside a ramp excites an oscillator of its frequency to 1e-3 times pi times the number
+    /// of periods. A step and a ramp have no resonance, and neither has a sine below the negligible level.
     #[test]
     fn a_small_sine_beside_a_ramp_is_a_resonance() {
         let both = |t: f64| 0.1 * t + 1e-3 * (TAU * 20.0 * t).sin();

@@ -1,4 +1,4 @@
-//! How what a body lacks turns it: the error of the attitude of a free body.
+//! Rotation of a free body by its truncated part: the error of the attitude.
 
 use super::residual::NodalView;
 use faer::Mat;
@@ -6,21 +6,21 @@ use flexbody_linalg::{combine, gram};
 use flexbody_motion::scene::Instant;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// What a free body and the static responses E that it lacks have of angular momentum, in body axes. In the
-/// plane all but the entries about z are zero.
+/// Angular momentum of a free body and of the static responses E outside its modes, in body axes. In the plane all
+/// entries except those about z are zero.
 pub(super) struct Turning {
-    /// J, about the centre of mass.
+    /// Inertia tensor J about the centre of mass.
     inertia: Matrix3<f64>,
     /// First-order change of J by each response.
     changes: Vec<Matrix3<f64>>,
-    /// Displacement by each response where each load acts.
+    /// Displacement of each load's point by each response.
     at_loads: Vec<Vec<Vector3<f64>>>,
     plane: bool,
 }
 
 impl Turning {
-    /// With the rotations R_a = e_a x (x - x_cm) of points (and of directors) about the axes of the body, J_ab = R_a'M
-    /// R_b, and to first order R_a changes by e_a x u.
+    /// Computes inertia and its changes. With the rotations R_a = e_a x (x - x_cm) of points (and of directors) about
+    /// the axes of the body, J_ab = R_a'M R_b; to first order R_a changes by e_a x u.
     pub(super) fn new(view: &NodalView<'_>, responses: &Mat<f64>) -> Self {
         let plane = view.model.dimension() == 2;
         let turns = central_turns(view);
@@ -30,8 +30,10 @@ impl Turning {
             true => Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, own[(0, 0)])),
             false => Matrix3::from_fn(|a, b| own[(a, b)]),
         };
+        // J_ab = R_a'M R_b.
         let inertia = square(&gram(turns.as_ref(), weighted.as_ref()));
         let change = |j: usize| {
+            // Change of J_ab: (e_a x u)'M R_b and its transpose.
             let repeated = Mat::from_fn(turns.nrows(), turns.ncols(), |row, _| extended[(row, j)]);
             let mut turned = Mat::<f64>::zeros(turns.nrows(), turns.ncols());
             let axis = |k: usize| view.axes.column(if plane { 2 } else { k }).into_owned();
@@ -49,15 +51,15 @@ impl Turning {
         Self { inertia, changes, at_loads: view.loads.iter().map(at_load).collect(), plane }
     }
 
-    /// The angle theta between the frames of all nodes and of the body, at every instant of the `motion`, whose
-    /// missed responses have the `amplitudes` c. Angular momentum is J omega in both; to first order
+    /// Returns the angle theta between the frames of all nodes and of the body at every instant of the `motion`. The
+    /// `amplitudes` c belong to the responses. The angular momentum is J omega in both; to first order
     ///
     /// theta' = delta omega - omega x theta,
     /// J delta omega = (J omega) x theta - (delta J) omega + l,
     /// l' = sum of (delta u) x F - omega x l,
     ///
-    /// with delta J and the displacements delta u of the loads F linear in c. Coefficients are constant
-    /// between instants, and the equations solved exactly there. Both begin with the same omega.
+    /// with delta J and the displacements delta u at the loads F linear in c. The coefficients are constant between
+    /// instants, and the equations are solved exactly there. Both frames begin with the same omega.
     pub(super) fn angles(&self, motion: &[Instant], amplitudes: &Mat<f64>) -> Vec<f64> {
         let mut state = SVector::<f64, 7>::zeros();
         let Some(first) = motion.first() else { return Vec::new() };
@@ -66,6 +68,7 @@ impl Turning {
         state[6] = 1.0;
         let mut angles = vec![0.0];
         for (i, pair) in motion.windows(2).enumerate() {
+            // Constant coefficients over the step: exact by the matrix exponential.
             let midway = |row: usize| 0.5 * (amplitudes[(row, i)] + amplitudes[(row, i + 1)]);
             let c: Vec<f64> = (0..amplitudes.nrows()).map(midway).collect();
             let step = pair[1].time - pair[0].time;
@@ -75,7 +78,7 @@ impl Turning {
         angles
     }
 
-    /// The matrix of the rates of (theta, l, 1).
+    /// Returns the matrix of the linear differential equations for (theta, l, 1).
     fn rates(&self, first: &Instant, second: &Instant, c: &[f64]) -> SMatrix<f64, 7, 7> {
         let omega = 0.5 * (first.omega + second.omega);
         let mut torque = Vector3::zeros();
@@ -97,12 +100,12 @@ impl Turning {
         rates
     }
 
-    /// delta J by responses with the amplitudes c.
+    /// Returns delta J for responses with the amplitudes c.
     fn change(&self, c: &[f64]) -> Matrix3<f64> {
         self.changes.iter().zip(c).fold(Matrix3::zeros(), |sum, (own, c)| sum + own * *c)
     }
 
-    /// The inverse of J; zero where a body has none, as one that lies on a line.
+    /// Returns the inverse of J; zero if J is singular, as for a body on a line.
     fn inverse(&self) -> Matrix3<f64> {
         match self.plane {
             true => Matrix3::from_diagonal(&Vector3::new(0.0, 0.0, self.inertia[(2, 2)].recip())),
@@ -111,8 +114,8 @@ impl Turning {
     }
 }
 
-/// Rotations about the axes of the body through the centre of mass of the rows that inertia acts on, three columns,
-/// in the plane one.
+/// Returns the rotations about the body axes through the centre of mass, in the rows that inertia acts on: three
+/// columns, in the plane one.
 fn central_turns(view: &NodalView<'_>) -> Mat<f64> {
     let d = view.model.dimension();
     let (shifts, turns) = view.extended_rigid.as_ref().split_at_col(d);
@@ -120,6 +123,7 @@ fn central_turns(view: &NodalView<'_>) -> Mat<f64> {
         2 => turns.to_owned(),
         _ => combine(turns, Mat::from_fn(3, 3, |i, j| view.axes[(i, j)]).as_ref()),
     };
+    // Shift the axes to the centre of mass, so that rotations are M-orthogonal to translations.
     let weighted = view.rows.weigh(shifts);
     let mass = gram(shifts, weighted.as_ref())[(0, 0)];
     let moments = gram(weighted.as_ref(), turns.as_ref());
@@ -165,12 +169,12 @@ mod tests {
         for (i, angle) in turning().angles(&motion, &grown).iter().enumerate().skip(1) {
             assert!((angle - 0.05 * 0.5 * (i as f64 - 0.5)).abs() < 1e-12, "{i}: {angle}");
         }
-        // One that was as large from the start began with more angular momentum.
+        // A body with the larger moment from the start has the larger angular momentum and does not turn away.
         let steady = turning().angles(&motion, &Mat::full(1, 9, 1.0));
         assert!(steady.iter().all(|angle| *angle < 1e-12), "{steady:?}");
     }
 
-    /// A force at a place that lies 1e-3 beside turns a body at rest by F s t^2 / 2 J.
+    /// A force at a point displaced by s = 1e-3 turns a body at rest by F s t^2 / 2 J.
     #[test]
     fn a_load_beside_its_place_turns_the_body() {
         let motion = instants(Vector3::zeros(), Vector3::new(0.0, 8.0, 0.0), 4, 0.25);

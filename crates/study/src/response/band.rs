@@ -1,63 +1,65 @@
-//! Frequencies at which a response is looked at.
+//! Frequencies at which a response is evaluated.
 
-/// A band over which frequencies are spaced by ratio spans at least this ratio.
+/// Smallest ratio of the ends of a band whose frequencies are spaced by equal ratios.
 const WIDE: f64 = 20.0;
 
-/// Half the width of a resonance, relative, where damping makes it no wider.
+/// Smallest relative half width of a resonance, used if damping makes it no wider.
 const NARROWEST: f64 = 1e-3;
 
-/// How far from the natural frequency, relative, the peak of a damped resonance is looked for at least: at
-/// the frequency itself the dynamic stiffness without damping is singular.
+/// Smallest relative distance from the natural frequency at which the peak of a damped resonance is evaluated: at the
+/// natural frequency itself the undamped dynamic stiffness is singular.
 const BESIDE: f64 = 1e-6;
 
-/// Resonances with more damping than this have a peak that is looked at; others are sampled on both sides of
-/// their pole.
+/// Damping ratio above which the peak of a resonance is evaluated. Resonances with less damping are sampled on both
+/// sides of their pole.
 const DAMPED: f64 = 1e-5;
 
-/// How far below the natural frequency, relative, the peak of a strongly damped resonance is looked for at most: beyond a
-/// ratio of 0.7 the response has no peak.
+/// Largest relative distance below the natural frequency at which the peak of a strongly damped resonance is evaluated:
+/// for damping ratios above 0.7 the response has no peak.
 const MOST_SHIFTED: f64 = 0.5;
 
-/// How near to a natural frequency, relative, no response is evaluated: without damping it has no finite
-/// value there, and with damping the matrix without it cannot be solved with.
+/// Relative distance from a natural frequency without damping within which no response is evaluated, since it is
+/// infinite at the frequency itself.
 const POLE: f64 = 1e-4;
+/// Relative distance from a damped natural frequency within which no response is evaluated, since the undamped matrix
+/// is nearly singular there.
 const DAMPED_POLE: f64 = 3e-7;
 
-/// Natural frequencies of one cluster differ by less, relative.
+/// Relative difference below which natural frequencies belong to one cluster.
 const SAME: f64 = 1e-6;
 
-/// Places around a resonance, in half widths, that only the curves of modes are evaluated at.
+/// Positions around a resonance, in half widths, at which only the modal responses are evaluated.
 const AROUND: [f64; 8] = [-8.0, -4.0, -2.0, -0.5, 0.5, 2.0, 4.0, 8.0];
 
-/// Most resonances that are looked at closely.
+/// Largest number of resonances that get frequencies of their own.
 const MOST_RESONANCES: usize = 60;
 
-/// A range of frequencies in hertz, 0 <= low < high.
+/// Range of frequencies in hertz, 0 <= low < high.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Band {
     low: f64,
     high: f64,
 }
 
-/// How frequencies are spaced.
+/// Spacing of frequencies in a band.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Spacing {
-    /// By equal differences.
+    /// Frequencies at equal differences.
     Linear,
-    /// By equal ratios.
+    /// Frequencies at equal ratios.
     Logarithmic,
 }
 
-/// A natural frequency in hertz, and the damping ratio there.
+/// Natural frequency and damping ratio of a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resonance {
-    /// Natural frequency.
+    /// Natural frequency, in hertz.
     pub hertz: f64,
     /// Damping ratio.
     pub ratio: f64,
 }
 
-/// A frequency in hertz, and whether the equations of all nodes are solved there.
+/// Frequency in hertz, and whether the equations of all nodes are solved at it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frequency {
     pub hertz: f64,
@@ -65,23 +67,23 @@ pub(super) struct Frequency {
 }
 
 impl Band {
-    /// `None` where it is no range of frequencies.
+    /// Returns the band; `None` if the ends are not 0 <= low < high with finite numbers.
     pub fn new(low: f64, high: f64) -> Option<Self> {
         (low >= 0.0 && high.is_finite() && low < high).then_some(Self { low, high })
     }
 
-    /// The lowest and the highest frequency.
+    /// Returns the lowest and the highest frequency.
     pub fn ends(&self) -> [f64; 2] {
         [self.low, self.high]
     }
 
-    /// By ratio over a band that is wide enough and does not begin at zero.
+    /// Returns the spacing: by equal ratios if the band is wide and does not begin at zero.
     pub fn spacing(&self) -> Spacing {
         if self.low > 0.0 && self.high / self.low >= WIDE { Spacing::Logarithmic } else { Spacing::Linear }
     }
 
-    /// `count` frequencies of even spacing up to the end of the band; at zero a free body has no response, so
-    /// a band from there begins one step above it.
+    /// Returns `count` evenly spaced frequencies up to the end of the band. A free body has no finite response at zero;
+    /// a band from zero begins one step above it.
     fn even(&self, count: usize) -> impl Iterator<Item = f64> + '_ {
         let steps = if self.low > 0.0 { count.max(2) - 1 } else { count.max(1) };
         let first = usize::from(self.low == 0.0);
@@ -95,8 +97,8 @@ impl Band {
         })
     }
 
-    /// About `points` frequencies, ascending, at about `solves` of which (none where that is zero) the
-    /// equations of all nodes are solved: half of these at the resonances, the rest spread evenly.
+    /// Returns about `points` frequencies in ascending order. At about `solves` of them the equations of all nodes are
+    /// solved: half of these at the resonances, the rest evenly spaced. No equations are solved if `solves` is zero.
     pub(super) fn frequencies(
         &self,
         points: usize,
@@ -106,7 +108,7 @@ impl Band {
         let within = |f: f64| f >= self.low && f <= self.high && f > 0.0;
         let mut inside: Vec<Resonance> = resonances.iter().copied().filter(|r| within(r.hertz)).collect();
         inside.sort_by(|a, b| a.hertz.total_cmp(&b.hertz));
-        // One of each cluster, that with the least damping.
+        // Keep one resonance of each cluster, with the smallest damping ratio.
         inside.dedup_by(|next, kept| {
             let same = next.hertz <= kept.hertz * (1.0 + SAME);
             if same {
@@ -115,13 +117,14 @@ impl Band {
             same
         });
         inside.truncate(MOST_RESONANCES);
+        // Solves near resonances and evenly spaced; modal responses around resonances and at all points.
         let close = if solves == 0 { Vec::new() } else { closely(&inside, solves / 2) };
         let around = inside.iter().flat_map(|r| AROUND.map(|at| r.hertz * (1.0 + at * r.half_width())));
         let free = if solves == 0 { 0 } else { solves.saturating_sub(close.len()).max(2) };
         let spread: Vec<f64> = self.even(free.max(1)).filter(|_| free > 0).collect();
         let solved = close.into_iter().chain(spread).map(|hertz| Frequency { hertz, solved: true });
         let others = around.chain(self.even(points)).map(|hertz| Frequency { hertz, solved: false });
-        // Those just outside the band too: a band may end at a resonance.
+        // Check resonances just outside the band too: a band may end at a resonance.
         let looked_at = |f: &Frequency| within(f.hertz) && !resonances.iter().any(|r| r.is_pole_at(f.hertz));
         let mut all: Vec<Frequency> = solved.chain(others).filter(looked_at).collect();
         all.sort_by(|a, b| a.hertz.total_cmp(&b.hertz).then(b.solved.cmp(&a.solved)));
@@ -131,18 +134,18 @@ impl Band {
 }
 
 impl Resonance {
-    /// Relative to its frequency.
+    /// Returns the half width of the resonance relative to its frequency.
     fn half_width(&self) -> f64 {
         self.ratio.clamp(NARROWEST, 0.1)
     }
 
-    /// Whether the frequency is too near to this one to be evaluated.
+    /// Returns true if the frequency is too close to the resonance to be evaluated.
     fn is_pole_at(&self, hertz: f64) -> bool {
         let nearest = if self.ratio <= DAMPED { POLE } else { DAMPED_POLE };
         (hertz / self.hertz - 1.0).abs() < nearest
     }
 
-    /// The peak, and both sides of it, the most telling first.
+    /// Returns the frequencies of the peak and of both its sides, the most significant first.
     fn looked_at(&self) -> [f64; 3] {
         let side = self.half_width();
         let peak = if self.ratio > DAMPED {
@@ -154,7 +157,7 @@ impl Resonance {
     }
 }
 
-/// At most `most` frequencies at resonances: all three of each, or the peaks, or the peaks of some of them.
+/// Returns at most `most` frequencies at resonances: three for each, or the peak of each, or the peaks of some.
 fn closely(resonances: &[Resonance], most: usize) -> Vec<f64> {
     let of_each = if 3 * resonances.len() <= most { 3 } else { 1 };
     let stride = resonances.len().div_ceil(most.max(1)).max(1);
@@ -177,17 +180,17 @@ mod tests {
         let solved: Vec<f64> = found.iter().filter(|f| f.solved).map(|f| f.hertz).collect();
         assert_eq!(solved.len(), 20);
         assert_eq!(solved.last(), Some(&100.0));
-        // The damped peak, and nothing at the pole without damping.
+        // The damped peak is solved for; there is no frequency at the undamped pole.
         assert!(solved.contains(&(30.0 * (1.0 - 0.02 * 0.02))));
         assert!(found.iter().all(|f| (f.hertz - 80.0).abs() > 1e-3));
         assert!(solved.iter().any(|f| (f - 80.0).abs() < 0.05));
         assert!(band.frequencies(50, 0, &resonances).iter().all(|f| !f.solved));
-        // A band that ends at a resonance ends just before it.
+        // A band that ends at a resonance has its last frequency just below it.
         for end in [30.0, 30.0 * (1.0 - 1e-12)] {
             let ends_there = Band::new(0.0, end).expect("a band").frequencies(50, 20, &resonances);
             assert!(ends_there.iter().all(|f| f.hertz < 30.0 * (1.0 - 1e-7)));
         }
-        // A repeated frequency is looked at once.
+        // A repeated natural frequency is evaluated once.
         let twice = [resonances[0], resonances[0], resonances[1], resonances[2]];
         assert_eq!(band.frequencies(50, 20, &twice), found);
     }

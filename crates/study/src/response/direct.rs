@@ -1,4 +1,4 @@
-//! The equations of all nodes at one frequency, solved with a factor of the dynamic stiffness there.
+//! Equations of all nodes at one frequency, solved with a factor of the dynamic stiffness.
 
 use faer::{Mat, Scale};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -10,54 +10,55 @@ use flexbody_linalg::{
 };
 use nalgebra::{Complex, DMatrix};
 
-/// A factor with a larger backward error is no preconditioner.
+/// Largest backward error of a factor that serves as preconditioner.
 const GROWTH_LIMIT: f64 = 1e-4;
 
-/// Refinements of a solution at the most, and its last change, relative, at which it is good, and at which it
-/// still is one.
+/// Largest number of iterative refinements of a solution.
 const REFINEMENTS: usize = 4;
+/// Relative change of a solution at which refinement stops.
 const GOOD: f64 = 1e-11;
+/// Largest relative change after the last refinement at which the solution is accepted.
 const ACCEPTED: f64 = 1e-6;
 
-/// Operations per second that estimates of time assume.
+/// Floating-point operations per second that estimates of time assume.
 const PACE: f64 = 4e9;
 
-/// A free body that is loaded at places and watched at others: H(w) = L'(K + i w D - w^2 M)^-1 B; matrices, loads and
-/// N rows are those of the model under the couplings of the body.
+/// Frequency response of a free body: H(w) = L'(K + i w D - w^2 M)^-1 B. Matrices, loads and the N rows are those of
+/// the model under the couplings of the body.
 pub(super) struct DirectSolver<'m> {
     pencil: Pencil<'m>,
     analysis: Analysis,
-    /// Phi (N x 6), orthonormal in M, and M Phi.
+    /// Rigid modes Phi (N x 6), orthonormal in M, and M Phi.
     rigid: Mat<f64>,
     rigid_products: Mat<f64>,
-    /// B without what accelerates the body as a whole (N x inputs), and L (N x outputs).
+    /// Loads B without the part that accelerates the body as a whole (N x inputs), and outputs L (N x outputs).
     loads: Mat<f64>,
     measured: Mat<f64>,
-    /// L'Phi Phi'B: rigid accelerations.
+    /// Rigid accelerations L'Phi Phi'B.
     rigid_gain: Mat<f64>,
-    /// U (N x m) and C (m x m) of D = U C U', in columns that have damping; `None` without.
+    /// U (N x m) and C (m x m) of D = U C U', for the columns that have damping; `None` without damping.
     damping: Option<(Mat<f64>, Mat<f64>)>,
 }
 
-/// The response at one frequency.
+/// Frequency response at one frequency.
 pub(super) struct DirectSolution {
-    /// outputs x inputs.
+    /// Response matrix (outputs x inputs).
     pub response: DMatrix<Complex<f64>>,
-    /// Flexible natural frequencies of the model below this one: negative pivots less rigid motions.
+    /// Number of flexible natural frequencies of the model below this frequency: negative pivots minus rigid motions.
     pub modes_below: usize,
 }
 
-/// Columns with their real parts first and, with damping, their imaginary parts behind them.
+/// Columns of real parts, followed by columns of imaginary parts if there is damping.
 type Parts = Mat<f64>;
 
 impl<'m> DirectSolver<'m> {
-    /// Prepares `solves` solutions.
+    /// Prepares the solution at `solves` frequencies.
     ///
     /// * `loads`, `measured`: B and L in all rows of the model.
-    /// * `damping`: the products M Psi and the matrix of the modes, D = M Psi C (M Psi)'.
+    /// * `damping`: the products M Psi and the modal matrix C of D = M Psi C (M Psi)'.
     ///
     /// # Errors
-    /// [`MemoryShort`](Code::MemoryShort) and [`WorkLong`](Code::WorkLong), before the work.
+    /// [`MemoryShort`](Code::MemoryShort) and [`WorkLong`](Code::WorkLong), before any solution.
     pub(super) fn new(
         model: &'m CoupledModel<'_>,
         [loads, measured]: [&Mat<f64>; 2],
@@ -71,6 +72,7 @@ impl<'m> DirectSolver<'m> {
         let analysis = Analysis::new(&pencil).ok_or_else(ordering)?;
         let rigid = model.rigid_modes()?;
         let [mut loads, measured] = [loads, measured].map(|columns| model.restrict(columns.clone()));
+        // Split the rigid acceleration off the loads: B <- (1 - M Phi Phi') B.
         let rigid_products = pencil.apply_mass(rigid.as_ref());
         let rigid_loads = gram(rigid.as_ref(), loads.as_ref());
         let rigid_gain = gram(gram(rigid.as_ref(), measured.as_ref()).as_ref(), rigid_loads.as_ref());
@@ -81,6 +83,7 @@ impl<'m> DirectSolver<'m> {
         Ok(solver)
     }
 
+    /// Refuses solutions that need more memory or time than the context allows.
     fn refuse_too_much(&self, solves: usize, context: &Context<'_>) -> Result<()> {
         let (n, columns) = (self.pencil.n(), self.columns());
         let numbers = self.analysis.peaks(rayon::current_num_threads()).inertia;
@@ -106,27 +109,28 @@ impl<'m> DirectSolver<'m> {
         Ok(())
     }
 
-    /// Columns that are solved for with one factor.
+    /// Returns the number of columns that are solved for with one factor.
     fn columns(&self) -> usize {
         let inputs = self.loads.ncols();
         self.damping.as_ref().map_or(inputs, |(u, _)| 2 * inputs + u.ncols())
     }
 
-    /// Multiplications and additions of one factorisation.
+    /// Returns the number of multiplications and additions of one factorisation.
     pub(super) fn flops(&self) -> f64 {
         self.analysis.flops()
     }
 
-    /// The response at w > 0, radians per time.
+    /// Returns the response at w > 0, in radians per unit of time.
     ///
     /// # Errors
-    /// [`FactorizationFailed`](Code::FactorizationFailed) where the solution has too few digits.
+    /// [`FactorizationFailed`](Code::FactorizationFailed) if the factor or the solution is too inaccurate.
     pub(super) fn at(&self, omega: f64) -> Result<DirectSolution> {
         let factor = Indefinite::new(&self.analysis, &self.pencil, omega * omega);
         let inertia = factor.inertia();
         if inertia.zero > 0 || inertia.backward_error.is_nan() || inertia.backward_error > GROWTH_LIMIT {
             return Err(inaccurate(omega, inertia.backward_error));
         }
+        // Flexible part by the factor, rigid part -L'Phi Phi'B / w^2 in closed form.
         let point = Point { solver: self, damped: self.damped_at(&factor, omega), factor, omega };
         let x = point.solution()?;
         let product = gram(self.measured.as_ref(), x.as_ref());
@@ -138,7 +142,7 @@ impl<'m> DirectSolver<'m> {
         Ok(DirectSolution { response, modes_below: inertia.negative.saturating_sub(self.rigid.ncols()) })
     }
 
-    /// Z = A^-1 U and (1 + i w C U'Z)^-1 i w C, with A = K - w^2 M.
+    /// Returns Z = A^-1 U and (1 + i w C U'Z)^-1 i w C, with A = K - w^2 M; `None` without damping.
     fn damped_at(&self, factor: &Indefinite<'_>, omega: f64) -> Option<Damped> {
         let (u, c) = self.damping.as_ref()?;
         let mut z = u.clone();
@@ -152,20 +156,20 @@ impl<'m> DirectSolver<'m> {
         Some(Damped { z, gain })
     }
 
-    /// X <- (1 - Phi Phi'M) X.
+    /// Removes rigid motion from displacements: X <- (1 - Phi Phi'M) X.
     fn deflate(&self, x: &mut Mat<f64>) {
         let along = gram(self.rigid_products.as_ref(), x.as_ref());
         subtract_combination(x.as_mut(), self.rigid.as_ref(), along.as_ref());
     }
 
-    /// F <- (1 - M Phi Phi') F.
+    /// Removes the resultants from forces: F <- (1 - M Phi Phi') F.
     fn equilibrate(&self, f: &mut Mat<f64>) {
         let along = gram(self.rigid.as_ref(), f.as_ref());
         subtract_combination(f.as_mut(), self.rigid_products.as_ref(), along.as_ref());
     }
 }
 
-/// U and C of the columns that have damping.
+/// Returns U and C restricted to the columns that have damping; `None` if there are none.
 fn damped_columns(u: &Mat<f64>, c: &Mat<f64>) -> Option<(Mat<f64>, Mat<f64>)> {
     let damped: Vec<usize> =
         (0..c.ncols()).filter(|&j| (0..c.nrows()).any(|i| c[(i, j)] != 0.0 || c[(j, i)] != 0.0)).collect();
@@ -185,13 +189,13 @@ fn inaccurate(omega: f64, residual: f64) -> flexbody_base::error::Error {
     Diagnostic::new(Code::FactorizationFailed, message).into()
 }
 
-/// What damping adds to solutions without: (A + i w U C U')^-1 = A^-1 - Z gain U'A^-1 (Woodbury).
+/// Woodbury correction for damping: (A + i w U C U')^-1 = A^-1 - Z gain U'A^-1.
 struct Damped {
     z: Mat<f64>,
     gain: DMatrix<Complex<f64>>,
 }
 
-/// One frequency.
+/// Factor and damping correction at one frequency.
 struct Point<'s, 'm> {
     solver: &'s DirectSolver<'m>,
     factor: Indefinite<'s>,
@@ -200,7 +204,7 @@ struct Point<'s, 'm> {
 }
 
 impl Point<'_, '_> {
-    /// X = (K + i w D - w^2 M)^-1 B, refined until it stands.
+    /// Returns X = (K + i w D - w^2 M)^-1 B, refined iteratively.
     fn solution(&self) -> Result<Parts> {
         let loads = &self.solver.loads;
         let nothing = Mat::zeros(loads.nrows(), loads.ncols());
@@ -220,11 +224,11 @@ impl Point<'_, '_> {
                 break;
             }
         }
-        // Not a number fails too.
+        // This condition also rejects NaN.
         if change <= ACCEPTED { Ok(x) } else { Err(inaccurate(self.omega, change)) }
     }
 
-    /// (A + i w U C U')^-1 of self-equilibrated columns, by the factor alone.
+    /// Returns (A + i w U C U')^-1 times self-equilibrated columns, without refinement.
     fn solved(&self, columns: Parts) -> Parts {
         let mut x = columns;
         self.factor.solve_in_place(x.as_mut());
@@ -236,7 +240,7 @@ impl Point<'_, '_> {
         x
     }
 
-    /// (K + i w D - w^2 M) X.
+    /// Returns (K + i w D - w^2 M) X.
     fn product(&self, x: &Parts) -> Parts {
         let DirectSolver { pencil, damping, .. } = self.solver;
         let mut product = pencil.apply_stiffness(x.as_ref())
@@ -250,13 +254,13 @@ impl Point<'_, '_> {
     }
 }
 
-/// From columns of real parts with those of imaginary parts behind them.
+/// Returns complex columns from columns of real parts followed by columns of imaginary parts.
 fn complex(parts: &Mat<f64>) -> DMatrix<Complex<f64>> {
     let columns = parts.ncols() / 2;
     DMatrix::from_fn(parts.nrows(), columns, |i, j| Complex::new(parts[(i, j)], parts[(i, columns + j)]))
 }
 
-/// And back.
+/// Returns columns of real parts followed by columns of imaginary parts from complex columns.
 fn real(matrix: &DMatrix<Complex<f64>>) -> Mat<f64> {
     let columns = matrix.ncols();
     Mat::from_fn(matrix.nrows(), 2 * columns, |i, j| match j.checked_sub(columns) {

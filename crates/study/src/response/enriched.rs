@@ -1,5 +1,5 @@
-//! The response with what the equations of all nodes leave unbalanced added to the modes: the estimate of
-//! what the modes lack (theory section 8).
+//! Frequency response with static responses added to the modes: the estimate of the truncation error (theory section
+//! 8).
 
 use super::modal_sum::ModalSum;
 use faer::{Mat, MatRef};
@@ -12,38 +12,37 @@ use flexbody_linalg::{
     symmetric_eigen,
 };
 
-/// Residual of a mode, relative, below which it is an eigenvector and leaves nothing unbalanced.
+/// Relative residual of a mode below which it counts as an eigenvector and leaves no unbalanced force.
 const EIGENVECTOR: f64 = 1e-6;
 
-/// Part of a load that must be left beside rigid motions and modes.
+/// Smallest part of a load outside rigid motions and modes that gets a static response.
 const LEFT: f64 = 1e-10;
 
-/// Part of the elastic energy, relative to the largest, that a direction of the static responses must have to
-/// count.
+/// Smallest elastic energy of a direction of the static responses, relative to the largest, that counts as independent.
 const INDEPENDENT: f64 = 1e-9;
 
-/// A body seen from the rows of its model.
+/// A body expressed in the rows of its model.
 pub(super) struct NodalModes<'m> {
     pub model: CoupledModel<'m>,
-    /// Phi (N x 6), orthonormal in M.
+    /// Rigid modes Phi (N x 6), orthonormal in M.
     pub rigid: Mat<f64>,
-    /// Psi (N x nf), M Psi and K Psi.
+    /// Modes Psi (N x nf), M Psi and K Psi.
     pub vectors: Mat<f64>,
     pub inertial: Mat<f64>,
     pub elastic: Mat<f64>,
-    /// B (N x inputs) and L (N x outputs).
+    /// Loads B (N x inputs) and outputs L (N x outputs).
     pub loads: Mat<f64>,
     pub measured: Mat<f64>,
 }
 
 impl NodalModes<'_> {
-    /// The transfer function in the span of the modes and the static responses E = K^+
-    /// \[(1 - M Phi Phi' - M Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\] to what they leave unbalanced,
-    /// with the damping C of the modes: D = M Psi C (M Psi)'. `None` where nothing is left.
+    /// Returns the transfer function in the span of the modes and of the static responses E = K^+ \[(1 - M Phi Phi' - M
+    /// Psi Psi') \[B, L\], K Psi - M Psi Psi'K Psi\], with the modal damping C: D = M Psi C (M Psi)'. Returns `None` if
+    /// the modes leave no unbalanced force.
     ///
     /// # Errors
-    /// Those of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) where the span
-    /// has no basis.
+    /// The errors of [`free_static_responses`]; [`FactorizationFailed`](Code::FactorizationFailed) if the modes and
+    /// responses are linearly dependent.
     pub(super) fn enriched(&self, body: &FlexBody, damping: Option<&Mat<f64>>) -> Result<Option<ModalSum>> {
         let Some(static_responses) = self.static_responses(body)? else { return Ok(None) };
         let stiff = normalised(&self.vectors, &self.elastic);
@@ -57,7 +56,7 @@ impl NodalModes<'_> {
         Ok(Some(self.in_span(&all, damping).ok_or_else(dependent)?))
     }
 
-    /// E (N x k): orthonormal in K.
+    /// Returns E (N x k), orthonormal in K; `None` if there are no unbalanced forces.
     fn static_responses(&self, body: &FlexBody) -> Result<Option<Mat<f64>>> {
         let [loads, modes] = [self.unbalanced_loads(), self.unbalanced_modes(body)];
         let unbalanced = side_by_side(&[loads.as_ref(), modes.as_ref()]);
@@ -72,7 +71,7 @@ impl NodalModes<'_> {
         Ok(orthonormal(&responses, &self.model.model().pencil().apply_stiffness(responses.as_ref())))
     }
 
-    /// What rigid motions and modes leave of the loads B and L.
+    /// Returns the part of the loads B and L outside rigid motions and modes.
     fn unbalanced_loads(&self) -> Mat<f64> {
         let loads = side_by_side(&[self.loads.as_ref(), self.measured.as_ref()]);
         let mut left = loads.clone();
@@ -86,7 +85,7 @@ impl NodalModes<'_> {
         columns(&left, &kept.collect::<Vec<_>>())
     }
 
-    /// K psi - M Psi Psi'K psi of the modes that are no eigenvectors.
+    /// Returns K psi - M Psi Psi'K psi for the modes that are not eigenvectors.
     fn unbalanced_modes(&self, body: &FlexBody) -> Mat<f64> {
         let residual = &body.modes().residual;
         let kept: Vec<usize> = (0..residual.len()).filter(|&j| residual[j] > EIGENVECTOR).collect();
@@ -97,18 +96,19 @@ impl NodalModes<'_> {
         left
     }
 
-    /// The transfer function of the motion in the span of rigid motions and the columns of `span`.
+    /// Returns the transfer function of motion in the span of rigid motions and the columns of `span`.
     fn in_span(&self, span: &Mat<f64>, damping: Option<&Mat<f64>>) -> Option<ModalSum> {
         let pencil = self.model.model().pencil();
         let stiffness = gram(span.as_ref(), pencil.apply_stiffness(span.as_ref()).as_ref());
         let mass = gram(span.as_ref(), pencil.apply_mass(span.as_ref()).as_ref());
-        // K = T T' is definite on the span, and M may be singular: T^-1 M T^-T = Y diag(m) Y'.
+        // K = T T' is positive definite on the span, and M may be singular: T^-1 M T^-T = Y diag(m) Y'.
         let lower = dense_cholesky(stiffness)?;
         let half = solve_lower(&lower, &mass).transpose().to_owned();
         let whole = solve_lower(&lower, &half);
         let symmetric =
             Mat::from_fn(whole.nrows(), whole.ncols(), |i, j| 0.5 * (whole[(i, j)] + whole[(j, i)]));
         let eigen = symmetric_eigen(symmetric.as_ref())?;
+        // Coordinates of unit stiffness and diagonal mass; project loads, outputs and damping.
         let coordinates = solve_upper(&lower, &eigen.vectors);
         let seen = |columns: MatRef<'_, f64>| {
             combine(coordinates.transpose().to_owned().as_ref(), gram(span.as_ref(), columns).as_ref())
@@ -132,13 +132,12 @@ impl NodalModes<'_> {
     }
 }
 
-/// Columns with the numbers `kept`.
+/// Returns the columns with the indices `kept`.
 fn columns(a: &Mat<f64>, kept: &[usize]) -> Mat<f64> {
     Mat::from_fn(a.nrows(), kept.len(), |i, j| a[(i, kept[j])])
 }
 
-/// Columns x / sqrt(x'p) for columns x of `vectors` and p of `products`, without those where that is not
-/// positive.
+/// Returns the columns x / sqrt(x'p) for columns x of `vectors` and p of `products`. Columns with x'p <= 0 are dropped.
 fn normalised(vectors: &Mat<f64>, products: &Mat<f64>) -> Mat<f64> {
     let square = |j: usize| (0..vectors.nrows()).map(|i| vectors[(i, j)] * products[(i, j)]).sum::<f64>();
     let sizes: Vec<(usize, f64)> =
@@ -146,8 +145,8 @@ fn normalised(vectors: &Mat<f64>, products: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(vectors.nrows(), sizes.len(), |i, at| vectors[(i, sizes[at].0)] / sizes[at].1)
 }
 
-/// An orthonormal basis of what `vectors` span in the inner product whose products with them are `products`;
-/// `None` where that is nothing.
+/// Returns an orthonormal basis of the span of `vectors` in the inner product whose products with them are `products`.
+/// Returns `None` if the span is empty.
 fn orthonormal(vectors: &Mat<f64>, products: &Mat<f64>) -> Option<Mat<f64>> {
     let square = gram(vectors.as_ref(), products.as_ref());
     let symmetric =

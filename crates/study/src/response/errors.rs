@@ -1,53 +1,53 @@
-//! How far two transfer functions are apart between two places.
+//! Relative difference of two transfer functions between two places.
 
 use nalgebra::{Complex, DMatrix};
 use serde::Serialize;
 
-/// Errors below this are rounding of the two: their ratio to an estimate says nothing.
+/// Error below which rounding dominates; its ratio to an estimate is not evaluated.
 const ROUNDING: f64 = 1e-7;
 
-/// An error and where it is.
+/// Error and the frequency at which it occurs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct At {
-    /// Frequency.
+    /// Frequency, in hertz.
     pub hertz: f64,
     /// Error, relative or in decibels.
     pub value: f64,
 }
 
-/// The estimate over what was measured, where that is more than rounding.
+/// Ratio of the estimated to the measured error, at frequencies where the measured error exceeds rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Effectivity {
-    /// The smallest ratio.
+    /// Smallest ratio.
     pub least: f64,
-    /// The one in the middle.
+    /// Median of the ratios.
     pub median: f64,
-    /// The largest.
+    /// Largest ratio.
     pub most: f64,
 }
 
 /// Errors of a body between two places, over the directions that count there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairErrors {
-    /// |H_r - H| / |H| at every frequency that the equations of all nodes were solved at, in the Frobenius norm over the directions.
+    /// Error |H_r - H| / |H| at every frequency, in the Frobenius norm over the directions; `None` where the equations
+    /// of all nodes were not solved.
     pub measured: Vec<Option<f64>>,
-    /// Its estimate at every frequency; not finite numbers at resonances without damping.
+    /// Estimated error at every frequency; infinite or NaN at resonances without damping.
     pub estimated: Vec<f64>,
-    /// The largest measured.
+    /// Largest measured error.
     pub largest: Option<At>,
-    /// The largest of the ratio of the amplitudes |H_r| / |H|, in decibels, whatever its sign; measured.
+    /// Largest ratio of the amplitudes |H_r| / |H|, in decibels, by magnitude; measured.
     pub decibels: Option<At>,
-    /// The largest of both: measured where that was done, estimated elsewhere.
+    /// Largest error: measured where the equations were solved, estimated elsewhere.
     pub worst: Option<At>,
-    /// Up to this frequency no error, measured or else estimated, is above the tolerance; `None` where the
-    /// first one is.
+    /// Highest frequency up to which no error, measured or else estimated, exceeds the tolerance; `None` if the first
+    /// error exceeds it.
     pub accurate_to: Option<f64>,
-    /// How good the estimate was.
+    /// Quality of the estimate; `None` if no measured error exceeds rounding.
     pub effectivity: Option<Effectivity>,
 }
 
-/// One frequency: the reduced response between two places, the enriched one, and that of all nodes where it
-/// is known.
+/// Responses between two places at one frequency: reduced, enriched, and that of all nodes if it was solved for.
 pub(super) struct Compared<'a> {
     pub hertz: f64,
     pub reduced: &'a DMatrix<Complex<f64>>,
@@ -56,7 +56,7 @@ pub(super) struct Compared<'a> {
 }
 
 impl PairErrors {
-    /// Over frequencies that ascend.
+    /// Compares responses at frequencies in ascending order.
     pub(super) fn new(compared: &[Compared<'_>], tolerance: f64) -> Self {
         let measured: Vec<Option<f64>> =
             compared.iter().map(|at| at.full.map(|full| relative(at.reduced, full))).collect();
@@ -68,7 +68,7 @@ impl PairErrors {
         let both: Vec<At> = (0..compared.len())
             .map(|i| At { hertz: compared[i].hertz, value: measured[i].unwrap_or(estimated[i]) })
             .collect();
-        // What is not a number is no accuracy.
+        // NaN counts as an error above the tolerance.
         let first_bad = both.iter().position(|at| at.value.is_nan() || at.value > tolerance);
         let accurate_to = match first_bad {
             None => both.last().map(|at| at.hertz),
@@ -88,18 +88,18 @@ impl PairErrors {
     }
 }
 
-/// |A - B| / |B|; zero where both are zero.
+/// Returns |A - B| / |B|; zero if both are zero.
 fn relative(a: &DMatrix<Complex<f64>>, b: &DMatrix<Complex<f64>>) -> f64 {
     let apart = norm(&(a - b));
     if apart == 0.0 { 0.0 } else { apart / norm(b) }
 }
 
-/// Frobenius norm.
+/// Returns the Frobenius norm.
 fn norm(a: &DMatrix<Complex<f64>>) -> f64 {
     a.iter().map(Complex::norm_sqr).sum::<f64>().sqrt()
 }
 
-/// The largest magnitude; NaN is larger than any number.
+/// Returns the error of largest magnitude; NaN counts as larger than any number.
 fn largest(errors: impl Iterator<Item = At>) -> Option<At> {
     errors.reduce(|most, next| {
         let larger = !most.value.is_nan() && (next.value.is_nan() || next.value.abs() > most.value.abs());

@@ -1,5 +1,5 @@
-//! Frequency response of a free body: the displacement that a harmonic force causes, of the reduced body and
-//! of all nodes of the model that it was made of, and how far the two are apart. No files.
+//! Frequency response of a free body: the displacement caused by a harmonic force, of the reduced body and of all nodes
+//! of its model, and the difference of the two. No files.
 
 mod band;
 mod direct;
@@ -14,5 +14,5 @@ pub use errors::{At, Effectivity, PairErrors};
 pub use place::{Direction, Place};
 pub use study::{CouplingEffect, Function, Pair, Response, ResponseSettings, Solved, respond};
 
-/// The complex numbers of a response: real part in phase with the force.
+/// Complex number of a response; the real part is in phase with the force.
 pub use nalgebra::Complex;

@@ -1,28 +1,28 @@
-//! A transfer function as a sum over rigid motion and modes.
+//! Transfer function as a sum over rigid motion and modes.
 
 use faer::Mat;
 use nalgebra::{Complex, DMatrix};
 
-/// H(w) = -G / w^2 + C' (diag(k) - w^2 diag(m) + i w D)^-1 B: the receptances of a free body in coordinates
-/// of diagonal stiffness and mass.
+/// Receptances of a free body in coordinates of diagonal stiffness and mass: H(w) = -G / w^2 + C' (diag(k) - w^2
+/// diag(m) + i w D)^-1 B.
 pub(super) struct ModalSum {
-    /// k (n).
+    /// Stiffness k of the coordinates (n).
     pub stiffness: Vec<f64>,
-    /// m (n).
+    /// Mass m of the coordinates (n).
     pub mass: Vec<f64>,
-    /// D (n x n); `None` without damping.
+    /// Damping D (n x n); `None` without damping.
     pub damping: Option<Mat<f64>>,
-    /// B (n x inputs).
+    /// Inputs B (n x inputs).
     pub inputs: Mat<f64>,
-    /// C (n x outputs).
+    /// Outputs C (n x outputs).
     pub outputs: Mat<f64>,
-    /// G (outputs x inputs): rigid accelerations for unit loads.
+    /// Rigid accelerations G for unit loads (outputs x inputs).
     pub rigid: Mat<f64>,
 }
 
 impl ModalSum {
-    /// H (outputs x inputs) at w > 0, in radians per time. Numbers that are not finite at the resonance of a
-    /// coordinate without damping.
+    /// Returns H (outputs x inputs) at w > 0, in radians per unit of time. Entries are infinite or NaN at the resonance
+    /// of an undamped coordinate.
     pub(super) fn at(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let amplitudes = self.amplitudes(omega);
         let (outputs, inputs) = (self.outputs.ncols(), self.inputs.ncols());
@@ -33,7 +33,7 @@ impl ModalSum {
         })
     }
 
-    /// (diag(k) - w^2 diag(m) + i w D)^-1 B.
+    /// Returns (diag(k) - w^2 diag(m) + i w D)^-1 B.
     fn amplitudes(&self, omega: f64) -> DMatrix<Complex<f64>> {
         let (n, inputs) = (self.mass.len(), self.inputs.ncols());
         let input = |j: usize, i: usize| Complex::new(self.inputs[(j, i)], 0.0);
@@ -53,7 +53,7 @@ impl ModalSum {
         }
     }
 
-    /// Square of the natural frequency of every coordinate (infinite without mass), and its damping ratio.
+    /// Returns the square of the natural frequency of every coordinate (infinite without mass), and its damping ratio.
     pub(super) fn resonances(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
         (0..self.mass.len()).map(|j| {
             let (k, m) = (self.stiffness[j], self.mass[j].max(0.0));
@@ -71,8 +71,8 @@ fn is_diagonal(a: &Mat<f64>) -> bool {
 mod tests {
     use super::*;
 
-    /// Two masses m joined by a spring k and a damper c: H_11 - H_12 = 1 / (2 k - w^2 m + 2 i w c), H_11 +
-    /// H_12 = -1 / (w^2 m).
+    /// Two masses m joined by a spring k and a damper c have H_11 - H_12 = 1 / (2 k - w^2 m + 2 i w c) and H_11 + H_12
+    /// = -1 / (w^2 m).
     #[test]
     fn two_masses_have_their_closed_form() {
         let (m, k, c) = (2.0, 50.0, 0.3);
@@ -81,7 +81,7 @@ mod tests {
             stiffness: if spread { vec![k / m, k / m] } else { vec![2.0 * k / m] },
             mass: if spread { vec![0.5, 0.5] } else { vec![1.0] },
             damping: Some(if spread {
-                // The same coordinate, halved in two that move alike: their amplitudes differ by nothing.
+                // One coordinate split into two that move alike: the sum of their contributions is unchanged.
                 Mat::from_fn(2, 2, |_, _| c / m / 2.0)
             } else {
                 Mat::from_fn(1, 1, |_, _| 2.0 * c / m)
@@ -99,7 +99,7 @@ mod tests {
         for omega in [0.1, 5.0, 7.0710678, 30.0] {
             let h = sum(false).at(omega);
             let apart = 1.0 / Complex::new(2.0 * k - omega * omega * m, 2.0 * omega * c);
-            // Rigid motion, which is large at low frequencies, cancels in the difference.
+            // Rigid motion is large at low frequencies and cancels in the difference.
             let rounding = 1e-14 * h[(0, 0)].norm();
             assert!((h[(0, 0)] - h[(0, 1)] - apart).norm() < rounding + 1e-13 * apart.norm());
             assert!((h[(0, 0)] + h[(0, 1)] + 1.0 / (omega * omega * m)).norm() < rounding + 1e-13);

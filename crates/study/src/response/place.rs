@@ -1,4 +1,4 @@
-//! Where a force acts and where a displacement is read, and along which axes of the model.
+//! Place of a force or of a measured displacement, with its directions along the axes of the model.
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -8,7 +8,7 @@ use flexbody_model::FeModel;
 use flexbody_motion::scene::{Point, find_nodal_point};
 use nalgebra::Vector3;
 
-/// A force and a displacement along an axis of the model, or a torque and a rotation about it.
+/// Direction of a force and displacement along an axis of the model, or of a torque and rotation about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Direction {
     /// Along x.
@@ -26,25 +26,26 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All six.
+    /// All six directions.
     pub const ALL: [Self; 6] = [Self::X, Self::Y, Self::Z, Self::Rx, Self::Ry, Self::Rz];
 
-    /// `x`, `y`, `z`, `rx`, `ry`, `rz`.
+    /// Returns the name of the direction: `x`, `y`, `z`, `rx`, `ry` or `rz`.
     pub fn name(self) -> &'static str {
         ["x", "y", "z", "rx", "ry", "rz"][self as usize]
     }
 
-    /// Whether it is a torque and a rotation.
+    /// Returns true for a torque and a rotation.
     pub fn turns(self) -> bool {
         self as usize >= 3
     }
 
-    /// The axis: 0, 1 or 2.
+    /// Returns the index of the axis: 0, 1 or 2.
     fn axis(self) -> usize {
         self as usize % 3
     }
 
-    /// Its place among the directions of a body of that dimension; `None` where the body does not have it.
+    /// Returns the index among the directions of a body of the given dimension; `None` if the body does not have the
+    /// direction.
     fn column(self, dimension: usize) -> Option<usize> {
         match (dimension, self) {
             (3, _) | (_, Self::X | Self::Y) => Some(self as usize),
@@ -54,24 +55,24 @@ impl Direction {
     }
 }
 
-/// A point of the body with the directions that count there.
+/// Point of the body with the directions that count there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Place {
-    /// A node, or the reference point of an interface.
+    /// Node, or reference point of an interface.
     pub point: Point,
-    /// Directions; empty: all displacements.
+    /// Directions; empty means all displacements.
     pub directions: Vec<Direction>,
 }
 
-/// A point of a body: where it is, and its displacements and rotations in the modes (3 x nf), the latter
-/// where something determines them.
+/// Motion of a point of a body: its position, and its displacements and rotations in the modes (3 x nf each).
+/// `rotation` is `None` if the model does not determine it.
 struct PointMotion {
     position: Vector3<f64>,
     translation: Mat<f64>,
     rotation: Option<Mat<f64>>,
 }
 
-/// What a place is to the modes of a body.
+/// Modal and rigid loads of a place.
 pub(super) struct PlaceRows {
     /// Displacements and rotations of the modes along the directions (nf x k).
     pub modal: Mat<f64>,
@@ -80,17 +81,17 @@ pub(super) struct PlaceRows {
 }
 
 impl Place {
-    /// All displacements of a point.
+    /// Returns the place of all displacements of a point.
     pub fn of(point: Point) -> Self {
         Self { point, directions: Vec::new() }
     }
 
-    /// `17`, `big_end`, `big_end:z`, `17:x,rz`: a node by its number or an interface by its name, and which
-    /// directions count there.
+    /// Parses a place: a node number or interface name, optionally with a colon and directions (`17`, `big_end`,
+    /// `big_end:z`, `17:x,rz`).
     pub fn parse(text: &str) -> Self {
         let named = |name: &str| Direction::ALL.into_iter().find(|direction| direction.name() == name);
         let point = |text: &str| text.parse().map_or_else(|_| Point::Interface(text.to_owned()), Point::Node);
-        // Whatever is no list of directions belongs to the name.
+        // Text after a colon that is not a list of directions belongs to the name.
         let split = text.rsplit_once(':').and_then(|(before, after)| {
             let directions: Option<Vec<Direction>> =
                 after.split(',').map(|name| named(name.trim())).collect();
@@ -106,7 +107,7 @@ impl Place {
         }
     }
 
-    /// The directions in a body of that dimension.
+    /// Returns the directions of the place in a body of the given dimension.
     pub(super) fn directions_of(&self, dimension: usize) -> Vec<Direction> {
         match self.directions.as_slice() {
             [] => Direction::ALL[..dimension].to_vec(),
@@ -114,11 +115,11 @@ impl Place {
         }
     }
 
-    /// Refuses what `body`, whose axes are those of the model and whose origin is the centre of mass, does
-    /// not have.
+    /// Returns the modal and rigid loads of the place. The axes of `body` must be those of the model and its origin the
+    /// centre of mass.
     ///
     /// # Errors
-    /// [`PlaceUnknown`](Code::PlaceUnknown).
+    /// [`PlaceUnknown`](Code::PlaceUnknown) for a point or direction that the body does not have.
     pub(super) fn rows(&self, body: &FlexBody) -> Result<PlaceRows> {
         let (nf, d) = (body.n_modes(), body.dimension());
         let PointMotion { position, translation, rotation } = self.motion(body)?;
@@ -152,7 +153,7 @@ impl Place {
                 let found = body.nodes().ids.iter().position(|id| id == number);
                 let node = found.ok_or_else(|| self.unknown(body))?;
                 let rows_of_node = |shape: &Mat<f64>| Mat::from_fn(3, nf, |k, j| shape[(3 * node + k, j)]);
-                // Nodes without rotations have zeros in their place.
+                // Nodes without rotations have zero rows.
                 let turns = |rows: &Mat<f64>| (0..nf).any(|j| (0..3).any(|k| rows[(k, j)] != 0.0));
                 let rotation = modes.rotation.as_ref().map(rows_of_node).filter(turns);
                 let position = Vector3::from(body.nodes().positions[node]);
@@ -180,11 +181,12 @@ impl Place {
         }
     }
 
-    /// Nodal forces of a unit force or torque along each direction (N x k), which also read the
+    /// Returns the nodal forces of a unit force or torque along each direction (N x k). Their transpose gives the
     /// displacements.
     ///
     /// # Errors
-    /// [`PlaceUnknown`](Code::PlaceUnknown), and [`InterfaceNode`](Code::InterfaceNode).
+    /// [`PlaceUnknown`](Code::PlaceUnknown) for a point or direction that the model does not have, and
+    /// [`InterfaceNode`](Code::InterfaceNode).
     pub(super) fn loads(&self, model: &FeModel) -> Result<Mat<f64>> {
         let d = model.dimension();
         let missing = || {

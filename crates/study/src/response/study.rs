@@ -1,4 +1,4 @@
-//! A body's response over a band, beside that of its model.
+//! Frequency response of a body over a band, compared with that of its model.
 
 use super::Complex;
 use super::band::{Band, Frequency, Resonance};
@@ -21,33 +21,33 @@ use nalgebra::{DMatrix, Matrix6, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// Modal masses of a body differ from one by less than this in the model that it was made of, for arrays of
-/// 32 bits too.
+/// Largest deviation from one of the modal masses (and relative modal stiffnesses) of a body in its own model. It
+/// allows for arrays of 32 bits; a larger deviation means another model.
 const MODAL_MASS: f64 = 1e-4;
 
-/// What is asked for.
+/// Settings of a frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ResponseSettings {
-    /// Frequencies.
+    /// Frequency band.
     pub band: Band,
-    /// About as many frequencies the curves have.
+    /// Approximate number of frequencies of the curves.
     pub points: usize,
-    /// At about as many of them the equations of all nodes are solved.
+    /// Approximate number of frequencies at which the equations of all nodes are solved.
     pub solves: usize,
-    /// Damping ratios of the modes, where they are not those of the body.
+    /// Damping ratios of the modes; `None` to use those of the body.
     pub damping: Option<DampingRatios>,
-    /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
+    /// True if `damping` replaces the damping of the body. If false, a body with damping is refused.
     pub replaces_damping: bool,
-    /// Largest relative error.
+    /// Largest relative error that is accepted.
     pub tolerance: f64,
 }
 
 impl ResponseSettings {
-    /// Frequencies of the curves: more cannot be told apart in a plot.
+    /// Default number of frequencies of the curves: more are not visible in a plot.
     pub const POINTS: usize = 400;
-    /// Solves: enough for two dozen resonances.
+    /// Default number of frequencies at which the equations are solved: enough for two dozen resonances.
     pub const SOLVES: usize = 80;
-    /// Relative error: less than half a decibel.
+    /// Default tolerance of the relative error: less than half a decibel.
     pub const TOLERANCE: f64 = 0.05;
 }
 
@@ -58,74 +58,74 @@ pub struct Response {
     pub name: String,
     /// Units of body and model.
     pub units: UnitSystem,
-    /// Modes of the body.
+    /// Number of modes of the body.
     pub modes: usize,
-    /// Whether the modes are damped.
+    /// True if the modes are damped.
     pub damped: bool,
     /// Frequencies in hertz, ascending.
     pub frequencies: Vec<f64>,
-    /// What is loaded with what is watched.
+    /// Pairs of a loaded and a measured place.
     pub pairs: Vec<Pair>,
-    /// Natural frequencies of the body in the band.
+    /// Number of natural frequencies of the body in the band.
     pub body_modes_in_band: usize,
-    /// What was solved; `None` without a model, and then no error is known.
+    /// Work on the equations of all nodes; `None` without a model, and then no error is known.
     pub solved: Option<Solved>,
-    /// Effect of rigid interfaces of the body, which the model has in the comparison as well; `None` without.
+    /// Effect of the rigid interfaces of the body; the compared model has these interfaces too. `None` without rigid
+    /// interfaces.
     pub coupling: Option<CouplingEffect>,
 }
 
-/// The difference that rigid interfaces make in a frequency response.
+/// Effect of rigid interfaces on a frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CouplingEffect {
     /// Names of the interfaces that no mode of the body deforms.
     pub interfaces: Vec<String>,
-    /// The largest relative difference of the model under the coupling from the model whose interfaces deform, over all
-    /// pairs; `None` where no frequency could be solved for both.
+    /// Largest relative difference between the model under the coupling and the model with deformable interfaces, over
+    /// all pairs; `None` if no frequency could be solved for both.
     pub largest: Option<At>,
 }
 
-/// The equations of all nodes.
+/// Work on the equations of all nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Solved {
-    /// Rows of the matrices.
+    /// Number of rows of the matrices.
     pub rows: usize,
-    /// Frequencies at which they were solved.
+    /// Number of frequencies at which the equations were solved.
     pub solves: usize,
     /// Multiplications and additions of one factorisation.
     pub flops: f64,
-    /// Flexible natural frequencies of the model up to the end of the band, by the signs of the pivots there.
+    /// Number of flexible natural frequencies of the model in the band, from the signs of the pivots at its ends.
     pub modes_in_band: usize,
 }
 
-/// From one place to another.
+/// Transfer functions from one place to another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pair {
-    /// Where forces act.
+    /// Place of the forces.
     pub from: Place,
-    /// Where displacements are read.
+    /// Place of the displacements.
     pub to: Place,
-    /// Of every direction at the one place to every direction at the other.
+    /// Transfer functions from every direction at the one place to every direction at the other.
     pub functions: Vec<Function>,
-    /// How far reduced and full are apart; `None` without a model.
+    /// Errors of the reduced response; `None` without a model.
     pub errors: Option<PairErrors>,
 }
 
-/// A transfer function: displacement per force, rotation per force, and so on, in the units of the body and
-/// radians.
+/// Transfer function: displacement per force, rotation per force, and so on, in the units of the body and radians.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Function {
     /// Direction of the force or torque.
     pub from: Direction,
     /// Direction of the displacement or rotation.
     pub to: Direction,
-    /// Of the reduced body, at every frequency.
+    /// Response of the reduced body at every frequency.
     pub reduced: Vec<Complex<f64>>,
-    /// Of all nodes, where their equations were solved.
+    /// Response of all nodes at every frequency; `None` where their equations were not solved.
     pub full: Vec<Option<Complex<f64>>>,
 }
 
 impl Function {
-    /// `displacement per force`, `rotation per torque`, and so on.
+    /// Returns the kind of function: `displacement per force`, `rotation per torque`, and so on.
     pub fn kind(&self) -> &'static str {
         match (self.to.turns(), self.from.turns()) {
             (false, false) => "displacement per force",
@@ -137,17 +137,17 @@ impl Function {
 }
 
 impl Response {
-    /// Whether no error is above the tolerance; true where none is known.
+    /// Returns true if no error exceeds the tolerance, or if no error is known.
     pub fn holds(&self, tolerance: f64) -> bool {
         let errors = self.pairs.iter().filter_map(|pair| pair.errors.as_ref());
         errors.filter_map(|errors| errors.worst).all(|worst| worst.value <= tolerance)
     }
 }
 
-/// The receptances of `body` from places to places over a band: displacements and rotations for unit forces
-/// and torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the
-/// body was made of also those of all its nodes, at some of the frequencies, with the damping that the body
-/// has: D = M Psi C Psi'M.
+/// Computes the receptances of `body` between places over a band: displacements and rotations for unit forces and
+/// torques, along the axes of the model, H(w) = L'(K + i w D - w^2 M)^-1 B. With the `model` that the body was made of,
+/// the equations of all its nodes are also solved at some of the frequencies, with the damping of the body: D = M Psi C
+/// Psi'M.
 ///
 /// # Errors
 /// [`PlaceUnknown`](Code::PlaceUnknown) for a place that the body does not have;
@@ -160,6 +160,7 @@ pub fn respond(
     settings: &ResponseSettings,
     context: &Context<'_>,
 ) -> Result<Response> {
+    // Frames: mean axes uncouple rigid motion from the modes; places refer to the centre of mass.
     let mean = body.in_mean_axes()?;
     let body = &*damped(&mean, settings)?;
     let at_centre = body.in_model_axes(body.invariants().first_moment() / body.invariants().mass())?;
@@ -171,12 +172,14 @@ pub fn respond(
         Some(model) => Some(Known::new(model, body, [from, to], damping.as_ref(), context)?),
         None => None,
     };
+    // Frequencies cluster at the resonances of the best sum at hand.
     let resonances =
         known.as_ref().and_then(|known| known.enriched.as_ref()).unwrap_or(&reduced).resonances();
     let resonances: Vec<Resonance> = resonances.map(|found| in_hertz(body.units(), found)).collect();
     let solves = if known.is_some() { settings.solves } else { 0 };
     let frequencies = settings.band.frequencies(settings.points, solves, &resonances);
     let blocks = blocks(from, to, body.dimension());
+    // Evaluate the curves, then solve the equations of all nodes, also where the estimate is critical.
     let mut curves = Curves::new(&reduced, known.as_ref(), frequencies, body.units());
     if let Some(known) = &known {
         curves.look_closer(&blocks, settings.tolerance, solves.div_ceil(4));
@@ -197,7 +200,7 @@ pub fn respond(
     })
 }
 
-/// The body with the damping ratio of the settings for its modes, where they state one.
+/// Returns the body with the damping ratios of the settings, if they state any.
 fn damped<'b>(body: &'b FlexBody, settings: &ResponseSettings) -> Result<Cow<'b, FlexBody>> {
     let ResponseSettings { damping, replaces_damping, .. } = settings;
     let stated = Requirements {
@@ -212,8 +215,8 @@ fn in_hertz(units: &UnitSystem, (square, ratio): (f64, f64)) -> Resonance {
     Resonance { hertz: units.frequency_of(square), ratio }
 }
 
-/// The response of a body in a frame along the axes of the model about its centre of mass: rigid motion of
-/// the undeformed body and the modes, which no rigid motion couples to at rest.
+/// Returns the response of a body in a frame along the axes of the model about its centre of mass: rigid motion of the
+/// undeformed body plus the modes, to which rigid motion does not couple at rest.
 fn reduced_sum(body: &FlexBody, from: &[PlaceRows], to: &[PlaceRows], damping: Option<Mat<f64>>) -> ModalSum {
     let joined = |rows: &[PlaceRows], part: fn(&PlaceRows) -> &Mat<f64>| {
         side_by_side(&rows.iter().map(|place| part(place).as_ref()).collect::<Vec<_>>())
@@ -234,8 +237,8 @@ fn reduced_sum(body: &FlexBody, from: &[PlaceRows], to: &[PlaceRows], damping: O
     }
 }
 
-/// Accelerations of the undeformed body for unit forces and torques about its centre of mass; in the plane,
-/// those in the plane.
+/// Returns the accelerations of the undeformed body for unit forces and torques about its centre of mass; for a plane
+/// body, those in the plane.
 fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
     let (mass, inertia) = (body.invariants().mass(), body.invariants().inertia());
     let mut compliance = Matrix6::zeros();
@@ -251,11 +254,11 @@ fn rigid_compliance(body: &FlexBody) -> Matrix6<f64> {
     compliance
 }
 
-/// What the model knows.
+/// Model of the body, with the enriched response that estimates the error.
 struct Known<'m> {
     nodal: NodalModes<'m>,
-    /// The estimate: the response with static responses beside the modes; `None` where the modes leave
-    /// nothing to respond to.
+    /// Response with static responses added to the modes, which estimates the error; `None` if the modes leave no
+    /// unbalanced force.
     enriched: Option<ModalSum>,
     damping: Option<Mat<f64>>,
     context: Context<'m>,
@@ -275,21 +278,22 @@ impl<'m> Known<'m> {
         Ok(Self { nodal, enriched, damping: damping.cloned(), context: *context })
     }
 
-    /// The equations of all nodes of `model`, under the couplings of the body or without, for `solves` frequencies.
+    /// Prepares the equations of all nodes of `model`, with the couplings of the body or without, for `solves`
+    /// frequencies.
     fn direct_solver<'s>(&'s self, model: &'s CoupledModel<'_>, solves: usize) -> Result<DirectSolver<'s>> {
         let NodalModes { inertial, loads, measured, .. } = &self.nodal;
         let damping = self.damping.as_ref().map(|c| (inertial, c));
         DirectSolver::new(model, [loads, measured], damping, solves, &self.context)
     }
 
-    /// The model whose interfaces deform; `None` where no interface of the body is rigid.
+    /// Returns the model with deformable interfaces; `None` if no interface of the body is rigid.
     fn deforming(&self) -> Option<CoupledModel<'m>> {
         let coupled = &self.nodal.model;
         (!coupled.rigid_interfaces().is_empty()).then(|| CoupledModel::uncoupled(coupled.model()))
     }
 }
 
-/// The body in the rows of the model that it was made of.
+/// Expresses the body in the rows of the model that it was made of, and refuses a body of another model.
 fn nodal_modes<'m>(
     model: &'m FeModel,
     body: &FlexBody,
@@ -303,6 +307,7 @@ fn nodal_modes<'m>(
     };
     let vectors = body.vectors_of(model).ok_or_else(|| foreign("it has other rows"))?;
     let pencil = model.pencil();
+    // Modes of this model have modal mass 1 and modal stiffness lambda.
     let (inertial, elastic) = (pencil.apply_mass(vectors.as_ref()), pencil.apply_stiffness(vectors.as_ref()));
     let mass = gram(vectors.as_ref(), inertial.as_ref());
     let eigenvalue = &body.modes().eigenvalue;
@@ -330,20 +335,20 @@ fn nodal_modes<'m>(
     })
 }
 
-/// The responses of everything to everything, at every frequency.
+/// Responses between all places at every frequency.
 struct Curves {
     frequencies: Vec<Frequency>,
     reduced: Vec<DMatrix<Complex<f64>>>,
-    /// Empty without a model.
+    /// Enriched responses; empty without a model.
     enriched: Vec<DMatrix<Complex<f64>>>,
     full: Vec<Option<DirectSolution>>,
-    /// The same of the model whose interfaces deform, where some of the body are rigid.
+    /// Solutions of the model with deformable interfaces; all `None` if no interface of the body is rigid.
     deforming: Vec<Option<DirectSolution>>,
     flops: f64,
 }
 
 impl Curves {
-    /// What modes tell; nothing is solved yet.
+    /// Evaluates the modal responses; the equations of all nodes are not solved here.
     fn new(
         reduced: &ModalSum,
         known: Option<&Known<'_>>,
@@ -361,8 +366,8 @@ impl Curves {
         Self { frequencies, reduced: own, enriched, full, deforming, flops: 0.0 }
     }
 
-    /// Has the equations of all nodes solved also where the estimate of a block is largest and where it first
-    /// is above the tolerance, at up to `most` frequencies: what is said of them shall be measured.
+    /// Marks for solution the frequencies where the estimated error of a block is largest and where it first exceeds
+    /// the tolerance, at most `most` of them, so that reported errors are measured there.
     fn look_closer(&mut self, blocks: &[(&Place, &Place, Block)], tolerance: f64, most: usize) {
         let mut found = Vec::new();
         for errors in blocks.iter().filter_map(|(_, _, block)| self.errors(block, tolerance)) {
@@ -381,7 +386,8 @@ impl Curves {
         }
     }
 
-    /// Solves the equations of all nodes, under the couplings of the body and, where these hold something, without.
+    /// Solves the equations of all nodes, with the couplings of the body and, if these make an interface rigid,
+    /// without.
     fn solve(&mut self, known: &Known<'_>, units: &UnitSystem, context: &Context<'_>) -> Result<()> {
         context.phase("equations of all nodes");
         let deforming = known.deforming();
@@ -398,10 +404,10 @@ impl Curves {
         Ok(())
     }
 
-    /// Solutions at the frequencies that are to be solved. Those with too few digits, at a natural frequency, are left
-    /// out.
+    /// Returns the solutions at the marked frequencies. A solution that is too inaccurate, near a natural frequency, is
+    /// left out. If all are, the error is returned.
     ///
-    /// * `done`: hears the part that is done.
+    /// * `done`: called with the completed part, from 0 to 1.
     fn solutions(
         &self,
         solver: &DirectSolver<'_>,
@@ -424,7 +430,8 @@ impl Curves {
         }
     }
 
-    /// How far the model under the couplings of the body is from the model whose interfaces deform.
+    /// Returns the difference between the model under the couplings of the body and the model with deformable
+    /// interfaces.
     fn coupling_effect(
         &self,
         known: &Known<'_>,
@@ -436,6 +443,7 @@ impl Curves {
             return None;
         }
         let of_block = |(_, _, block): &(&Place, &Place, Block)| {
+            // Frequencies that were solved for both models.
             let both = self.full.iter().zip(&self.deforming).enumerate();
             let both: Vec<_> = both
                 .filter_map(|(i, (coupled, deforming))| {
@@ -470,7 +478,7 @@ impl Curves {
             rows: known.nodal.model.pencil().n(),
             solves: self.full.iter().flatten().count(),
             flops: self.flops,
-            // A band that begins above some modes does not have them.
+            // Modes below the low end of the band are not in the band.
             modes_in_band: if low > 0.0 { last.saturating_sub(first) } else { last },
         }
     }
@@ -519,7 +527,7 @@ impl Curves {
     }
 }
 
-/// Directions at every place, with their numbers among those of all places.
+/// Returns every place with its directions, which are numbered over all places.
 fn numbered(places: &[Place], dimension: usize) -> impl Iterator<Item = (&Place, Vec<(usize, Direction)>)> {
     let mut next = 0;
     places.iter().map(move |place| {
@@ -532,7 +540,8 @@ fn numbered(places: &[Place], dimension: usize) -> impl Iterator<Item = (&Place,
     })
 }
 
-/// From each place to each other: forces and torques apart, and displacements and rotations.
+/// Returns the blocks from each place to each other. Forces and torques, displacements and rotations are in separate
+/// blocks.
 fn blocks<'p>(from: &'p [Place], to: &'p [Place], dimension: usize) -> Vec<(&'p Place, &'p Place, Block)> {
     let mut blocks = Vec::new();
     for (source, columns) in numbered(from, dimension) {

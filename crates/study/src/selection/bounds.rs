@@ -1,29 +1,28 @@
-//! Guaranteed bounds of what dropped terms change of the motion of a body whose rotation is given (theory
-//! section 7).
+//! Guaranteed bounds of the change of motion by dropped terms, for a body whose rotation is given (theory section 7).
 //!
-//! With the angular velocity w(t) of the frame given, the modes move by linear equations,
+//! With the angular velocity w(t) of the frame given, the modes obey linear equations,
 //!
 //! ```text
 //! q'' + D q' + 2 G(w) q' + (Lambda - E(w, w) + G(w')) q = Q(t) + W1'w w / 2,    G skew, E symmetric, 0 <= E <= |w|^2
 //! ```
 //!
-//! and the error of a model without some of the terms obeys the same equations with these terms of its own
-//! motion as load. The energy H = (|q'|^2 + q'(Lambda - E) q) / 2 bounds the response to a load F twice:
-//! sqrt(2 H) grows by no more than |F|; and against the static response, by no more than the total variation
-//! of that. Damping only helps, and is not counted on.
+//! and the error of a model without some of the terms obeys these equations with the dropped terms, evaluated along its
+//! own motion, as load. The energy H = (|q'|^2 + q'(Lambda - E) q) / 2 gives two bounds of the response to a load F:
+//! sqrt(2 H) grows by at most |F|; and, relative to the static response, by at most the total variation of that.
+//! Damping only reduces the response and is neglected.
 
 use super::norms::Norms;
 use super::variation::{Rotation, Variation};
 use flexbody_body::flex_body::TermGroups;
 
-/// A load on the modes that is a direction times a function of time.
+/// Modal load: a direction times a function of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModalLoad {
-    /// |Q|.
+    /// Length of the load, |Q|.
     pub force: f64,
-    /// |Lambda^(-1/2) Q|.
+    /// Length in the norm of flexibility, |Lambda^(-1/2) Q|.
     pub energy: f64,
-    /// The function of time that the direction is multiplied by.
+    /// Function of time that multiplies the direction.
     pub factor: Variation,
 }
 
@@ -39,7 +38,7 @@ impl ModalLoad {
     }
 }
 
-/// What bounds need to know of a load on the modes, over the duration.
+/// Quantities of a modal load that the bounds use, over the duration.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct LoadSizes {
     /// Integral of |F|.
@@ -52,74 +51,74 @@ pub struct LoadSizes {
     pub largest: f64,
 }
 
-/// The motion of a body of given rotation.
+/// Motion of a body whose rotation is given.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Driven {
     /// Rotation of the frame.
     pub rotation: Rotation,
     /// Loads on the modes.
     pub loads: Vec<ModalLoad>,
-    /// Modes at the start.
+    /// Initial state of the modes.
     pub start: Start,
-    /// Whether the deformation starts in equilibrium with the loads.
+    /// True if the deformation starts in equilibrium with the loads.
     pub settled: bool,
-    /// How torques act on the deformed body.
+    /// Change of the modal forces of torques by the deformation.
     pub turned: TurnedTorques,
-    /// |D|.
+    /// Norm of the modal damping, |D|.
     pub damping: f64,
 }
 
-/// By how much torques change their modal forces, for a change of |Lambda^(1/2) q| by one.
+/// Change of the modal forces of torques, for a change of |Lambda^(1/2) q| by one.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TurnedTorques {
-    /// |F|, at the largest torque.
+    /// Change |F| at the largest torque.
     pub force: f64,
-    /// |F'| where the torque changes fastest; world axes turn besides.
+    /// Rate of change |F'| where the torque changes fastest, without the rotation of world axes.
     pub rate: f64,
 }
 
-/// Modes at time zero.
+/// Modal energies at time zero.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Start {
     /// sqrt(|q'|^2 + q'Lambda q).
     pub energy: f64,
-    /// The same of the rates (q', q'') without loads.
+    /// sqrt(|q''|^2 + |Lambda^(1/2) q'|^2), with q'' without loads.
     pub rate_energy: f64,
 }
 
 /// Bounds of modal motion, over the duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Amplitude {
-    /// |Lambda^(1/2) q|: the root of twice the elastic energy.
+    /// Bound of |Lambda^(1/2) q|, the root of twice the elastic energy.
     pub energy: f64,
-    /// |q|.
+    /// Bound of |q|.
     pub coordinate: f64,
-    /// |q'|.
+    /// Bound of |q'|.
     pub rate: f64,
-    /// |q''|; infinite where it is not known.
+    /// Bound of |q''|; infinite if unknown.
     pub acceleration: f64,
-    /// |Lambda^(1/2) q'|; likewise.
+    /// Bound of |Lambda^(1/2) q'|; infinite if unknown.
     pub energy_rate: f64,
 }
 
 /// Bounds of the error e of modal motion, over the duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorBound {
-    /// |Lambda^(1/2) e|.
+    /// Bound of |Lambda^(1/2) e|.
     pub energy: f64,
-    /// |e|.
+    /// Bound of |e|.
     pub coordinate: f64,
-    /// |e'|.
+    /// Bound of |e'|.
     pub rate: f64,
-    /// |e'' + Lambda e|.
+    /// Bound of |e'' + Lambda e|.
     pub acceleration_without_stiffness: f64,
 }
 
-/// How loads act on modes under the terms that are kept.
+/// Bounds of the modal equations with the terms that are kept.
 struct Operator {
-    /// Lambda - E >= margin Lambda.
+    /// Largest margin with Lambda - E >= margin Lambda.
     margin: f64,
-    /// exp of how much motion may grow by itself because the rotation changes.
+    /// Factor by which free motion may grow because the rotation changes.
     growth: f64,
     softening: f64,
     coupling: f64,
@@ -127,12 +126,12 @@ struct Operator {
     /// Force of turned torques for |Lambda^(1/2) q| = 1.
     turned: f64,
     rotation: Rotation,
-    /// Whether responses start in equilibrium with the load.
+    /// True if responses start in equilibrium with the load.
     settled: bool,
 }
 
 impl Operator {
-    /// `None` where the spin takes all stiffness of some motion.
+    /// Returns the bounds; `None` if the spin may remove all stiffness of some motion.
     fn new(kept: TermGroups, norms: &Norms, driven: &Driven) -> Option<Self> {
         let rotation = &driven.rotation;
         let softening = if kept.w2 { norms.softening } else { 0.0 };
@@ -148,12 +147,12 @@ impl Operator {
         Some(Self { margin, growth, softening, coupling, first, turned, rotation: *rotation, settled })
     }
 
-    /// sqrt(2 H) of the response to a load, from rest without deformation; or from its static response, about
-    /// which it then moves by what is not more, but of which an impulse says nothing.
+    /// Returns the bound of sqrt(2 H) of the response to a load, from rest without deformation. If the motion starts at
+    /// the static response, only the bound by variation holds.
     fn response(&self, load: &LoadSizes) -> f64 {
         let (m, r) = (self.margin, &self.rotation);
         let impulse = product(self.growth, load.impulse);
-        // The static response (Lambda - E)^-1 F moves with the load and with E.
+        // The static response (Lambda - E)^-1 F changes with the load and with E.
         let moved = load.moved + 2.0 * r.largest * r.variation * self.softening * load.largest / m;
         let swept = r.variation * self.coupling * load.largest / (m * self.first)
             + product(self.turned * r.duration, load.largest) / m;
@@ -163,14 +162,14 @@ impl Operator {
 }
 
 impl Driven {
-    /// The centrifugal load of W1.
+    /// Returns the centrifugal load of W1.
     fn centrifugal(&self, norms: &Norms) -> ModalLoad {
         let rate = self.rotation.rate();
         ModalLoad { force: norms.centrifugal, energy: norms.centrifugal_energy, factor: rate.times(&rate) }
     }
 
-    /// Bounds of the motion of the body with the groups that are kept. `None` where the spin takes all
-    /// stiffness of some motion.
+    /// Returns bounds of the motion of the body with the kept groups; `None` if the spin may remove all stiffness of
+    /// some motion.
     pub fn amplitude(&self, kept: TermGroups, norms: &Norms) -> Option<Amplitude> {
         let operator = Operator::new(kept, norms, self)?;
         let mut loads = self.loads.clone();
@@ -187,7 +186,8 @@ impl Driven {
         let (rate, acceleration, energy_rate) = if kept.w2 || kept.w3 {
             (energy, f64::INFINITY, f64::INFINITY)
         } else {
-            // The rates are moved by the rates of the loads, and start with the loads.
+            // Without W2 and W3 the equations are constant: the rates obey them too, with the rates of the loads and
+            // initial values that contain the loads.
             let begun: f64 = loads.iter().map(|load| load.force * load.factor.start).sum();
             let torques = self.turned.rate + self.turned.force * self.rotation.largest;
             let torques = product(torques * self.rotation.duration, energy / root);
@@ -210,14 +210,14 @@ impl Driven {
         Some(Amplitude { energy: energy / root, coordinate, rate, acceleration, energy_rate })
     }
 
-    /// The load that the groups `dropped` are to the error, at motion within `own`.
+    /// Returns the load on the error that the `dropped` groups cause, for motion within `own`.
     pub fn residual(&self, dropped: TermGroups, norms: &Norms, own: &Amplitude) -> Vec<LoadSizes> {
         let r = &self.rotation;
         let mut loads = Vec::new();
         if dropped.w1 {
             loads.push(self.centrifugal(norms).sizes(r.duration));
         }
-        // A force that may be anywhere between zero and `force`.
+        // Adds a load that may take any value between zero and `force`.
         let mut push = |force: f64, energy: f64, moved: f64| {
             loads.push(LoadSizes {
                 impulse: product(force, r.duration),
@@ -227,14 +227,14 @@ impl Driven {
             });
         };
         if dropped.w2 {
-            // E(w, w) q.
+            // Load of W2: E(w, w) q.
             let (w2, turned) = (r.largest.powi(2), 2.0 * r.largest * r.variation);
             let moved = product(w2 * r.duration, own.energy_rate) + turned * own.energy;
             let energy = norms.softening * w2 * own.energy;
             push(norms.spin * w2 * own.coordinate, energy, norms.softening * moved);
         }
         if dropped.w3 {
-            // 2 G(w) q', and G(w') q.
+            // Loads of W3: 2 G(w) q', and G(w') q.
             let per_rate = norms.coupling / norms.first;
             let moved = product(r.largest * r.duration, own.acceleration) + r.variation * own.rate;
             let force = 2.0 * norms.coupling * r.largest * own.rate;
@@ -246,8 +246,8 @@ impl Driven {
         loads
     }
 
-    /// Bounds of how far a motion moves from that of the whole body to whose error `residual` are the loads.
-    /// `None` where the spin may take all stiffness of some motion.
+    /// Returns bounds of the error of a motion relative to that of the whole body, for the loads `residual` on the
+    /// error. Returns `None` if the spin may remove all stiffness of some motion.
     pub fn error(&self, norms: &Norms, residual: &[LoadSizes]) -> Option<ErrorBound> {
         let operator = Operator::new(TermGroups::ALL, norms, self)?;
         let r = &self.rotation;
@@ -266,7 +266,7 @@ impl Driven {
         })
     }
 
-    /// What the torque lacks without the groups `dropped`, at motion within `own`.
+    /// Returns the missing torque without the `dropped` groups, for motion within `own`.
     pub fn torque_defect(&self, dropped: TermGroups, norms: &Norms, own: &Amplitude) -> TorqueDefect {
         let (w, turn) = (self.rotation.largest, self.rotation.acceleration + self.rotation.largest.powi(2));
         let (q, v, a) = (own.coordinate, own.rate, own.acceleration);
@@ -277,8 +277,8 @@ impl Driven {
         TorqueDefect { torque, stiff: product(norms.turning * norms.last, q) }
     }
 
-    /// Bound of the error of the torque that the rotation takes, without that of the levers of loads: what it
-    /// lacks, and what the whole body makes of the `error` of a motion within `own`.
+    /// Returns the bound of the error of the driving torque, without the lever arms of loads: the missing torque, and
+    /// the torque of the whole body for the `error` of a motion within `own`.
     pub fn torque_error(
         &self,
         norms: &Norms,
@@ -292,8 +292,7 @@ impl Driven {
         let (q, v) = (own.coordinate + dq, own.rate + dv);
         let linear = norms.inertia * (dv * w + dq * turn);
         let quadratic = 2.0 * (q * dv + v * dq) * w + 2.0 * q * dq * turn;
-        // q'W3 e'' with e'' of the equations of motion, whose part Lambda e meets W3'q in the norm of
-        // stiffness.
+        // q'W3 e'' with e'' from the equations of motion; the part Lambda e multiplies W3'q in the norm of stiffness.
         let stiff = product(defect.stiff + product(norms.turning * norms.last, dq), error.energy);
         let rest = product(product(norms.turning, q), error.acceleration_without_stiffness);
         let coupled =
@@ -302,7 +301,7 @@ impl Driven {
     }
 }
 
-/// What the balance of torques lacks without some groups.
+/// Missing torque in the balance without some groups.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TorqueDefect {
     /// Largest torque.
@@ -311,7 +310,7 @@ pub struct TorqueDefect {
     pub stiff: f64,
 }
 
-/// What is zero is zero, however large the other.
+/// Product that is zero if either factor is zero, even if the other is infinite.
 fn product(a: f64, b: f64) -> f64 {
     if a == 0.0 || b == 0.0 { 0.0 } else { a * b }
 }

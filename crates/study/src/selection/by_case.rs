@@ -1,4 +1,4 @@
-//! A selection for several load cases, seen from each of them.
+//! Selection for several load cases, listed by case.
 
 use super::decisions::Ground;
 use super::demand::Demand;
@@ -8,24 +8,24 @@ use crate::reference::ReferenceError;
 use flexbody_body::flex_body::TermGroup;
 use flexbody_motion::scene::Tolerance;
 
-/// What a selection for several load cases is for one of them.
+/// Result of a selection for one of several load cases.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaseSelection {
     /// Name of the load case.
     pub name: String,
-    /// Its tolerances.
+    /// Tolerances of the load case.
     pub tolerance: Tolerance,
-    /// The selected model, measured against all that the body holds; none where nothing was integrated.
+    /// Selected model, measured against the whole body; `None` if no motion was integrated.
     pub chosen: Option<Trial>,
-    /// Groups that are kept because of this case more than of any other.
+    /// Groups whose decision rests on this load case.
     pub binds_groups: Vec<TermGroup>,
-    /// Whether one mode fewer is furthest beyond the tolerances in this case.
+    /// True if one mode fewer would exceed the tolerances most in this load case.
     pub binds_modes: bool,
-    /// What the body, and those before it that were enriched, lack of the model in this case.
+    /// Truncation errors in this case, of the body and of its versions before enrichment.
     pub lacks: Vec<ReferenceError>,
 }
 
-/// What belongs to each of several load cases; nothing of a scene alone.
+/// Returns the results for each of several load cases; empty for a single scene.
 pub(super) fn by_case(
     demands: &[Demand<'_>],
     choice: &Choice,
@@ -36,6 +36,7 @@ pub(super) fn by_case(
     if demands.len() == 1 {
         return Vec::new();
     }
+    // Failed trial with one mode fewer than the choice: its worst load case binds the number of modes.
     let one_fewer = trials
         .iter()
         .rfind(|trial| !trial.by_case.is_empty() && !trial.passed() && trial.modes + 1 == choice.modes.len());
@@ -59,10 +60,10 @@ pub(super) fn by_case(
     demands.iter().enumerate().map(of_case).collect()
 }
 
-/// What the body lacks in the load case where it lacks most at last.
+/// Returns the truncation errors in the load case whose last error is largest.
 pub(super) fn worst_lacks(demands: &[Demand<'_>]) -> Vec<ReferenceError> {
     let last = |demand: &&Demand<'_>| demand.lacks.last().map_or(-1.0, |own| own.worst);
-    // The first of equals.
+    // The reversed order returns the first of equal cases.
     let worst = demands.iter().rev().max_by(|a, b| last(a).total_cmp(&last(b)));
     worst.map_or_else(Vec::new, |demand| demand.lacks.to_vec())
 }

@@ -1,4 +1,4 @@
-//! The scenes that a selection has to hold in, and trials by bounds in all of them.
+//! Scenes in which a selection must hold, and trials by bounds in all of them.
 
 use super::norms::Norms;
 use super::situation::Situation;
@@ -11,26 +11,26 @@ use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{OutputErrors, Range, Scene, points_of};
 use nalgebra::Vector3;
 
-/// Part of the tolerances that dropped terms may take by bounds; what is measured gets the rest.
+/// Part of the tolerances that dropped terms may take according to bounds. The rest is left for measured trials.
 pub(super) const PART_OF_BOUNDS: f64 = 0.5;
 
-/// How far the run may stay behind the rotation that the scene allows for its measurements to count.
+/// Largest ratio of the allowed rotation to that of the run at which measurements of the run count.
 pub(super) const SLACK_OF_RANGE: f64 = 1.01;
 
-/// Sets of groups that a body may be left with, cheapest first. A body that is carried keeps all: dropped
-/// groups are those of its own modes, and what the interface takes from these needs them.
+/// Returns the sets of groups that a body may keep, cheapest first. A carried body keeps all: the dropped groups would
+/// be those of its own modes, but the motion of its interface needs them.
 pub(super) fn sets_in(carried: bool) -> impl Iterator<Item = TermGroups> {
     sets().filter(move |set| !carried || *set == TermGroups::ALL)
 }
 
-/// Every set of groups, cheapest first: W1 costs a multiple of nf, W2 six products with matrices of the size
-/// of K_ff, W3 two times three.
+/// Returns every set of groups, cheapest first. W1 costs a multiple of nf, W2 six products with matrices of the size of
+/// K_ff, W3 two times three.
 pub(super) fn sets() -> impl Iterator<Item = TermGroups> {
     (0..8).map(|bits| TermGroups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
 }
 
-/// The scene; and the same with the rotation scaled to the largest that it allows, where its own run stays
-/// behind that.
+/// Returns the scene and, if its run turns less than the scene allows, the scene with its rotation scaled to the
+/// largest allowed.
 pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     let (loads, _) = points_of(body, scene)?;
     let allowed = Situation::new(body, scene, &loads);
@@ -42,9 +42,10 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
             (rate.largest, rate.rate)
         }
         (None, Some(_)) => (0.0, 0.0),
-        // The accelerations of a free body grow like the square of its angular velocity.
+        // The accelerations of a free body grow with the square of its angular velocity.
         (None, None) => (scene.initial.angular_velocity.norm(), f64::INFINITY),
     };
+    // Factor that brings velocity and acceleration to the largest allowed.
     let velocity = allowed.spin.value / spin;
     let acceleration = match scene.requirements.motion.angular_acceleration {
         Some(_) => allowed.acceleration.value / acceleration,
@@ -60,7 +61,7 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     let mut scaled = own.turning_faster(factor);
     match (scene.prescribes(), &scene.requirements.motion.angular_velocity) {
         (true, _) if factor.is_infinite() => return Ok(vec![scene.clone()]),
-        // A free body that does not turn at first is given the rotation.
+        // A free body without initial rotation gets the allowed rotation.
         (false, Some(range)) if factor.is_infinite() => {
             scaled.initial.angular_velocity = match range {
                 Range::Axes(components) => *components,
@@ -73,7 +74,7 @@ pub(super) fn scenes(body: &FlexBody, scene: &Scene) -> Result<Vec<Scene>> {
     Ok(vec![own, scaled])
 }
 
-/// A scene to try models in.
+/// Scene in which models are tested.
 pub(super) struct Case<'c> {
     body: &'c FlexBody,
     scene: &'c Scene,
@@ -90,8 +91,8 @@ impl<'c> Case<'c> {
         Ok(Self { body, scene, situation, loads, watched, context: context.unheard() })
     }
 
-    /// Sizes of the terms at tier 0 and, where they are wanted and the body holds all groups, at tier 1.
-    /// Nothing without bounds.
+    /// Returns norms of the terms at tier 0 and, if `tier_1` is set and the body holds all groups, at tier 1. Empty if
+    /// there are no bounds for the scene.
     fn norms(&self, tier_1: bool) -> Vec<Norms> {
         let Ok(driven) = &self.situation.driven else { return Vec::new() };
         let (invariants, eigenvalues) = (self.body.invariants(), &self.body.modes().eigenvalue);
@@ -107,14 +108,15 @@ impl<'c> Case<'c> {
     }
 }
 
-/// Trials by bounds, up to the first set of groups that passes. Where the rotation is that of a run, the
-/// models that cost a multiple of nf only are run; others are as dear as a measurement.
+/// Returns trials by bounds, up to the first set of groups that passes. If the rotation comes from a run, only models
+/// that cost a multiple of nf are simulated; others cost as much as a measurement.
 pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
-    // Norms of the actual terms are eigenproblems of the size of the basis: once for every case.
+    // The norms of the actual terms are eigenproblems of the size of the basis: compute them once for each case.
     let norms: Vec<Vec<Norms>> = cases.iter().map(|case| case.norms(tier_1)).collect();
     let mut trials = Vec::new();
     let only_w1 = TermGroups::NONE.with(TermGroup::W1);
     for kept in sets().filter(|set| *set != TermGroups::ALL) {
+        // Bounds of this set of groups in every case, at every tier.
         let by_tier = cases.iter().zip(&norms).map(|(case, norms)| -> Result<Vec<Trial>> {
             let runs = case.runs();
             let TrialRuns { body, scene, situation, .. } = runs;
@@ -131,6 +133,7 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
             Ok(tiers.map(|norms| runs.bounded(norms, run.as_ref(), kept, PART_OF_BOUNDS)).collect())
         });
         let by_case: Vec<Vec<Trial>> = by_tier.collect::<Result<_>>()?;
+        // A tier counts if all cases have it; the worst case decides.
         let tiers = by_case.iter().map(Vec::len).min().unwrap_or(0);
         for tier in 0..tiers {
             let trial = worst(by_case.iter().map(|trials| trials[tier].clone()));
@@ -144,8 +147,8 @@ pub(super) fn bounded(cases: &[Case<'_>], tier_1: bool) -> Result<Vec<Trial>> {
     Ok(trials)
 }
 
-/// The trial with the largest error over its tolerance, one at least, with the larger of each error of all trials that
-/// have errors.
+/// Returns the trial with the largest error over its tolerance. Its errors become the largest of all trials that have
+/// errors. `trials` must not be empty.
 pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
     let trials: Vec<Trial> = trials.collect();
     let errors = trials.iter().filter_map(|trial| trial.errors).reduce(OutputErrors::larger_of);
@@ -153,8 +156,8 @@ pub(super) fn worst(trials: impl Iterator<Item = Trial>) -> Trial {
     Trial { errors: worst.errors.and(errors), ..worst }
 }
 
-/// The trial of a model in all load cases: that of the case in which its errors take the largest part of what
-/// is left of the tolerances there. Of a scene alone it is its own.
+/// Returns the trial of a model in all load cases: that of the case in which the errors take the largest part of the
+/// remaining tolerances. The trial of a single scene is returned unchanged.
 pub(super) fn together(trials: Vec<Trial>) -> Trial {
     let part = |trial: &Trial| (!trial.passed(), trial.worst / trial.budget);
     let larger = |a: &Trial, b: &Trial| {

@@ -1,4 +1,4 @@
-//! A selection on its way: from what bounds leave to what is measured.
+//! State of a selection: groups left open by bounds are decided by simulation.
 
 use super::basis::BEYOND_BAND;
 use super::cases::{SLACK_OF_RANGE, together, worst};
@@ -13,21 +13,21 @@ use flexbody_body::flex_body::TermGroups;
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{Measure, Trace};
 
-/// What was tried and what is chosen so far.
+/// Trials and current choice of a selection.
 pub(super) struct Deciding<'s> {
     demands: &'s [Demand<'s>],
     pub choice: Choice,
     pub trials: Vec<Trial>,
-    /// Of each load case the largest rotation of its runs and that which it allows, where the runs stay
-    /// behind that.
+    /// Largest angular velocity of the runs and the allowed one, for each load case; `None` if the runs reach the
+    /// allowed one.
     pub short_of: Vec<Option<(f64, f64)>>,
-    /// The chosen model in each load case, measured.
+    /// Measured trial of the chosen model in each load case.
     pub chosen_by_case: Vec<Trial>,
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl<'s> Deciding<'s> {
-    /// All modes, and what bounds leave of the groups in any load case.
+    /// Starts with all modes, and with the groups that bounds leave open in at least one load case.
     pub(super) fn new(demands: &'s [Demand<'s>]) -> Self {
         let mut diagnostics = Vec::new();
         let mut trials = Vec::new();
@@ -49,19 +49,20 @@ impl<'s> Deciding<'s> {
         Self { demands, choice, trials, short_of, chosen_by_case: Vec::new(), diagnostics }
     }
 
-    /// Whether motion can be measured.
+    /// Returns true if all load cases have a duration, so that motion can be measured.
     pub(super) fn has_run(&self) -> bool {
         self.demands.iter().all(|demand| demand.scene.run.duration.is_some())
     }
 
-    /// Chooses the modes of the highest band of the load cases, all where one has none; gives the reason.
+    /// Chooses the modes up to the highest band of the load cases, or all modes if one case has no band. Returns the
+    /// reason.
     pub(super) fn choose_by_band(&mut self) -> String {
         let bands = self.demands.iter().map(|demand| demand.scene.requirements.band);
         let band = bands.collect::<Option<Vec<f64>>>().map(|bands| bands.into_iter().fold(0.0, f64::max));
         let modes = self.demands[0].body.modes();
         let within = |&j: &usize| {
             let frequency = modes.eigenvalue[j].sqrt() / std::f64::consts::TAU;
-            // Residual vectors are what makes up for the modes beyond the band.
+            // Residual vectors are kept: they replace the modes beyond the band.
             let free = modes.provenance.get(j).is_none_or(|from| from == "free mode");
             band.is_none_or(|band| !free || frequency <= BEYOND_BAND * band)
         };
@@ -77,7 +78,7 @@ impl<'s> Deciding<'s> {
         }
     }
 
-    /// Chooses terms and modes by motion that is integrated; gives the reason for the modes.
+    /// Chooses terms and modes by integrated motion. Returns the reason for the modes.
     pub(super) fn choose_by_motion(&mut self, context: &Context<'_>) -> Result<String> {
         context.phase("reference motion");
         let references = self.reference_motions()?;
@@ -106,7 +107,8 @@ impl<'s> Deciding<'s> {
         }
     }
 
-    /// The motion of the whole body, as far as bounds leave it whole, in every scene of every load case.
+    /// Returns the motion of the whole body, with the groups that bounds do not rule out, in every scene of every load
+    /// case.
     fn reference_motions(&mut self) -> Result<Vec<Vec<Trace>>> {
         let mut by_case = Vec::new();
         for (demand, short_of) in self.demands.iter().zip(&mut self.short_of) {
@@ -131,7 +133,7 @@ impl<'s> Deciding<'s> {
         Ok(by_case)
     }
 
-    /// Drops terms and modes; gives the reason for the modes.
+    /// Drops terms and modes. Returns the reason for the modes.
     fn search(&mut self, search: &SelectionSearch<'_>) -> Result<String> {
         let (choice, trials) = (&mut self.choice, &mut self.trials);
         if let Some(most) = self.demands[0].scene.requirements.multiplications {
@@ -150,7 +152,7 @@ impl<'s> Deciding<'s> {
         Ok(format!("the fewest whose motion is within {within}"))
     }
 
-    /// Measures the chosen model in every scene, and says what may go wrong with it.
+    /// Measures the chosen model in every scene, and adds warnings about it.
     fn measure_choice(&mut self, search: &SelectionSearch<'_>) -> Result<()> {
         for (demand, case) in self.demands.iter().zip(search.cases) {
             let mut chosen = Vec::new();

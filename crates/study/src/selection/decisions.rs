@@ -1,4 +1,4 @@
-//! Decisions in words and numbers, and the trials that they rest on.
+//! Decisions about groups, with their reasons and the trials behind them.
 
 use super::demand::Demand;
 use super::search::Choice;
@@ -6,26 +6,26 @@ use super::situation::Input;
 use super::trial::Trial;
 use flexbody_body::flex_body::{TermDecision, TermGroup, TermGroups};
 
-/// The error that a decision about a group rests on.
+/// Error that decides about a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ground {
-    /// The output whose error is largest beside its tolerance: attitude, deflection, stress or reaction.
+    /// Output whose error is largest relative to its tolerance: attitude, deflection, stress or reaction.
     pub output: &'static str,
-    /// Its error without the group: of the attitude in radians, else relative. A bound, or measured over a
-    /// run (`tier` 2).
+    /// Error of that output without the group: of the attitude in radians, else relative. It is a bound, or measured
+    /// over a run (`tier` 2).
     pub error: f64,
-    /// The tolerance of the scene.
+    /// Tolerance of the scene for that output.
     pub tolerance: f64,
-    /// The part of the tolerance that may be spent on dropping groups.
+    /// Part of the tolerance that dropped groups may take.
     pub budget: f64,
-    /// 0: bound from I0 and the frequencies; 1: bound with the norms of the invariants; 2: measured.
+    /// Tier of the decision. 0: bound from I0 and the frequencies; 1: bound with the norms of the invariants; 2:
+    /// measured.
     pub tier: u8,
-    /// The load case (from 0) that it belongs to, where there are several.
+    /// Index of the load case (from 0), if there are several.
     pub case: Option<usize>,
 }
 
-/// What decisions are made from: what every load case demands, what was chosen, and what was tried on the
-/// way.
+/// Input of the decisions: the demands of every load case, the choice, and all trials.
 pub(super) struct Deliberation<'d> {
     pub demands: &'d [Demand<'d>],
     pub choice: &'d Choice,
@@ -33,7 +33,7 @@ pub(super) struct Deliberation<'d> {
 }
 
 impl Deliberation<'_> {
-    /// The decision about every group, and the error that it rests on where there is one.
+    /// Returns the decision about every group, and the error behind it if there is one.
     pub(super) fn decisions(&self) -> Vec<(TermDecision, Option<Ground>)> {
         TermGroup::ALL.into_iter().map(|group| self.decide(group)).collect()
     }
@@ -64,20 +64,20 @@ impl Deliberation<'_> {
         (decided, ground)
     }
 
-    /// Whether a trial is of all load cases; bounds are of one each.
+    /// Returns true if the trial covers all load cases; a bound covers one.
     fn is_of_all(&self, trial: &Trial) -> bool {
         self.demands.len() == 1 || !trial.by_case.is_empty()
     }
 
-    /// The last trial of what is kept without `group`.
+    /// Returns the last trial of the kept groups without `group`.
     fn last_without(&self, group: TermGroup) -> Option<&Trial> {
         let kept = self.choice.groups.and(TermGroups::without(group));
         let without = || self.trials.iter().filter(move |trial| trial.kept == kept);
         without().rfind(|trial| self.is_of_all(trial)).or(without().rfind(|trial| !trial.passed()))
     }
 
-    /// The first trial of what is kept that passed; where bounds of each load case decided, the largest of
-    /// those without `group`.
+    /// Returns the first trial of the kept groups that passed. If bounds in each load case decided, returns the trial
+    /// with the largest error among those without `group`.
     fn first_that_passed(&self, group: TermGroup) -> Option<&Trial> {
         let kept = self.choice.groups;
         let passed = || self.trials.iter().filter(|trial| trial.passed());
@@ -91,19 +91,19 @@ fn undecided(group: TermGroup, kept: bool, reason: &str) -> TermDecision {
     TermDecision { group, kept, tier: 0, bound: 0.0, limit: 0.0, reason: reason.to_owned() }
 }
 
-/// What the load case of a trial demands.
+/// Returns the demand of the load case of a trial.
 fn demand_of<'d>(trial: &Trial, demands: &'d [Demand<'d>]) -> &'d Demand<'d> {
     &demands[trial.case.unwrap_or(0)]
 }
 
-/// What is largest beside its tolerance in a trial; `None` where its errors are not known.
+/// Returns the error of a trial that is largest relative to its tolerance; `None` if the errors are unknown.
 fn ground(trial: &Trial, demands: &[Demand<'_>]) -> Option<Ground> {
     let errors = trial.errors.as_ref().filter(|_| trial.worst.is_finite())?;
     let (output, error, tolerance) = errors.decisive(demand_of(trial, demands).tolerance());
     Some(Ground { output, error, tolerance, budget: trial.budget, tier: trial.tier, case: trial.case })
 }
 
-/// The decision that a trial without `group` leads to; `rotation` is the one that it rests on.
+/// Returns the decision that follows from `trial`. `rotation` is the rotation that the trial assumes.
 pub(super) fn decision(
     group: TermGroup,
     kept: bool,
@@ -131,7 +131,7 @@ pub(super) fn decision(
     TermDecision { group, kept, tier: trial.tier, bound, limit, reason }
 }
 
-/// The guideline of \[WP19\] section 8 that a set of groups is nearest to.
+/// Returns the guideline of \[WP19\] section 8 that is closest to a set of groups.
 pub(super) fn guideline(groups: TermGroups) -> &'static str {
     match (groups.w1, groups.w2, groups.w3) {
         (false, false, false) => "I: inertia of the undeformed body",

@@ -1,4 +1,4 @@
-//! What one scene, or one load case of several, demands of a body.
+//! Demands of a scene, or of one of several load cases, on a body.
 
 use super::cases::{Case, PART_OF_BOUNDS, bounded, scenes};
 use super::situation::Situation;
@@ -12,8 +12,8 @@ use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{PerQuantity, Scene, Stage, Tolerance, damped_once, points_of};
 use std::borrow::Cow;
 
-/// A body and a scene on their stage, and the scenes that a model is tried in: this one, and where it allows
-/// faster rotation than its run has, the one that turns as fast.
+/// Body and scene in one frame, with the scenes in which models are tested: this scene and, if it allows faster
+/// rotation than its run has, the scene with its rotation scaled to that.
 pub(super) struct OnStage<'s> {
     pub body: Cow<'s, FlexBody>,
     pub scene: Cow<'s, Scene>,
@@ -30,31 +30,30 @@ impl<'s> OnStage<'s> {
     }
 }
 
-/// What a scene demands: the motion that it means, the groups that bounds leave, and what is left of its
-/// tolerances.
+/// Demand of a scene: the motion that it implies, the groups that bounds leave open, and the remaining tolerances.
 pub(super) struct Demand<'c> {
-    /// Name of the load case; `None` of a scene alone.
+    /// Name of the load case; `None` for a single scene.
     pub name: Option<&'c str>,
     pub body: &'c FlexBody,
     pub scene: &'c Scene,
     pub situation: Situation,
     pub loads: Vec<BodyPoint>,
-    /// What a model is tried in.
+    /// Scenes in which models are tested.
     pub cases: Vec<Case<'c>>,
     /// Warnings and notes about scene and body.
     pub found: &'c [Diagnostic],
     /// Trials by bounds.
     pub bounds: Vec<Trial>,
-    /// The groups that bounds leave, where these rule out some.
+    /// Groups that bounds do not rule out; `None` if bounds rule out no group.
     pub by_bounds: Option<TermGroups>,
-    /// What the body, and those before it that were enriched, lack of the model.
+    /// Truncation errors of the body and of its versions before enrichment.
     pub lacks: &'c [ReferenceError],
-    /// The largest rotation of the runs and that which the scene allows, where the runs stay behind it.
+    /// Largest angular velocity of the runs and the allowed one; `None` if the runs reach the allowed one.
     pub short_of: Option<(f64, f64)>,
 }
 
 impl<'c> Demand<'c> {
-    /// Of the load case `name`; `tier_1` says whether bounds may use norms of the invariants.
+    /// Creates the demand of the load case `name`. Bounds use norms of the invariants if `tier_1` is set.
     pub(super) fn new(
         stage: &'c OnStage<'_>,
         name: Option<&'c str>,
@@ -81,7 +80,7 @@ impl<'c> Demand<'c> {
         })
     }
 
-    /// The groups that the body holds and bounds leave.
+    /// Returns the groups that the body holds and that bounds do not rule out.
     pub(super) fn groups(&self) -> TermGroups {
         let held = self.body.invariants().groups();
         self.by_bounds.map_or(held, |kept| kept.and(held))
@@ -91,20 +90,20 @@ impl<'c> Demand<'c> {
         &self.scene.requirements.tolerance
     }
 
-    /// What the body itself and bounds leave of the tolerances.
+    /// Returns the part of the tolerances left after the truncation error of the body and the bounds.
     pub(super) fn budget(&self) -> f64 {
         let lacking = self.lacks.last().filter(|own| own.is_reference());
         let left = (1.0 - lacking.map_or(0.0, |own| own.worst)).max(0.0);
         if self.by_bounds.is_none() {
             return left;
         }
-        // What is measured is relative to a motion that may be larger than that of the whole body by as much
-        // as bounds allow.
+        // Measured errors are relative to a motion with groups dropped by bounds, which may be larger than that of the
+        // whole body by as much as the bounds allow.
         let PerQuantity { deflection, stress, reaction, .. } = self.tolerance().errors;
         (left - PART_OF_BOUNDS).max(0.0) / (1.0 + PART_OF_BOUNDS * deflection.max(stress).max(reaction))
     }
 
-    /// What is said about this load case, where there are several.
+    /// Returns the diagnostic with the name of the load case, if there are several.
     pub(super) fn about(&self, said: Diagnostic) -> Diagnostic {
         match self.name {
             Some(name) => said.about(format!("case `{name}`")),

@@ -1,4 +1,4 @@
-//! What the terms that a model drops would add along its own motion.
+//! Contributions of the dropped terms along the motion of a model without them.
 
 use super::bounds::{Amplitude, LoadSizes, TorqueDefect};
 use super::first_order::{FirstOrder, ModalState, Oscillators};
@@ -10,19 +10,19 @@ use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation, Orientation, Term
 use flexbody_motion::scene::{Recording, Scene};
 use nalgebra::Vector3;
 
-/// A motion without some terms, and what these would add at its instants: from norms of the terms at tier 0,
-/// at tier 1 from the terms.
+/// Motion without some terms, and the contributions of the dropped terms at its instants: from norms of the terms at
+/// tier 0, from the terms themselves at tier 1.
 pub(super) struct DroppedTerms {
     pub amplitude: Amplitude,
-    /// What the balance of modal forces lacks.
+    /// Missing part of the modal forces.
     pub load: LoadSizes,
-    /// What the balance of torques lacks.
+    /// Missing part of the torque.
     pub defect: TorqueDefect,
-    /// The error in the first order, where the terms themselves are known.
+    /// First-order error; `None` if only norms of the terms are known.
     pub first_order: Option<FirstOrder>,
 }
 
-/// The motion at one instant.
+/// Motion at one instant.
 struct Instant<'r> {
     time: f64,
     /// Angular velocity and acceleration.
@@ -30,12 +30,12 @@ struct Instant<'r> {
     alpha: Vector3<f64>,
     q: &'r [f64],
     qd: &'r [f64],
-    /// q'', from the motion at the instants beside.
+    /// Modal accelerations q'', from the motion at the neighbouring instants.
     acceleration: Vec<f64>,
 }
 
 impl DroppedTerms {
-    /// Of the motion `run` of `body` in `scene` with the groups `kept`.
+    /// Evaluates the dropped terms along the motion `run` of `body` in `scene` with the groups `kept`.
     pub(super) fn new(
         body: &FlexBody,
         scene: &Scene,
@@ -64,8 +64,8 @@ impl DroppedTerms {
     }
 }
 
-/// The response of every mode alone to the `forces` that the dropped terms are at the instants; and what the
-/// terms that couple the modes make of that, which is left to bounds.
+/// Computes the response of every uncoupled mode to the `forces` of the dropped terms. The coupling terms along this
+/// response are left to bounds.
 fn first_order(
     body: &FlexBody,
     scene: &Scene,
@@ -74,6 +74,7 @@ fn first_order(
     norms: &Norms,
 ) -> Option<FirstOrder> {
     let times: Vec<f64> = instants.iter().map(|instant| instant.time).collect();
+    // Response of the uncoupled modes, then the load of the coupling terms along it.
     let oscillators = Oscillators::new(body, &times)?;
     let (errors, mut first) = oscillators.respond(forces, scene.initial.settled);
     let along: Vec<Instant<'_>> =
@@ -88,7 +89,7 @@ fn first_order(
 }
 
 impl<'r> Instant<'r> {
-    /// An error of the modes in place of their motion.
+    /// Returns the instant with an error of the modes in place of their motion.
     fn of_error<'e>(&self, error: &'e ModalState) -> Instant<'e> {
         let Self { time, omega, alpha, .. } = *self;
         Instant { time, omega, alpha, q: &error.q, qd: &error.qd, acceleration: Vec::new() }
@@ -113,8 +114,8 @@ fn instants<'r>(scene: &Scene, run: &'r Recording) -> Vec<Instant<'r>> {
     (0..run.time.len()).map(instant).collect()
 }
 
-/// q'' at an instant: of the polynomial through q and q' there and beside, of degree five, at the ends of
-/// degree three.
+/// Returns q'' at an instant, from the polynomial of degree five through q and q' at the instant and its neighbours; at
+/// the ends, of degree three.
 fn acceleration(run: &Recording, i: usize) -> Vec<f64> {
     let last = run.time.len() - 1;
     let (before, after) = (i.saturating_sub(1), (i + 1).min(last));
@@ -131,7 +132,7 @@ fn acceleration(run: &Recording, i: usize) -> Vec<f64> {
     (0..now.q.len()).map(acceleration).collect()
 }
 
-/// What the dropped terms add to the balances, collected from instant to instant.
+/// Contributions of the dropped terms, accumulated over the instants.
 #[derive(Default)]
 struct Collected {
     load: LoadSizes,
@@ -145,7 +146,7 @@ impl Collected {
     }
 }
 
-/// Sizes of the state at an instant.
+/// Norms of the state at an instant.
 struct Scalars<'i> {
     instant: &'i Instant<'i>,
     /// |omega| and |omega'|.
@@ -157,12 +158,12 @@ struct Scalars<'i> {
     energy: f64,
 }
 
-/// Bounds of the dropped terms by the norms of theirs.
+/// Norms of the dropped terms, for bounds.
 struct TermNorms<'n> {
-    /// 1 of a group that is dropped, else 0.
+    /// Factors of W1 and W2: 1 if the group is dropped, else 0.
     w1: f64,
     w2: f64,
-    /// The norms of W3, likewise zero where it is kept.
+    /// Norms of W3; zero if W3 is kept.
     w3: f64,
     turning: f64,
     norms: &'n Norms,
@@ -170,6 +171,7 @@ struct TermNorms<'n> {
     root: &'n [f64],
 }
 
+/// Bounds the contributions of the dropped groups by norms of the terms.
 fn by_norms(
     instants: &[Instant<'_>],
     dropped: TermGroups,
@@ -188,6 +190,7 @@ fn by_norms(
     let mut found = Collected::default();
     let mut before: Option<(Scalars<'_>, f64)> = None;
     for instant in instants {
+        // Largest values at the instants; impulse and variation between them.
         let now = terms.scalars(instant);
         let (force, in_energy) = terms.load(&now);
         found.load.largest = larger(found.load.largest, in_energy);
@@ -195,7 +198,7 @@ fn by_norms(
         match &before {
             None => found.load.begun = in_energy,
             Some((earlier, force_before)) => {
-                // The larger of both ends: what jumps between them is not missed.
+                // Take the larger of both ends, so that a jump between instants is included.
                 found.load.impulse += larger(force, *force_before) * (instant.time - earlier.instant.time);
                 found.load.moved += terms.moved(earlier, &now);
             }
@@ -220,7 +223,7 @@ impl TermNorms<'_> {
         }
     }
 
-    /// The load on the modes, and Lambda^(-1/2) times it.
+    /// Returns the norm of the load on the modes, and of Lambda^(-1/2) times the load.
     fn load(&self, now: &Scalars<'_>) -> (f64, f64) {
         let (norms, &Scalars { w, alpha, q, v, energy, .. }) = (self.norms, now);
         let coupled = self.w3 * (2.0 * w * v + alpha * q);
@@ -239,8 +242,8 @@ impl TermNorms<'_> {
             + self.turning * (q * a + w * q * v)
     }
 
-    /// How far Lambda^(-1/2) times the load moves between two instants: products change by the change of one
-    /// factor times the other.
+    /// Returns a bound of the change of Lambda^(-1/2) times the load between two instants: a product changes by the
+    /// change of one factor times the other.
     fn moved(&self, earlier: &Scalars<'_>, now: &Scalars<'_>) -> f64 {
         let (norms, root) = (self.norms, self.root);
         let (state, old) = (now.instant, earlier.instant);
@@ -262,8 +265,8 @@ impl TermNorms<'_> {
     }
 }
 
-/// The dropped terms themselves: what the balance of forces of the whole body has beyond that of the kept
-/// groups; its modal forces at every instant.
+/// Computes the dropped terms as the difference between the force balances of the whole body and of the kept groups.
+/// The last result holds the modal forces at every instant.
 fn by_terms(
     body: &FlexBody,
     instants: &[Instant<'_>],
@@ -284,11 +287,12 @@ fn by_terms(
     let mut found = Collected::default();
     let mut forces: Vec<Vec<f64>> = Vec::with_capacity(instants.len());
     for (at, instant) in instants.iter().enumerate() {
+        // Largest values at the instants; impulse and variation between them.
         let (torque, force) = balances.difference(instant);
         found.torque = larger(found.torque, norm(&torque));
         let in_energy: Vec<f64> = force.iter().zip(root).map(|(f, root)| f / root).collect();
         found.load.largest = larger(found.load.largest, norm(&in_energy));
-        // W3'q changes slowly beside how often it is looked at.
+        // W3'q changes slowly compared with the spacing of the instants: evaluate it at some of them.
         if at % COARSE == 0 {
             found.stiff = larger(found.stiff, stiff_at(instant.q));
         }
@@ -308,12 +312,12 @@ fn by_terms(
     (load, defect, forces)
 }
 
-/// The balances of forces of the whole body and of the kept groups, in the same motion.
+/// Force balances of the whole body and of the kept groups, for the same motion.
 struct Balances<'e> {
     evaluations: [Evaluation<'e>; 2],
     /// Number of rigid motions.
     rigid: usize,
-    /// Axes that the body turns about.
+    /// Axes of rotation of the body.
     axes: &'static [usize],
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
@@ -332,9 +336,9 @@ impl<'e> Balances<'e> {
         }
     }
 
-    /// Torque and modal forces that the whole body has beyond the kept groups.
+    /// Returns torque and modal forces of the whole body minus those of the kept groups.
     fn difference(&mut self, instant: &Instant<'_>) -> (Vec<f64>, Vec<f64>) {
-        // Free-surface modes about the centre of mass do not feel how the frame moves along.
+        // Translation of the frame does not act on free-surface modes about the centre of mass.
         let first = self.rigid - self.axes.len();
         for (at, &axis) in self.axes.iter().enumerate() {
             self.velocity[first + at] = instant.omega[axis];
@@ -353,14 +357,14 @@ impl<'e> Balances<'e> {
     }
 }
 
-/// One of so many instants is looked at where a product with nf^2 entries is not part of the balance.
+/// Stride of the instants at which a product with nf^2 entries is evaluated outside the balance.
 const COARSE: usize = 4;
 
 fn norm(x: &[f64]) -> f64 {
     x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
-/// |Lambda^(1/2) x|.
+/// Returns |Lambda^(1/2) x|.
 fn weighted(x: &[f64], root: &[f64]) -> f64 {
     x.iter().zip(root).map(|(x, root)| (x * root).powi(2)).sum::<f64>().sqrt()
 }

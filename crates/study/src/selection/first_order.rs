@@ -1,49 +1,48 @@
-//! What dropped terms make of the motion of the modes in the first order: the response of every mode alone.
+//! First-order effect of dropped terms on the motion of the modes: the response of every uncoupled mode.
 
 use super::bounds::{ErrorBound, LoadSizes, TurnedTorques};
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::larger;
 use flexbody_motion::integration::free_oscillation;
 
-/// How far instants may be from even, relative to the time between two.
+/// Largest deviation of the instants from even spacing, relative to the spacing.
 const UNEVEN: f64 = 1e-6;
 
-/// Modes and their rates.
+/// Modal coordinates and their rates.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ModalState {
     pub q: Vec<f64>,
     pub qd: Vec<f64>,
 }
 
-/// Sizes of the response e of the uncoupled modes, e'' + D e' + Lambda e = F, to the load F that the dropped
-/// terms are.
+/// Norms of the response e of the uncoupled modes, e'' + D e' + Lambda e = F, to the load F of the dropped terms.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct FirstOrder {
-    /// |Lambda^(1/2) e|.
+    /// Largest |Lambda^(1/2) e|.
     energy: f64,
-    /// |e|.
+    /// Largest |e|.
     coordinate: f64,
-    /// |e'|.
+    /// Largest |e'|.
     rate: f64,
-    /// |e'' + Lambda e|.
+    /// Largest |e'' + Lambda e|.
     without_stiffness: f64,
-    /// Loads that e leaves out: those of the terms that couple the modes, along e, and what F has beside
-    /// straight lines from instant to instant.
+    /// Loads that the response e does not contain: the terms that couple the modes, along e, and the deviation of F
+    /// from linear interpolation between the instants.
     pub rest: LoadSizes,
 }
 
 impl FirstOrder {
-    /// Leaves to the rest what `turned` torques make of e in the `duration`.
+    /// Adds to the rest the load of torques on the deformed body, for the motion e over `duration`.
     pub(super) fn leave_torques(&mut self, turned: &TurnedTorques, duration: f64) {
         if turned.force > 0.0 {
             let force = turned.force * self.energy;
             self.rest.impulse += force * duration;
-            // How they change is not known.
+            // The change of this load over time is unknown.
             self.rest.moved = f64::INFINITY;
         }
     }
 
-    /// The error, where `rest` is the bound of what the loads that were left out make.
+    /// Returns the total error. `rest` is the bound of the response to the loads in [`FirstOrder::rest`].
     pub(super) fn with(&self, rest: &ErrorBound) -> ErrorBound {
         ErrorBound {
             energy: self.energy + rest.energy,
@@ -54,21 +53,21 @@ impl FirstOrder {
     }
 }
 
-/// The modes of a body as oscillators x'' + d x' + lambda x = f, each of which moves from one of even
-/// instants to the next, under a load that is straight between them, without error.
+/// Modes of a body as oscillators x'' + d x' + lambda x = f at evenly spaced instants. With a load that is linear
+/// between the instants, a step is exact.
 pub(super) struct Oscillators {
     /// Time between two instants.
     step: f64,
     root: Vec<f64>,
     decay: Vec<f64>,
-    /// |D| where the modes are damped together: left to the rest.
+    /// Norm |D| if the damping couples the modes; the damping forces are then part of the rest.
     damping_left: f64,
-    /// The free motion of every mode over a step, see [`free_oscillation`].
+    /// Free motion of every mode over one step, see [`free_oscillation`].
     turns: Vec<[f64; 2]>,
 }
 
 impl Oscillators {
-    /// `None` where `times` are not even.
+    /// Prepares the steps. Returns `None` if `times` are not evenly spaced.
     pub(super) fn new(body: &FlexBody, times: &[f64]) -> Option<Self> {
         let (&first, &last) = (times.first()?, times.last()?);
         let step = (last - first) / (times.len() - 1) as f64;
@@ -86,13 +85,13 @@ impl Oscillators {
         (even && step > 0.0).then_some(Self { step, root, decay, damping_left, turns })
     }
 
-    /// sqrt(Lambda).
+    /// Returns sqrt(Lambda).
     pub(super) fn root(&self) -> &[f64] {
         &self.root
     }
 
-    /// The response at every instant to the loads there, from rest without deformation or, `settled`, from
-    /// the static response; its sizes.
+    /// Returns the response at every instant, and its norms. The motion starts from rest without deformation or, if
+    /// `settled`, from the static response. `loads` holds the modal loads at every instant.
     pub(super) fn respond(&self, loads: &[Vec<f64>], settled: bool) -> (Vec<ModalState>, FirstOrder) {
         let modes = self.root.len();
         let mut now = ModalState { q: vec![0.0; modes], qd: vec![0.0; modes] };
@@ -112,11 +111,11 @@ impl Oscillators {
         (states, sizes)
     }
 
-    /// Moves mode j to the next instant, under a load from f to g.
+    /// Advances mode j to the next instant, under a load that changes linearly from f to g.
     fn advance(&self, state: &mut ModalState, j: usize, f: f64, g: f64) {
         let (lambda, d) = (self.root[j] * self.root[j], self.decay[j]);
         let slope = (g - f) / self.step;
-        // The response that is straight itself, and the free motion about it.
+        // Split into the linear particular solution and the free motion about it.
         let (rate, place) = (slope / lambda, (f - d * slope / lambda) / lambda);
         let (x, v) = (state.q[j] - place, state.qd[j] - rate);
         let [cosine, sine] = self.turns[j];
@@ -136,7 +135,7 @@ impl Oscillators {
         sizes.rest.impulse += self.damping_left * norm(&state.qd) * self.step;
     }
 
-    /// What loads are beside straight lines, from how these bend at the instants.
+    /// Adds the deviation of the loads from linear interpolation, estimated from second differences.
     fn leave(&self, loads: &[Vec<f64>], sizes: &mut FirstOrder) {
         for three in loads.windows(3) {
             let bend = |j: usize| three[0][j] - 2.0 * three[1][j] + three[2][j];
@@ -145,7 +144,7 @@ impl Oscillators {
                 force += bend(j).powi(2);
                 energy += (bend(j) / root).powi(2);
             }
-            // A parabola through the three is an eighth of that away from its chords.
+            // The parabola through three instants deviates from its chords by an eighth of the second difference.
             let (force, energy) = (force.sqrt() / 8.0, energy.sqrt() / 8.0);
             sizes.rest.impulse += force * self.step;
             sizes.rest.largest = larger(sizes.rest.largest, energy);

@@ -1,5 +1,5 @@
-//! What a body needs in a scene: sizes of the terms, guaranteed bounds of what dropping them does, measured
-//! errors, and the decision.
+//! Selection of the terms and modes that a body needs in a scene: norms of the terms, guaranteed bounds of the error of
+//! dropping them, measured errors, and the decision.
 
 mod basis;
 mod bounds;

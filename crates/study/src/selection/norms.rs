@@ -1,17 +1,16 @@
-//! Sizes of the terms of the equations of motion, before and after the invariants are known (theory section
-//! 7).
+//! Norms of the terms of the equations of motion, before and after the invariants are known (theory section 7).
 
 use faer::Mat;
 use flexbody_body::invariants::{Invariants, relative_norm};
 use flexbody_linalg::symmetric_eigen;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// Bounds of the terms for mass-normalised free-surface modes about the centre of mass, per unit of angular
-/// velocity and of q. Tier 0 knows I0 and the eigenvalues and follows from the Cauchy-Schwarz inequality in
-/// the inner product of M; tier 1 has the norms of the actual W1, W2, W3.
+/// Norms of the terms for mass-normalised free-surface modes about the centre of mass, per unit of angular velocity and
+/// of q. Tier 0 uses I0 and the eigenvalues with the Cauchy-Schwarz inequality in the inner product of M; tier 1 uses
+/// the norms of the actual W1, W2 and W3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Norms {
-    /// 0 or 1.
+    /// Tier, 0 or 1.
     pub tier: u8,
     /// Smallest circular frequency Omega_1.
     pub first: f64,
@@ -23,19 +22,19 @@ pub struct Norms {
     pub centrifugal_energy: f64,
     /// |W1 Q| over |q|. Tier 0: 2 sqrt(largest principal inertia).
     pub inertia: f64,
-    /// |E(w, w)| over |w|^2, E = the symmetric part of W2. Tier 0: 1.
+    /// |E(w, w)| over |w|^2, with E the symmetric part of W2. Tier 0: 1.
     pub spin: f64,
     /// |Lambda^(-1/2) E Lambda^(-1/2)| over |w|^2. Tier 0: 1 / lambda_1.
     pub softening: f64,
-    /// |W3(w)| over |w|. Tier 0: 1.
+    /// |W3(w)| over |w|, for the axis of rotation if it is known. Tier 0: 1.
     pub coupling: f64,
-    /// |Q'W3| over |q|: the same for any direction, since the torque has all. Tier 0: 1.
+    /// |Q'W3| over |q|, for all axes, since the torque has all components. Tier 0: 1.
     pub turning: f64,
 }
 
 impl Norms {
-    /// What I0 (body axes, about the centre of mass) and the eigenvalues say, for rotation about `axis` or,
-    /// without one, about any.
+    /// Returns the norms of tier 0 from I0 (body axes, about the centre of mass) and the eigenvalues, for rotation
+    /// about `axis`; about any axis if it is `None`.
     pub fn of_rigid(inertia: &Matrix3<f64>, eigenvalues: &[f64], axis: Option<&Vector3<f64>>) -> Self {
         let largest = inertia.symmetric_eigenvalues().max();
         let along = axis.map_or(largest, |e| e.dot(&(inertia * e))).max(0.0).sqrt();
@@ -54,8 +53,8 @@ impl Norms {
         }
     }
 
-    /// What the invariants say; `None` where a group is not held or K_ff is not positive definite. Never more
-    /// than [`Norms::of_rigid`].
+    /// Returns the norms of tier 1 from the invariants. They never exceed the norms of [`Norms::of_rigid`]. Returns
+    /// `None` if a group is not held or K_ff is not positive definite.
     pub fn of_invariants(
         invariants: &Invariants,
         eigenvalues: &[f64],
@@ -64,6 +63,7 @@ impl Norms {
         let nf = eigenvalues.len();
         let rigid = Self::of_rigid(&invariants.inertia(), eigenvalues, axis);
         let root: Vec<f64> = eigenvalues.iter().map(|l| l.sqrt()).collect();
+        // Centrifugal load: along the axis, or the largest over all axes.
         let load = CentrifugalLoad::new(invariants)?;
         let (centrifugal, centrifugal_energy) = match axis {
             Some(e) => {
@@ -77,13 +77,14 @@ impl Norms {
         let block = |a: usize, b: usize| {
             Mat::from_fn(nf, nf, |i, j| 0.5 * (w2[(a * nf + i, b * nf + j)] + w2[(a * nf + j, b * nf + i)]))
         };
-        // About any axis E(e, e) is at most E_xx + E_yy + E_zz, all of them being positive semidefinite.
+        // About any axis, E(e, e) is at most E_xx + E_yy + E_zz, since all three are positive semidefinite.
         let weights = axis.map_or(Matrix3::identity(), |e| e * e.transpose());
         let spin = (0..9).filter(|at| weights[*at] != 0.0).fold(Mat::zeros(nf, nf), |sum: Mat<f64>, at| {
             let part = block(at % 3, at / 3);
             Mat::from_fn(nf, nf, |i, j| sum[(i, j)] + weights[at] * part[(i, j)])
         });
         let softening = relative_norm(spin.as_ref(), invariants.modal_stiffness().as_ref())?;
+        // Coupling W3: spectral norms along the axis and over all axes.
         let w3 = invariants.w3()?;
         let coupling = |e: &Vector3<f64>| {
             let part = |i: usize, j: usize| (0..3).map(|a| e[a] * w3[(a * nf + i, j)]).sum::<f64>();
@@ -107,23 +108,23 @@ impl Norms {
     }
 }
 
-/// Smallest and largest circular frequency.
+/// Returns the smallest and the largest circular frequency.
 fn ends(eigenvalues: &[f64]) -> (f64, f64) {
     let root = |value: f64| value.max(0.0).sqrt();
     let first = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min);
     (root(first), root(eigenvalues.iter().copied().fold(0.0, f64::max)))
 }
 
-/// Largest singular value.
+/// Returns the largest singular value.
 fn spectral_norm(a: &Mat<f64>) -> Option<f64> {
     let eigen = symmetric_eigen((a.transpose() * a).as_ref())?;
     Some(eigen.values.last().copied().unwrap_or(0.0).max(0.0).sqrt())
 }
 
-/// W1'w w / 2, the constant centrifugal load on the modes, as a function of w.
+/// Constant centrifugal load on the modes, W1'w w / 2, as a function of w.
 struct CentrifugalLoad {
-    /// nf x 6: of w_x^2, w_y^2, w_z^2, sqrt(2) w_y w_z, sqrt(2) w_x w_z, sqrt(2) w_x w_y, whose root of the
-    /// sum of squares is |w|^2.
+    /// Coefficients (nf x 6) of w_x^2, w_y^2, w_z^2, sqrt(2) w_y w_z, sqrt(2) w_x w_z and sqrt(2) w_x w_y. The
+    /// Euclidean length of these six products is |w|^2.
     rows: DMatrix<f64>,
 }
 
@@ -145,7 +146,7 @@ impl CentrifugalLoad {
         (&self.rows * nalgebra::Vector6::from(squares)).as_slice().to_vec()
     }
 
-    /// Largest length over |w|^2, row j times `weight(j)`.
+    /// Returns the largest length of the load over |w|^2, with row j multiplied by `weight(j)`.
     fn norm(&self, weight: impl Fn(usize) -> f64) -> f64 {
         let weighted = DMatrix::from_fn(self.rows.nrows(), 6, |j, at| weight(j) * self.rows[(j, at)]);
         (weighted.transpose() * weighted).symmetric_eigenvalues().max().max(0.0).sqrt()

@@ -1,4 +1,4 @@
-//! How much of the static response to each load the selected modes have (theory section 8).
+//! Static response to each load that the selected modes represent (theory section 8).
 
 use super::rows::PointRows;
 use flexbody_body::flex_body::FlexBody;
@@ -6,21 +6,22 @@ use flexbody_motion::dynamics::BodyPoint;
 use flexbody_motion::scene::{Point, Scene};
 use nalgebra::Vector3;
 
-/// What modes lack of the static response to a load, relative, in the norm of K: sqrt(1 - sum_kept (f_p^2 /
-/// lambda_p) / sum_all).
+/// Missing part of the static response to a load, relative, in the norm of K: sqrt(1 - sum_kept (f_p^2 / lambda_p) /
+/// sum_all).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Participation {
-    /// The load.
+    /// Name of the load.
     pub load: String,
-    /// What the selected modes lack of the response of all modes of the body.
+    /// Part that the selected modes miss of the response of all modes of the body.
     pub selected: f64,
-    /// What the modes of the body lack of the response of all nodes, with its residual vectors and without;
-    /// where it was recorded when the body was made.
+    /// Parts that the modes of the body miss of the response of all nodes, with its residual vectors and without them;
+    /// `None` if this was not recorded at the conversion.
     pub body: Option<(f64, f64)>,
 }
 
-/// For the loads of `scene` at `points` in their first direction, or where that changes along every axis that
-/// they have, and for steady spin about its axis. Loads that deform nothing are left out.
+/// Returns the missing parts for the loads of `scene` at `points` and for steady spin about its axis. Each force is
+/// taken in its first direction or, if the direction changes, along every axis that it has. Loads that cause no
+/// deformation are left out.
 pub fn participations(
     body: &FlexBody,
     scene: &Scene,
@@ -31,6 +32,7 @@ pub fn participations(
     let eigenvalues = &body.modes().eigenvalue;
     let mut all = Vec::new();
     let mut add = |load: String, forces: Vec<f64>, recorded: &dyn Fn(&str) -> bool| {
+        // Elastic energy of the static response in each mode: f_p^2 / lambda_p.
         let part = |j: usize| forces[j] * forces[j] / eigenvalues[j];
         let whole: f64 = (0..eigenvalues.len()).map(part).sum();
         let kept: f64 = selected.iter().map(|&j| part(j)).sum();
@@ -56,6 +58,7 @@ pub fn participations(
             add(format!("force {x}, {y}, {z} at {}", load.at), forces, &at_interface);
         }
     }
+    // Steady spin: W1'w w / 2 along its axis.
     let axis = match scene.rotation() {
         Some(velocity) => velocity.main_direction(),
         None => scene.initial.angular_velocity.try_normalize(0.0),

@@ -1,4 +1,4 @@
-//! The search for a cheaper model, by measured motion.
+//! Search for a cheaper model, by measured motion.
 
 use super::cases::{Case, sets_in, together, worst};
 use super::trial::{ModeShare, Trial, TrialRuns, multiplications};
@@ -7,11 +7,11 @@ use flexbody_body::flex_body::{FlexBody, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{Measure, Scene, Tolerance, Trace};
 
-/// Part of the rest that dropped terms may take before modes are dropped; all of it with the modes that are
-/// kept.
+/// Part of the remaining tolerances that dropped terms may take before modes are dropped. In the last search, with the
+/// kept modes, they may take all of it.
 const PART_OF_TERMS: f64 = 0.5;
 
-/// Terms and modes that are chosen so far.
+/// Current choice of terms and modes.
 pub(super) struct Choice {
     pub groups: TermGroups,
     pub modes: Vec<usize>,
@@ -20,7 +20,7 @@ pub(super) struct Choice {
 }
 
 impl Choice {
-    /// Keeps these modes.
+    /// Sets the kept modes.
     fn keep(&mut self, modes: Vec<usize>) {
         for (j, share) in self.shares.iter_mut().enumerate() {
             share.kept = modes.binary_search(&j).is_ok();
@@ -29,7 +29,7 @@ impl Choice {
     }
 }
 
-/// What modes do beside the tolerances.
+/// Returns the contribution of each mode relative to the tolerances: the larger of deflection and stress.
 fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
     let weight = |share: &ModeShare| {
         (share.deflection / tolerance.errors.deflection).max(share.stress / tolerance.errors.stress)
@@ -37,19 +37,19 @@ fn weights(shares: &[ModeShare], tolerance: &Tolerance) -> Vec<f64> {
     shares.iter().map(weight).collect()
 }
 
-/// Modes by their weights, most first.
+/// Returns the modes by descending weight.
 fn by_weight(weights: &[f64]) -> Vec<usize> {
     let mut ranked: Vec<usize> = (0..weights.len()).collect();
     ranked.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
     ranked
 }
 
-/// Modes of a body by what they do in its motion in the scene, most first: the order in which
-/// [`select`](super::select) keeps them. Of several load cases, for each the body in its frame, the scene and
-/// the motion, by the most that each mode does beside the tolerances of any.
+/// Returns the modes of a body by their contribution to its motion, largest first. [`select`](super::select) keeps
+/// modes in this order. `cases` holds, for each load case, the body in its frame, the scene and the motion; the largest
+/// contribution relative to the tolerances of any case counts.
 ///
 /// # Errors
-/// FB212 where a scene does not fit the body.
+/// FB212 if a scene does not match the body.
 pub fn liveliest_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usize>> {
     let mut weight = vec![0.0f64; cases.first().map_or(0, |(body, ..)| body.n_modes())];
     for (body, scene, motion) in cases {
@@ -60,27 +60,26 @@ pub fn liveliest_modes(cases: &[(&FlexBody, &Scene, &Trace)]) -> Result<Vec<usiz
     Ok(by_weight(&weight))
 }
 
-/// A scene that models are tried in, with the motion that they are measured against.
+/// Scene in which models are tested, with the reference motion.
 pub(super) struct Tried<'s> {
     pub runs: TrialRuns<'s>,
     pub measure: Measure<'s>,
 }
 
-/// The scenes of one load case.
+/// Scenes of one load case.
 pub(super) struct TriedCase<'s> {
     pub tried: Vec<Tried<'s>>,
-    /// What is left of the tolerances.
+    /// Remaining part of the tolerances.
     pub budget: f64,
 }
 
-/// The search for a model that holds in all load cases.
+/// Search for a model that holds in all load cases.
 pub(super) struct SelectionSearch<'s> {
-    /// One at least.
+    /// Load cases, at least one.
     pub cases: &'s [TriedCase<'s>],
-    /// Groups that have to stay: a run that turns slower than its scene allows shows of no term that it may
-    /// be dropped.
+    /// Groups that must be kept: a run that turns slower than its scene allows cannot show that a term may be dropped.
     pub fixed: TermGroups,
-    /// Whether something carries the body in a case: all groups stay then.
+    /// True if the body is carried in a load case; all groups are then kept.
     pub carried: bool,
 }
 
@@ -89,7 +88,7 @@ impl SelectionSearch<'_> {
         self.cases[0].tried[0].runs.body
     }
 
-    /// A model tried in all load cases; it may spend `part` of what is left of the tolerances of each.
+    /// Measures a model in all load cases. It may use `part` of the remaining tolerances of each.
     fn measured(&self, modes: &[usize], groups: TermGroups, part: f64) -> Result<Trial> {
         let in_case = |case: &TriedCase<'_>| -> Result<Trial> {
             let measured = |Tried { runs, measure }: &Tried<'_>| -> Result<Trial> {
@@ -100,19 +99,19 @@ impl SelectionSearch<'_> {
         Ok(together(self.cases.iter().map(in_case).collect::<Result<Vec<_>>>()?))
     }
 
-    /// The cheapest groups with all modes; they leave a part of the tolerances for these.
+    /// Chooses the cheapest groups with all modes, and leaves a part of the tolerances for the modes.
     pub(super) fn terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
         self.cheapest(PART_OF_TERMS, choice, trials)
     }
 
-    /// Cheaper groups with the modes that are kept, where these take less of the tolerances than was left to
-    /// them.
+    /// Chooses cheaper groups with the kept modes, if these use less of the tolerances than was left for them.
     pub(super) fn fewer_terms(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
         self.cheapest(1.0, choice, trials)
     }
 
-    /// The first set of groups whose motion is within a part of the tolerances.
+    /// Chooses the first set of groups whose motion is within `part` of the tolerances.
     fn cheapest(&self, part: f64, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
+        // Proper subsets of the current groups that contain all fixed groups, cheapest first.
         let smaller = sets_in(self.carried)
             .filter(|set| *set != choice.groups && set.and(choice.groups) == *set)
             .filter(|set| set.and(self.fixed) == self.fixed);
@@ -128,7 +127,7 @@ impl SelectionSearch<'_> {
         Ok(())
     }
 
-    /// Modes by what they do, most first.
+    /// Returns the modes by descending contribution, and records their shares.
     fn ranked(&self, choice: &mut Choice) -> Vec<usize> {
         let mut weight = vec![0.0f64; self.body().n_modes()];
         choice.shares.clear();
@@ -151,7 +150,7 @@ impl SelectionSearch<'_> {
         by_weight(&weight)
     }
 
-    /// The fewest modes, in the order of what they do, whose motion is within the tolerances.
+    /// Chooses the fewest modes, in the order of their contribution, whose motion is within the tolerances.
     pub(super) fn modes(&self, choice: &mut Choice, trials: &mut Vec<Trial>) -> Result<()> {
         let ranked = self.ranked(choice);
         let first = |count: usize| {
@@ -159,7 +158,7 @@ impl SelectionSearch<'_> {
             modes.sort_unstable();
             modes
         };
-        // More modes are not always better, but nearly: bisection, and the last that passed counts.
+        // Errors nearly always decrease with more modes: bisect, and keep the smallest number that passed.
         let (mut too_few, mut enough) = (0, ranked.len());
         while too_few + 1 < enough {
             let count = too_few.midpoint(enough);
@@ -175,8 +174,8 @@ impl SelectionSearch<'_> {
         Ok(())
     }
 
-    /// The most accurate model of at most `most` multiplications: for every set of groups as many modes as
-    /// that allows. False where every model takes more.
+    /// Chooses the most accurate model of at most `most` multiplications: for every set of groups, as many modes as the
+    /// cost allows. Returns false if every model costs more.
     pub(super) fn within_cost(
         &self,
         most: usize,
@@ -194,7 +193,7 @@ impl SelectionSearch<'_> {
                 let body = self.body().reduced(&modes, self.body().invariants().groups(), Vec::new())?;
                 Ok(multiplications(&body, groups))
             };
-            // The cost grows with the number of modes.
+            // The cost grows with the number of modes: bisect.
             let (mut fits, mut exceeds) = (0, ranked.len() + 1);
             while fits + 1 < exceeds {
                 let count = fits.midpoint(exceeds);
@@ -205,6 +204,7 @@ impl SelectionSearch<'_> {
             }
             let mut modes = ranked[..fits].to_vec();
             modes.sort_unstable();
+            // Measure the set with these modes, and keep the most accurate.
             let trial = self.measured(&modes, groups, 1.0)?;
             if best.as_ref().is_none_or(|(worst, ..)| trial.worst < *worst) {
                 best = Some((trial.worst, groups, modes));

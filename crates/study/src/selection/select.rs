@@ -1,4 +1,4 @@
-//! Decides which terms and modes a body needs in a scene.
+//! Selection of the terms and modes that a body needs in a scene.
 
 use super::by_case::{CaseSelection, by_case, worst_lacks};
 use super::deciding::Deciding;
@@ -15,60 +15,60 @@ use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroups};
 use flexbody_linalg::context::Context;
 use flexbody_motion::scene::{LoadCases, PerQuantity};
 
-/// What was decided, and on what grounds.
+/// Result of a selection, with the reasons.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
     /// Name of the scene.
     pub scene: String,
     /// Name of the body.
     pub body: String,
-    /// Numbers that the decision follows from.
+    /// Input numbers of the decision.
     pub inputs: Vec<Input>,
-    /// Largest errors that are allowed, of several load cases the least in any.
+    /// Tolerances; for several load cases, the smallest of each quantity.
     pub tolerance: PerQuantity<f64>,
-    /// Sizes of all terms.
+    /// Significance of all terms.
     pub significances: Vec<Significance>,
-    /// Everything that was tried, in order.
+    /// All trials, in order.
     pub trials: Vec<Trial>,
-    /// The decision about every group.
+    /// Decision about every group.
     pub terms: Vec<TermDecision>,
-    /// The error that each of these decisions rests on.
+    /// Error behind each decision; `None` if no error decided.
     pub grounds: Vec<Option<Ground>>,
     /// Groups that are kept.
     pub groups: TermGroups,
-    /// Modes that the body has.
+    /// Number of modes of the body.
     pub n_modes: usize,
-    /// Frequency of each of them in hertz.
+    /// Frequency of each mode of the body, in hertz.
     pub frequencies_hz: Vec<f64>,
-    /// Modes that are kept (from 0).
+    /// Indices of the kept modes (from 0).
     pub modes: Vec<usize>,
-    /// What every mode of the body does, where a motion was integrated.
+    /// Contribution of every mode of the body; empty if no motion was integrated.
     pub shares: Vec<ModeShare>,
-    /// What the selected modes lack of the static responses to the loads.
+    /// Parts of the static responses to the loads that the selected modes miss.
     pub participations: Vec<Participation>,
-    /// The reason for these modes.
+    /// Reason for the choice of modes.
     pub mode_reason: String,
-    /// The selected model, measured against all that the body holds; none where nothing was integrated.
+    /// Selected model, measured against the whole body; `None` if no motion was integrated.
     pub chosen: Option<Trial>,
-    /// Multiplications of an evaluation with everything that the body holds.
+    /// Multiplications of an evaluation of the equations with everything that the body holds.
     pub multiplications: usize,
-    /// Guideline of \[WP19\] section 8 that the kept groups are nearest to.
+    /// Guideline of \[WP19\] section 8 that is closest to the kept groups.
     pub guideline: &'static str,
-    /// The cost that the scene allows, where that decides.
+    /// Number of multiplications that the scene allows; `None` if tolerances decide.
     pub most_multiplications: Option<usize>,
-    /// What the body, and those before it that were enriched, lack of the model, the last one the body
-    /// itself; empty where only a file is at hand, or nothing can be estimated. Of several load cases: in
-    /// that where the body lacks most.
+    /// Truncation errors of the body and of its versions before enrichment; the last belongs to the body itself. Empty
+    /// if no model is at hand or nothing can be estimated. For several load cases, those of the case with the largest
+    /// last error.
     pub lacks: Vec<ReferenceError>,
-    /// What belongs to each load case; empty of a scene without.
+    /// Results for each load case; empty for a single scene.
     pub cases: Vec<CaseSelection>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Selection {
-    /// Whether what was asked for holds: the cost, or else the tolerances as far as they were measured,
-    /// against a body that lacks no more than half of them itself.
+    /// Returns true if the requirement holds: the cost, or else the measured errors, relative to a body whose
+    /// truncation error takes at most half of the tolerances. True if nothing was measured.
     pub fn holds(&self) -> bool {
         let is_reference = self.lacks.last().is_none_or(ReferenceError::is_reference);
         self.chosen.as_ref().is_none_or(|chosen| match self.most_multiplications {
@@ -78,11 +78,11 @@ impl Selection {
     }
 }
 
-/// What I0 and the eigenvalues alone rule out (tier 0): decisions about the groups that a body in these load
-/// cases need not hold. `body` needs to hold none.
+/// Returns decisions about the groups that I0 and the eigenvalues alone rule out (tier 0) in these load cases. `body`
+/// may hold no groups. Empty if no group is ruled out, or if the body is carried.
 ///
 /// # Errors
-/// FB212 where a scene does not fit the body; those of [`simulate`](flexbody_motion::scene::simulate).
+/// FB212 if a scene does not match the body; the errors of [`simulate`](flexbody_motion::scene::simulate).
 pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Result<Vec<TermDecision>> {
     if cases.iter().any(|scene| scene.carried.is_some()) {
         return Ok(Vec::new());
@@ -101,20 +101,20 @@ pub fn rule_out(body: &FlexBody, cases: &LoadCases, context: &Context<'_>) -> Re
     Ok(kept.dropped().map(|group| decision(group, false, largest, &demands, rotation)).collect())
 }
 
-/// The terms and modes of `body` with which every load case is within its own tolerances.
+/// Selects the terms and modes of `body` with which every load case is within its own tolerances.
 ///
-/// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 where these leave half of
-/// the tolerances, else by the error of a motion that is integrated (tier 2), if the scene says how long it
-/// lasts. A group that bounds rule out in some cases is measured in the others. Where a scene allows faster
-/// rotation than its run has, everything holds for the run and for the run with the rotation scaled to that.
-/// Modes are ranked by the most that they do beside the tolerances of any case, and the fewest are kept whose
-/// motion, with the kept groups, is within the tolerances.
+/// Terms are dropped by whole groups, cheapest set first: by bounds of tier 0 and 1 if these take at most half of the
+/// tolerances, else by the error of an integrated motion (tier 2), if the scene states its duration. A group that
+/// bounds rule out in some cases is measured in the others. If a scene allows faster rotation than its run has, the
+/// selection must hold for the run and for the run with its rotation scaled to the allowed one. Modes are ranked by
+/// their largest contribution relative to the tolerances of any case. The fewest modes are kept whose motion, with the
+/// kept groups, is within the tolerances.
 ///
-/// * `lacks`: for each load case the known errors of `body`, and of those before it, against the model: what is
-///   left of the tolerances. Nothing is known of cases that it does not reach.
+/// * `lacks`: for each load case, the known truncation errors of `body` and of its versions before enrichment; they
+///   reduce the tolerances. Cases beyond its length have unknown errors, which count as zero.
 ///
 /// # Errors
-/// FB212 where a scene does not fit the body; those of [`simulate`](flexbody_motion::scene::simulate).
+/// FB212 if a scene does not match the body; the errors of [`simulate`](flexbody_motion::scene::simulate).
 pub fn select(
     body: &FlexBody,
     lacks: &[Vec<ReferenceError>],
@@ -122,17 +122,20 @@ pub fn select(
     context: &Context<'_>,
 ) -> Result<Selection> {
     body.require_mean_axes("select")?;
+    // Bounds of each load case, in its own frame.
     let stages = stages(body, cases)?;
     context.phase("bounds");
     let mut demands = demands(&stages, cases, context, true)?;
     for (demand, lacks) in demands.iter_mut().zip(lacks) {
         demand.lacks = lacks;
     }
+    // By simulation if every case has a duration, else by the frequency band.
     let mut deciding = Deciding::new(&demands);
     let mode_reason = match deciding.has_run() {
         false => deciding.choose_by_band(),
         true => deciding.choose_by_motion(context)?,
     };
+    // State the reasons of the decision.
     let Deciding { choice, trials, diagnostics, short_of, chosen_by_case, .. } = deciding;
     for (demand, short_of) in demands.iter_mut().zip(short_of) {
         demand.short_of = short_of;
@@ -168,7 +171,7 @@ pub fn select(
     })
 }
 
-/// Body and load cases on their stages.
+/// Brings the body and each load case into one frame.
 fn stages<'s>(body: &'s FlexBody, cases: &'s LoadCases) -> Result<Vec<OnStage<'s>>> {
     let staged = |(at, scene)| OnStage::new(body, scene).map_err(|error| cases.about(at, error));
     cases.iter().enumerate().map(staged).collect()
@@ -184,7 +187,7 @@ fn demands<'d>(
     stages.iter().enumerate().map(demand).collect()
 }
 
-/// Numbers that the decision follows from, with their load cases where there are several.
+/// Returns the input numbers of the decision, marked with their load cases if there are several.
 fn inputs(demands: &[Demand<'_>]) -> Vec<Input> {
     let of = |demand: &Demand<'_>| {
         let own = |input: &Input| match demand.name {
@@ -196,7 +199,7 @@ fn inputs(demands: &[Demand<'_>]) -> Vec<Input> {
     demands.iter().flat_map(of).collect()
 }
 
-/// What the selected modes lack of static responses; loads that several load cases have stand there once.
+/// Returns the missing parts of static responses; loads that several load cases share are listed once.
 fn static_responses(demands: &[Demand<'_>], modes: &[usize]) -> Vec<Participation> {
     let mut all: Vec<Participation> = Vec::new();
     for demand in demands {
@@ -209,7 +212,7 @@ fn static_responses(demands: &[Demand<'_>], modes: &[usize]) -> Vec<Participatio
     all
 }
 
-/// Each diagnostic once.
+/// Removes repeated diagnostics.
 fn once(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
     let mut kept: Vec<Diagnostic> = Vec::new();
     for diagnostic in diagnostics {

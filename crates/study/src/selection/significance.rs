@@ -1,31 +1,32 @@
-//! Significance of every term of the equations of motion for a body and a scene: unit-free (\[WP19\] eq. 28
-//! and 36 to 40, as corrected in the theory, section 11), and with the invariants of the body.
+//! Significance of every term of the equations of motion for a body and a scene: dimensionless (\[WP19\] eq. 28 and 36
+//! to 40, as corrected in the theory, section 11), and with the invariants of the body.
 
 use super::norms::Norms;
 use super::situation::Situation;
 use flexbody_body::flex_body::{FlexBody, TermGroup};
 use nalgebra::Vector3;
 
-/// How large a term is beside what it stands next to.
+/// Size of a term relative to the term that it is compared with.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Significance {
-    /// The term.
+    /// Name of the term.
     pub term: &'static str,
-    /// Beside what.
+    /// Name of the term that it is compared with.
     pub beside: &'static str,
-    /// The unit-free bound as a formula.
+    /// Formula of the dimensionless bound.
     pub formula: &'static str,
-    /// Group of the kinetic energy that it belongs to.
+    /// Group of the kinetic energy that the term belongs to.
     pub group: TermGroup,
-    /// Guideline of \[WP19\] section 8 that asks for it.
+    /// Guideline of \[WP19\] section 8 that requires the term.
     pub guideline: &'static str,
     /// Bound from I0 and the frequencies (tier 0).
     pub bound: f64,
-    /// Bound with the norms of the invariants (tier 1), where the body holds them.
+    /// Bound with the norms of the invariants (tier 1); `None` if the body does not hold them, or if they do not bound
+    /// the term.
     pub of_body: Option<f64>,
 }
 
-/// A term in words.
+/// Description of a term.
 struct Term {
     name: &'static str,
     beside: &'static str,
@@ -44,7 +45,7 @@ const fn term(
     Term { name, beside, formula, group, guideline }
 }
 
-/// Every term, in the order of [`sizes`].
+/// Descriptions of all terms, in the order of [`sizes`].
 const TERMS: [Term; 8] = [
     term("linear inertia W1 Q", "I0", "2 eta", TermGroup::W1, "III"),
     term("quadratic inertia Q'W2 Q", "I0", "eta^2", TermGroup::W2, "III, free slender bodies"),
@@ -86,11 +87,11 @@ const TERMS: [Term; 8] = [
     ),
 ];
 
-/// Terms of [`TERMS`] that the norms of the invariants say nothing of: the Coriolis torque has components
-/// across the axis.
+/// Index of the first of [`TERMS`] that the norms of the invariants do not bound: the Coriolis torque has components
+/// perpendicular to the axis.
 const WITHOUT_NORM: usize = TERMS.len() - 1;
 
-/// Sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
+/// Returns the relative sizes of the terms for rotation about `axis`, in the order of [`TERMS`].
 fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] {
     let inertia = &situation.inertia;
     let (q, w, alpha) = (situation.amplitude.value, situation.spin.value, situation.acceleration.value);
@@ -108,7 +109,7 @@ fn sizes(situation: &Situation, norms: &Norms, axis: &Vector3<f64>) -> [f64; 8] 
     ]
 }
 
-/// The largest of every term in any of several load cases, one at least.
+/// Returns the largest significance of every term over all load cases.
 pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance>>) -> Vec<Significance> {
     let larger = |mut all: Vec<Significance>, other: Vec<Significance>| {
         for (one, other) in all.iter_mut().zip(other) {
@@ -120,14 +121,15 @@ pub(super) fn largest_significances(cases: impl Iterator<Item = Vec<Significance
     cases.reduce(larger).unwrap_or_default()
 }
 
-/// The sizes of all terms at the largest amplitudes and rates of a situation, along the axis of its rotation
-/// or the principal axis of inertia where they are largest.
+/// Returns the significance of all terms at the largest amplitudes and rates of a situation, for rotation about its
+/// axis or, if it has none, about the principal axis of inertia with the largest value.
 ///
-/// With eta = |q| / sqrt(e'I0 e), Omega_1 the first circular frequency of the body (of the assembly for
-/// Coriolis forces), w and alpha the largest angular velocity and acceleration.
+/// Symbols: eta = |q| / sqrt(e'I0 e); Omega_1 is the first circular frequency of the body (of the assembly for Coriolis
+/// forces); w and alpha are the largest angular velocity and acceleration.
 pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance> {
     let (invariants, eigenvalues) = (body.invariants(), &body.modes().eigenvalue);
     let driven = situation.driven.as_ref().ok().and_then(|driven| driven.rotation.axis);
+    // Axis of rotation, or the principal axes.
     let axes = match driven {
         Some(axis) => vec![axis],
         None if body.dimension() == 2 => vec![Vector3::z()],
@@ -142,6 +144,7 @@ pub fn significances(situation: &Situation, body: &FlexBody) -> Vec<Significance
             Some(std::array::from_fn(|i| most[i].max(own[i])))
         })
     };
+    // Largest value over the axes, at tier 0 and tier 1.
     let bound = largest(&|axis| Some(Norms::of_rigid(&invariants.inertia(), eigenvalues, Some(axis))));
     let bound = bound.unwrap_or([f64::INFINITY; 8]);
     let own = largest(&|axis| Norms::of_invariants(invariants, eigenvalues, Some(axis)));

@@ -1,5 +1,5 @@
-//! What a scene means for a body: how fast it turns, how far its modes go, what loads them, and where each of
-//! these numbers comes from.
+//! Motion that a scene implies for a body: rotation rates, modal amplitudes, loads on the modes, and the source of each
+//! number.
 
 use super::bounds::{Driven, ModalLoad, Start, TurnedTorques};
 use super::rows::PointRows;
@@ -11,34 +11,34 @@ use flexbody_motion::scene::{AttachmentKind, Axes, Load, Range, Scene, VectorHis
 use nalgebra::{DMatrix, Matrix3};
 use std::f64::consts::TAU;
 
-/// Deflection, relative to the largest extent, where linear elasticity ends: the bound of amplitudes unless a
-/// scene has one.
+/// Deflection, relative to the largest extent of the body, at which linear elasticity is assumed to end. It bounds the
+/// amplitudes if the scene states no limit.
 const LINEAR_RANGE: f64 = 0.1;
 
-/// Periods of the first mode that a scene lasts unless it says how long.
+/// Duration of a scene that states none, in periods of the first mode.
 const PERIODS: f64 = 100.0;
 
-/// How far C1 and C2 may be from zero for modes to be free-surface modes about the centre of mass, relative
-/// to their bounds.
+/// Largest C1, C2 and c, relative to their bounds, that count as zero. Above it the modes are not free-surface modes
+/// about the centre of mass.
 const ROUNDING: f64 = 1e-8;
 
-/// A number that decisions follow from.
+/// Number that decisions depend on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Input {
     /// Name of the number.
     pub name: &'static str,
-    /// Its value, in the units of the body.
+    /// Value, in the units of the body.
     pub value: f64,
-    /// Where it comes from.
+    /// Source of the value: a key of the scene, or a default.
     pub source: String,
 }
 
-/// Sizes of the motion that a scene means for a body: rates, amplitudes, duration.
+/// Sizes of the motion that a scene implies for a body: rates, amplitudes, duration.
 #[derive(Debug, Clone)]
 pub struct Situation {
     /// Largest angular velocity of the frame.
     pub spin: Input,
-    /// Largest angular acceleration.
+    /// Largest angular acceleration of the frame.
     pub acceleration: Input,
     /// Duration of the motion.
     pub duration: Input,
@@ -46,20 +46,21 @@ pub struct Situation {
     pub amplitude: Input,
     /// Largest amplitude of every mode.
     pub mode_amplitudes: Vec<f64>,
-    /// Inertia about the centre of mass with what joints attach.
+    /// Inertia tensor about the centre of mass, with the attached bodies.
     pub inertia: Matrix3<f64>,
     /// First circular frequency of the assembly.
     pub first_rate: Input,
-    /// What bounds need to know; or why there are none.
+    /// Quantities for guaranteed bounds, or the reason why there are no bounds.
     pub driven: Result<Driven, String>,
 }
 
 impl Situation {
-    /// Of `scene`, which fits `body`; `points` are those of its loads.
+    /// Evaluates `scene` for `body`, which must match. `points` are the points of the loads.
     pub fn new(body: &FlexBody, scene: &Scene, points: &[BodyPoint]) -> Self {
         let (demands, eigenvalues) = (&scene.requirements, &body.modes().eigenvalue);
         let inertia = body.invariants().inertia() + demands.attachment.inertia;
         let softest = eigenvalues.iter().copied().fold(f64::INFINITY, f64::min).sqrt();
+        // Duration and first frequency: stated by the scene, else derived from the softest mode.
         let duration = match scene.run.duration {
             Some(value) => Input { name: "duration", value, source: "[run] duration".to_owned() },
             None => Input {
@@ -72,6 +73,7 @@ impl Situation {
             Some(frequency) => (TAU * frequency, "[attachment] first_frequency"),
             None => (softest, "first mode of the free body"),
         };
+        // Largest spin, angular acceleration and modal amplitudes.
         let (spin, acceleration) = turning(body, scene, &inertia, duration.value, points);
         let mode_amplitudes = amplitudes(body, scene);
         let limits = &demands.limits;
@@ -106,16 +108,16 @@ impl Situation {
         }
     }
 
-    /// All inputs, in the order of a report.
+    /// Returns all inputs, in the order of a report.
     pub fn inputs(&self) -> [&Input; 5] {
         [&self.spin, &self.acceleration, &self.duration, &self.amplitude, &self.first_rate]
     }
 }
 
-/// A size of a motion, and where it comes from.
+/// Size of a motion, and its source.
 type Sourced = (f64, String);
 
-/// Largest angular velocity and acceleration of the frame.
+/// Returns the largest angular velocity and acceleration of the frame.
 fn turning(
     body: &FlexBody,
     scene: &Scene,
@@ -125,8 +127,8 @@ fn turning(
 ) -> (Input, Input) {
     let motion = &scene.requirements.motion;
     let [spin, acceleration] = turning_of_run(body, scene, inertia, duration, points);
-    // What is said of a free body is better than what loads might do at the worst; a prescribed spin is what
-    // it is.
+    // A range stated for a free body replaces the worst case of its loads; a prescribed spin is only increased by the
+    // range.
     let larger = |range: &Option<Range>, (value, source): Sourced, key: &str| match range {
         Some(range) if !scene.prescribes() || range.length() > value => {
             (range.length(), format!("[motion] {key}"))
@@ -134,7 +136,7 @@ fn turning(
         _ => (value, source),
     };
     let (spin, spin_source) = larger(&motion.angular_velocity, spin, "angular_velocity");
-    // Free rotation has accelerations of the size of the square of its angular velocity.
+    // Free rotation has angular accelerations of the order of the squared angular velocity.
     let (acceleration, acceleration_source) = match (&motion.angular_acceleration, &motion.angular_velocity) {
         (None, Some(_)) if spin * spin > acceleration.0 => {
             (spin * spin, "default: square of the angular velocity".to_owned())
@@ -147,7 +149,7 @@ fn turning(
     )
 }
 
-/// Largest angular velocity and acceleration in the run of the scene.
+/// Returns the largest angular velocity and acceleration in the run of the scene.
 fn turning_of_run(
     body: &FlexBody,
     scene: &Scene,
@@ -166,7 +168,7 @@ fn turning_of_run(
             [(0.0, source.clone()), (0.0, source)]
         }
         (None, None) => {
-            // The angular momentum of a free body is that of the start and what torques add.
+            // Angular momentum of a free body: the initial one plus the impulse of the torques.
             let start = inertia * scene.initial.angular_velocity;
             let torque = largest_torque(body, scene, duration, points);
             let principal = inertia.symmetric_eigenvalues();
@@ -183,7 +185,7 @@ fn turning_of_run(
     }
 }
 
-/// What the loads can turn the undeformed body with.
+/// Returns the largest torque of the loads on the undeformed body.
 fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyPoint]) -> f64 {
     let torque = |(load, point): (&Load, &BodyPoint)| {
         let largest = |history: &VectorHistory| Variation::of_vector(history, duration).largest;
@@ -193,9 +195,9 @@ fn largest_torque(body: &FlexBody, scene: &Scene, duration: f64, points: &[BodyP
     scene.loads.iter().zip(points).map(torque).sum()
 }
 
-/// The largest amplitude of every mode: what the strictest limit leaves of it alone; of higher modes no more
-/// than what a load of the size that the first mode may carry makes of them, q_1 lambda_1 / lambda_p
-/// (\[WP19\] 5.2).
+/// Returns the largest amplitude of every mode: the amplitude at which the mode alone reaches the strictest limit.
+/// Higher modes are also limited to the amplitude under a load that brings the first mode to its limit, q_1 lambda_1 /
+/// lambda_p (\[WP19\] 5.2).
 fn amplitudes(body: &FlexBody, scene: &Scene) -> Vec<f64> {
     let limits = &scene.requirements.limits;
     let deflection = limits.deflection.unwrap_or(LINEAR_RANGE * body.extent());
@@ -209,7 +211,7 @@ fn amplitudes(body: &FlexBody, scene: &Scene) -> Vec<f64> {
     eigenvalues.iter().enumerate().map(|(j, lambda)| alone(j).min(first / lambda)).collect()
 }
 
-/// What guaranteed bounds need, where they hold for the body and the scene.
+/// Returns the quantities for guaranteed bounds, or the reason why bounds do not hold for the body and the scene.
 fn driven(
     body: &FlexBody,
     scene: &Scene,
@@ -232,7 +234,7 @@ fn driven(
     })
 }
 
-/// The rotation of the frame, where the scene gives it.
+/// Returns the rotation of the frame, if the scene prescribes it.
 fn given_rotation(
     scene: &Scene,
     spin: &Input,
@@ -243,8 +245,8 @@ fn given_rotation(
     match (spin_of_run, scene.requirements.attachment.kind) {
         (Some(spin), _) => {
             let rate = Variation::of_vector(&spin.velocity, duration);
-            // Seen from the body, the acceleration of a rotation about axes of the world turns with omega
-            // besides.
+            // Seen from the body, the angular acceleration about world axes also changes because the axes turn with
+            // omega.
             let turned = if spin.axes == Axes::World { rate.largest * rate.total } else { 0.0 };
             Ok(Rotation {
                 axis: spin.velocity.direction().and_then(|direction| direction.try_normalize(0.0)),
@@ -271,7 +273,7 @@ fn given_rotation(
     }
 }
 
-/// Says why the bounds do not hold for the body and the scene.
+/// Returns an error with the reason if bounds do not hold for the body and the scene.
 fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
     let reason = if scene.carried.is_some() {
         "the body is carried: its frame moves its modes"
@@ -287,7 +289,7 @@ fn refuse_beyond_bounds(body: &FlexBody, scene: &Scene) -> Result<(), String> {
     Err(reason.to_owned())
 }
 
-/// The loads of the scene on the modes; `root` is sqrt(Lambda).
+/// Returns the loads of the scene on the modes. `root` is sqrt(Lambda).
 fn modal_loads(
     body: &FlexBody,
     scene: &Scene,
@@ -298,6 +300,7 @@ fn modal_loads(
     let rows = PointRows::new(body);
     let modal_load = |psi: DMatrix<f64>, axes: Axes, history: &VectorHistory| {
         let duration = rotation.duration;
+        // A fixed direction needs one row of the modes. World axes turn relative to the body and vary the load.
         let (psi, factor) = match (axes, history) {
             (Axes::Model | Axes::Body, VectorHistory::Along { direction, factor }) => {
                 let along = DMatrix::from_fn(1, root.len(), |_, j| psi.column(j).dot(direction));
@@ -322,14 +325,14 @@ fn modal_loads(
     loads
 }
 
-/// |Lambda^(-1/2) Psi'| of a few rows Psi; `root` is sqrt(Lambda).
+/// Returns |Lambda^(-1/2) Psi'| of a few rows Psi. `root` is sqrt(Lambda).
 fn energy_norm(rows: &DMatrix<f64>, root: &[f64]) -> f64 {
     PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / root[j]))
 }
 
-/// How the deformation changes the modal forces of torques: a torque t works on the rotation vector theta =
-/// Theta q of its point as G(theta) t, where G = integral_0^1 exp(-s theta~) ds, which changes by no more than
-/// half of what theta changes by.
+/// Returns the change of the modal forces of torques with deformation. A torque t does work on the rotation vector
+/// theta = Theta q of its point as G(theta) t, with G = integral_0^1 exp(-s theta~) ds. G changes by at most half the
+/// change of theta.
 fn turned_torques(
     body: &FlexBody,
     scene: &Scene,
@@ -349,7 +352,7 @@ fn turned_torques(
     turned
 }
 
-/// |D|, or a bound of it.
+/// Returns |D| or an upper bound of it.
 fn damping_norm(body: &FlexBody, root: &[f64]) -> f64 {
     let nf = body.n_modes();
     match &body.modes().modal_damping {
@@ -360,7 +363,7 @@ fn damping_norm(body: &FlexBody, root: &[f64]) -> f64 {
     }
 }
 
-/// The modes that the scene does not start at rest, together.
+/// Returns the summed energies of the modes that do not start at rest.
 fn start_of_modes(scene: &Scene, damping: f64, root: &[f64]) -> Start {
     let starts = scene.initial.modes.iter().map(|start| {
         let omega = root[start.mode];
@@ -374,7 +377,7 @@ fn start_of_modes(scene: &Scene, damping: f64, root: &[f64]) -> Start {
     })
 }
 
-/// Whether C1, C2 and c vanish and m_ff is the identity, up to rounding.
+/// Returns true if C1, C2 and c vanish and m_ff is the identity, up to rounding.
 fn is_about_centre(invariants: &Invariants) -> bool {
     let (nf, c2, m) = (invariants.n_modes(), invariants.c2(), invariants.modal_mass());
     let inertia = invariants.inertia().trace();

@@ -1,4 +1,4 @@
-//! Models with fewer terms or modes, tried: by bounds, and by integration.
+//! Trials of models with fewer terms or modes: by bounds, and by integration.
 
 use super::bounds::{Driven, ErrorBound};
 use super::dropped_terms::DroppedTerms;
@@ -18,91 +18,90 @@ use flexbody_motion::scene::{
 use nalgebra::DMatrix;
 use std::f64::consts::TAU;
 
-/// Instants per shortest period at which bounds look at a motion.
+/// Number of instants per shortest period at which bounds evaluate a motion.
 const INSTANTS_PER_PERIOD: f64 = 20.0;
 
-/// Instants at which they look at it at the most.
+/// Largest number of instants at which bounds evaluate a motion.
 const MOST_INSTANTS: f64 = 6e4;
 
-/// Part of the tolerance of the stress from which a mode takes part in a motion.
+/// Part of the stress tolerance above which a mode takes part in a motion.
 const TAKES_PART: f64 = 0.01;
 
-/// Instants that bounds look at a motion where nothing in it is fast, and places where the largest rate of a
-/// spin is looked for.
+/// Smallest number of instants at which bounds evaluate a motion, and number of samples for the largest rate of a spin.
 const LEAST_INSTANTS: usize = 500;
 
-/// A model with fewer terms or modes and the error that it makes.
+/// Model with fewer terms or modes, and its errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trial {
-    /// Groups that it has.
+    /// Groups of the model.
     pub kept: TermGroups,
-    /// Number of modes that it has.
+    /// Number of modes of the model.
     pub modes: usize,
     /// Multiplications of an evaluation of its equations.
     pub multiplications: usize,
-    /// 0 and 1: guaranteed bounds; 2: a measured motion.
+    /// Tier. 0 and 1: guaranteed bounds; 2: a measured motion.
     pub tier: u8,
-    /// Its errors, or bounds of them; none where there is no bound or the integration failed.
+    /// Errors or their bounds; `None` if there is no bound or the integration failed.
     pub errors: Option<OutputErrors>,
-    /// What remains of the tolerances for it: 1, or what other decisions leave.
+    /// Part of the tolerances that the model may use: 1, or the rest after other decisions.
     pub budget: f64,
     /// Largest error over its tolerance.
     pub worst: f64,
-    /// Why there are no errors; empty where there are.
+    /// Reason why there are no errors; empty if there are errors.
     pub remark: String,
-    /// Of several load cases the one (from 0) that the errors are of: where they take the largest part of
-    /// what is left of the tolerances.
+    /// Index (from 0) of the load case of the errors, where they take the largest part of the remaining tolerances;
+    /// `None` for a single scene.
     pub case: Option<usize>,
-    /// Largest error over its tolerance in each load case, where it was tried in several.
+    /// Largest error over its tolerance in each load case; empty if only one was tested.
     pub by_case: Vec<f64>,
 }
 
 impl Trial {
-    /// Whether the errors are within what the tolerances leave.
+    /// Returns true if the errors are within the allowed part of the tolerances.
     pub fn passed(&self) -> bool {
         self.worst <= self.budget
     }
 }
 
-/// A body and a scene that trials are made with, both on their [`Stage`](flexbody_motion::scene::Stage).
+/// Body and scene of the trials, both on their [`Stage`](flexbody_motion::scene::Stage).
 pub struct TrialRuns<'a> {
-    /// The body, with the damping of the scene.
+    /// Body, with the damping of the scene.
     pub body: &'a FlexBody,
-    /// The scene.
+    /// Scene.
     pub scene: &'a Scene,
-    /// The sizes of motion that the scene means for the body.
+    /// Sizes of motion that the scene implies for the body.
     pub situation: &'a Situation,
-    /// Where its loads act.
+    /// Points of the loads.
     pub loads: &'a [BodyPoint],
     /// Watched points.
     pub watched: &'a [BodyPoint],
-    /// The limits of recordings.
+    /// Limits of time and memory for recordings.
     pub context: Context<'a>,
 }
 
 impl TrialRuns<'_> {
-    /// The continuous motion of the body with the groups `kept`.
+    /// Simulates the motion of the body with the groups `kept`, as a continuous trace.
     ///
     /// # Errors
-    /// As [`trace`].
+    /// The errors of [`trace`].
     pub fn motion(&self, kept: TermGroups) -> Result<(Trace, Vec<Diagnostic>)> {
         let mut scene = self.scene.clone();
         scene.run.terms = Terms::ALL.held(kept);
         trace(self.body, &scene, &self.context)
     }
 
-    /// The motion of the body with the groups `kept`, at even instants that follow its fastest mode, the
-    /// loads and the spin; or, where these would be too many, the fastest mode that takes part. `None` where
-    /// that are too many still.
+    /// Simulates the body with the groups `kept` at evenly spaced instants. The spacing follows the fastest mode, the
+    /// loads and the spin; if this needs too many instants, only the modes that take part are followed. Returns `None`
+    /// if even these need too many.
     ///
     /// # Errors
-    /// As [`simulate`].
+    /// The errors of [`simulate`].
     pub fn fine_motion(&self, kept: TermGroups) -> Result<Option<Recording>> {
         let mut scene = self.scene.clone();
         let duration = self.situation.duration.value;
         let wanted = |rate: f64| (duration * rate / TAU * INSTANTS_PER_PERIOD).ceil();
         let followed = wanted(self.fastest(f64::INFINITY)).min(MOST_INSTANTS);
-        // What no mode has a part in has to be followed in any case.
+        // Loads and spin must be followed whether or not modes take part.
         if followed.is_nan() || wanted(self.fastest(0.0)) > MOST_INSTANTS {
             return Ok(None);
         }
@@ -113,8 +112,8 @@ impl TrialRuns<'_> {
         Ok(is_followed.then_some(motion))
     }
 
-    /// The largest circular frequency of the modes that take part in a motion: whose root of the elastic
-    /// energy, relative to the largest, is above a part of the tolerance.
+    /// Returns the largest circular frequency of the modes that take part in a motion. A mode takes part if its root of
+    /// the elastic energy, relative to the largest, exceeds a part of the stress tolerance.
     fn liveliest(&self, motion: &Recording) -> f64 {
         let roots: Vec<f64> = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
         let energies = || roots.iter().zip(&motion.extremes.amplitudes).map(|(root, q)| root * q.abs());
@@ -124,16 +123,18 @@ impl TrialRuns<'_> {
         lively.map(|(root, _)| *root).fold(0.0, f64::max)
     }
 
-    /// Largest circular frequency of anything in the motion of the body, of its modes up to `highest`. What a
-    /// spin does between two of its breaks is one half of a period.
+    /// Returns the largest circular frequency in the motion of the body, with its modes up to `highest`. The time
+    /// between two breaks of a spin counts as half a period.
     fn fastest(&self, highest: f64) -> f64 {
         let duration = self.situation.duration.value;
         let roots = self.body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt());
         let modes = roots.filter(|root| *root <= highest).fold(0.0, f64::max);
         let histories = self.scene.acting().chain(self.scene.driving());
+        // Frequencies of loads and driving motion.
         let tones = histories.map(|history| TAU * history.frequency_until(duration));
-        // Between two rows of a smooth history there may be half an oscillation.
+        // A smooth history may have half an oscillation between two rows.
         let rows = self.scene.driving().filter_map(|history| Some(0.5 * TAU / history.spacing()?));
+        // Half a period between two breaks of the spin.
         let mut breaks = self.scene.rotation().map_or(Vec::new(), |velocity| velocity.breaks());
         breaks.retain(|&time| 0.0 < time && time < duration);
         let ends = [0.0].into_iter().chain(breaks).chain([duration]);
@@ -142,11 +143,12 @@ impl TrialRuns<'_> {
         tones.chain(rows).chain(pieces).fold(modes, f64::max) + self.situation.spin.value
     }
 
-    /// The trial of a model with the modes `modes` and the groups `kept` against the motion that `measure`
-    /// holds; and how its errors grow.
+    /// Measures a model with the modes `modes` and the groups `kept` against the reference motion of `measure`. Returns
+    /// the trial and the history of its errors.
     ///
     /// # Errors
-    /// Those of [`simulate`] other than FB540 and FB550, which the trial notes.
+    /// The errors of [`simulate`] except those that end a run (such as FB540 and FB550), which become the remark of the
+    /// trial.
     pub fn measured(
         &self,
         measure: &Measure<'_>,
@@ -165,7 +167,7 @@ impl TrialRuns<'_> {
         let mut scene =
             if modes.len() == whole.n_modes() { self.scene.clone() } else { self.scene.of_modes(modes) };
         scene.run.terms = Terms::ALL.held(kept);
-        // The same steps: errors are those of the model.
+        // Use the steps of the reference, so that the errors come from the model alone.
         scene.run.scheme = measure.trace().scheme;
         let history = match trace_at(body, &scene, &measure.trace().time, &self.context) {
             Ok(trace) => Ok(measure.of_subset(&trace, modes)),
@@ -190,9 +192,8 @@ impl TrialRuns<'_> {
         Ok((trial, history.ok()))
     }
 
-    /// The trial by bounds of a model with the groups `kept`. With its motion `run`, the load that the
-    /// dropped terms are to its error is taken along that, at its instants; without, at the largest motion
-    /// that loads and rotation allow.
+    /// Returns the trial by bounds of a model with the groups `kept`. With its motion `run`, the dropped terms are
+    /// evaluated along this motion; without, at the largest motion that loads and rotation allow.
     pub fn bounded(&self, norms: &Norms, run: Option<&Recording>, kept: TermGroups, budget: f64) -> Trial {
         let mut trial = Trial {
             kept,
@@ -226,6 +227,7 @@ impl TrialRuns<'_> {
         let dropped = kept.complement();
         let softened = || "the spin may take the stiffness of some motion".to_owned();
         let mut first_order = None;
+        // Load of the dropped terms on the error, along the run or at the largest possible motion.
         let (own, residual, defect) = match run {
             Some(run) => {
                 let terms = DroppedTerms::new(self.body, self.scene, run, kept, norms);
@@ -238,6 +240,7 @@ impl TrialRuns<'_> {
                 (own, residual, driven.torque_defect(dropped, norms, &own))
             }
         };
+        // Bound of the error; the first-order response, where known, is often closer.
         let mut error = driven.error(norms, &residual).ok_or_else(softened)?;
         if let Some(mut first) = first_order {
             first.leave_torques(&driven.turned, driven.rotation.duration);
@@ -251,7 +254,7 @@ impl TrialRuns<'_> {
         Ok(self.relative_errors(driven, run, &error, torque))
     }
 
-    /// Torques of the loads for |Lambda^(1/2) e| = 1, since their levers deform with the body.
+    /// Returns the torques of the loads for |Lambda^(1/2) e| = 1, from the deformation of their lever arms.
     fn lever_torques(&self, driven: &Driven) -> f64 {
         let rows = PointRows::new(self.body);
         let lever = |(load, point): (&Load, &BodyPoint)| {
@@ -261,8 +264,8 @@ impl TrialRuns<'_> {
         self.scene.loads.iter().zip(self.loads).map(lever).sum::<f64>()
     }
 
-    /// Errors relative to what is certain of the whole motion, or to the least that counts; `torque` is the
-    /// bound of the error of that.
+    /// Returns errors relative to the certain part of the whole motion, or to the resolution. `torque` is the bound of
+    /// the torque error.
     fn relative_errors(
         &self,
         driven: &Driven,
@@ -288,9 +291,9 @@ impl TrialRuns<'_> {
         }
     }
 
-    /// The least torque of a prescribed spin that counts.
+    /// Returns the smallest torque of a prescribed spin that counts.
     fn least_torque(&self, duration: f64) -> f64 {
-        // The inertia whose radius of gyration a recording has: of a plane body that about its normal alone.
+        // Use the inertia with the radius of gyration of recordings: for a plane body, about its normal.
         let inertia = self.body.invariants().inertia();
         let inertia = 0.5 * if self.body.dimension() == 2 { inertia[(2, 2)] } else { inertia.trace() };
         let rate = |spin: &Spin| {
@@ -300,7 +303,7 @@ impl TrialRuns<'_> {
         LEAST_REACTION * inertia * self.scene.spin.as_ref().map_or(0.0, rate).powi(2)
     }
 
-    /// Largest deflection of a watched point, or without any of a node, for |Lambda^(1/2) q| = 1.
+    /// Returns the largest deflection of a watched point, or of any node if none is watched, for |Lambda^(1/2) q| = 1.
     fn reach(&self) -> f64 {
         let mut reach = 0.0f64;
         self.each_watched(|rows| reach = reach.max(self.reach_of(rows)));
@@ -312,7 +315,7 @@ impl TrialRuns<'_> {
         PointRows::norm(&PointRows::weighted(rows, |j| 1.0 / eigenvalues[j].sqrt()))
     }
 
-    /// Hands over Psi of every watched point; of every node where there are none.
+    /// Calls `hear` with Psi of every watched point, or of every node if none is watched.
     fn each_watched(&self, mut hear: impl FnMut(&DMatrix<f64>)) {
         let rows = PointRows::new(self.body);
         match self.watched {
@@ -321,8 +324,9 @@ impl TrialRuns<'_> {
         }
     }
 
-    /// What every mode does in a motion of the body.
+    /// Returns the contribution of every mode to a motion of the body.
     pub fn shares(&self, trace: &Trace) -> Vec<ModeShare> {
+        // Largest displacement of each mode, then its shares of deflection and stress.
         let mut longest = vec![0.0f64; self.body.n_modes()];
         self.each_watched(|rows| {
             for (longest, column) in longest.iter_mut().zip(rows.column_iter()) {
@@ -350,21 +354,21 @@ impl TrialRuns<'_> {
     }
 }
 
-/// The part of a mode in the motion of a scene.
+/// Contribution of a mode to the motion of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModeShare {
     /// Largest |q|.
     pub amplitude: f64,
-    /// Largest deflection of a watched point (without any: of a node) by this mode alone, relative to the
-    /// largest of all together.
+    /// Largest deflection of a watched point (or of any node if none is watched) by this mode alone, relative to the
+    /// largest of all modes together.
     pub deflection: f64,
-    /// Root of its largest elastic energy, relative to the largest of all together.
+    /// Root of its largest elastic energy, relative to the largest of all modes together.
     pub stress: f64,
-    /// Whether the mode is kept.
+    /// True if the mode is kept.
     pub kept: bool,
 }
 
-/// Multiplications of an evaluation of the equations of `body` with `groups`.
+/// Returns the multiplications of an evaluation of the equations of `body` with `groups`.
 pub(super) fn multiplications(body: &FlexBody, groups: TermGroups) -> usize {
     EquationsOfMotion::new(body, Terms::ALL.held(groups)).multiplications()
 }

@@ -1,4 +1,4 @@
-//! How much a function of time varies: all that bounds on the response to it need to know.
+//! Bounds of a function of time, as the bounds of responses need them.
 
 use flexbody_motion::scene::{History, Sizes, VectorHistory};
 use std::f64::consts::TAU;
@@ -8,23 +8,23 @@ use std::f64::consts::TAU;
 pub struct Variation {
     /// |h(0)|.
     pub start: f64,
-    /// max |h|.
+    /// Largest |h|.
     pub largest: f64,
     /// Total variation of h.
     pub total: f64,
-    /// max |h'|.
+    /// Largest |h'|.
     pub rate: f64,
-    /// Total variation of h', jumps included; infinite where it is not known.
+    /// Total variation of h', jumps included; infinite if unknown.
     pub rate_total: f64,
 }
 
 impl Variation {
-    /// A constant.
+    /// Returns the bounds of a constant.
     pub fn constant(value: f64) -> Self {
         Self { start: value.abs(), largest: value.abs(), total: 0.0, rate: 0.0, rate_total: 0.0 }
     }
 
-    /// Of a history from time 0 to `duration`.
+    /// Returns the bounds of a history from time 0 to `duration`.
     pub fn of(history: &History, duration: f64) -> Self {
         let start = history.at(0.0).0.abs();
         match history {
@@ -48,7 +48,7 @@ impl Variation {
             }
             History::Sine { amplitude, frequency, .. } => {
                 let (size, rate) = (amplitude.abs(), TAU * frequency);
-                // |h'| and |h''| are never above their amplitudes.
+                // |h'| and |h''| are at most the amplitudes of the derivatives.
                 Self {
                     start,
                     largest: size,
@@ -72,7 +72,7 @@ impl Variation {
         }
     }
 
-    /// Of a vector from time 0 to `duration`, in its length.
+    /// Returns the bounds of the length of a vector from time 0 to `duration`.
     pub fn of_vector(history: &VectorHistory, duration: f64) -> Self {
         match history {
             VectorHistory::Along { direction, factor } => {
@@ -82,7 +82,7 @@ impl Variation {
         }
     }
 
-    /// A unit vector that turns with the angular velocity `rotation` bounds, seen from the turning frame.
+    /// Returns the bounds of a unit vector that is fixed in space, seen from a frame that turns with `rotation`.
     pub fn direction(rotation: &Rotation) -> Self {
         Self {
             start: 1.0,
@@ -93,7 +93,7 @@ impl Variation {
         }
     }
 
-    /// Of the product with another function.
+    /// Returns the bounds of the product with another function.
     pub fn times(&self, other: &Self) -> Self {
         let (a, b) = (self, other);
         let sum = |x: f64, y: f64| if x == 0.0 || y == 0.0 { 0.0 } else { x * y };
@@ -116,29 +116,29 @@ impl From<Sizes> for Variation {
     }
 }
 
-/// Bounds of the angular velocity of a frame whose rotation is given, over the duration of a scene.
+/// Bounds of the angular velocity of a frame with given rotation, over the duration of a scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rotation {
-    /// Axis, body axes, where there is only one.
+    /// Axis of rotation, body axes; `None` if it changes or is unknown.
     pub axis: Option<nalgebra::Vector3<f64>>,
-    /// Whether it is that of the run, and not any within these bounds.
+    /// True if the rotation is that of the run; false if it may be any within these bounds.
     pub of_run: bool,
-    /// max |omega|.
+    /// Largest |omega|.
     pub largest: f64,
     /// |omega| at the start.
     pub start: f64,
     /// Integral of |alpha|.
     pub variation: f64,
-    /// max |alpha|.
+    /// Largest |alpha|.
     pub acceleration: f64,
-    /// Total variation of alpha; infinite where it is not known.
+    /// Total variation of alpha; infinite if unknown.
     pub jerk: f64,
     /// Duration.
     pub duration: f64,
 }
 
 impl Rotation {
-    /// As a function of time.
+    /// Returns the bounds of |omega| as a function of time.
     pub fn rate(&self) -> Variation {
         Variation {
             start: self.start,
@@ -155,7 +155,7 @@ mod tests {
     use super::*;
     use flexbody_motion::scene::Interpolation;
 
-    /// No sampled function varies more than it is said to, and the bounds of smooth ones are not far above.
+    /// Sampled functions never exceed their bounds, and the bounds of a single history are at most twice as large.
     #[test]
     fn sampled_variation_stays_below_the_bounds() {
         let histories = [

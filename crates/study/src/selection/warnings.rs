@@ -1,4 +1,4 @@
-//! What may go wrong in a scene although the tolerances hold.
+//! Warnings about a selection whose errors are within the tolerances.
 
 use super::rows::PointRows;
 use super::trial::TrialRuns;
@@ -6,11 +6,11 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_motion::scene::{Axes, History, Measure, VectorHistory};
 use std::f64::consts::TAU;
 
-/// How near the frequency of a load is to that of a mode where that resonates, relative: or three half widths
-/// of its resonance.
+/// Relative distance from a mode's frequency within which a load is resonant. Three half widths of the resonance count
+/// if these are larger.
 const NEAR: f64 = 0.1;
 
-/// The warning that the errors of the selected model grow faster than its motion, by this factor.
+/// Returns the warning that the errors of the selected model grow `growth` times faster than its motion.
 pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
     let message = format!(
         "errors of the selected model grow {growth:.1} times more than the motion from the first half of the run to the second"
@@ -18,14 +18,14 @@ pub(super) fn phase_drifts(growth: f64) -> Diagnostic {
     Diagnostic::new(Code::PhaseDrifts, message)
 }
 
-/// Modes that are dropped and that a load drives near their frequency.
+/// Returns warnings about dropped modes that a load excites near their frequency.
 pub(super) fn resonances(runs: &TrialRuns<'_>, measure: &Measure<'_>, modes: &[usize]) -> Vec<Diagnostic> {
     let (body, scene) = (runs.body, runs.scene);
     let rows = PointRows::new(body);
     let spin = measure.trace().extremes.spin;
     let mut found = Vec::new();
     for (load, point) in scene.loads.iter().zip(runs.loads) {
-        // Seen from the body a force that is fixed in space turns the other way round.
+        // Seen from the body, a force that is fixed in space turns backwards with the spin.
         let turning = if load.axes == Axes::World { spin } else { 0.0 };
         let rates: Vec<f64> = match &load.force {
             VectorHistory::Along { factor: History::Sine { frequency, .. }, .. } => {

@@ -1,13 +1,13 @@
-//! What is tried.
+//! Candidates of a trade study.
 
 use super::Source;
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{FlexBody, Storage, TermDecision, TermGroup, TermGroups};
 
-/// Mode counts of a ladder: about three to a doubling of the work.
+/// Numbers of modes of the candidates: about three for each doubling of the work.
 const LADDER: [usize; 14] = [1, 2, 4, 6, 10, 15, 20, 30, 40, 60, 80, 120, 160, 240];
 
-/// What sets a candidate apart: a series of the plot.
+/// Kind of a candidate, which is a series of the plot.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum CandidateKind {
@@ -15,7 +15,7 @@ pub enum CandidateKind {
     Modes,
     /// Some groups.
     Groups,
-    /// A lumped mass, as multibody programs have it.
+    /// Lumped mass, as multibody programs use it.
     Lumped,
     /// Single precision.
     Single,
@@ -25,7 +25,7 @@ impl CandidateKind {
     /// All kinds, in the order of plots.
     pub const ALL: [CandidateKind; 4] = [Self::Modes, Self::Groups, Self::Lumped, Self::Single];
 
-    /// Name in reports.
+    /// Returns the name in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Modes => "all groups",
@@ -36,26 +36,25 @@ impl CandidateKind {
     }
 }
 
-/// What was lumped of the mass, and by which scheme: the two ways of multibody programs.
+/// Lumped part of the mass and name of the scheme: the two practices of multibody programs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LumpedMass {
-    /// Modes and modal mass are those of the consistent mass; the rigid body and all couplings are summed
-    /// over nodal masses. This is made of a modal neutral file, which holds modes, generalised masses and
-    /// nodal masses.
+    /// Modes and modal mass of the consistent mass; the rigid body and all couplings are summed over nodal masses. This
+    /// corresponds to a modal neutral file, which holds modes, generalised masses and nodal masses.
     Couplings(String),
-    /// The whole mass was lumped before the modes were computed: an FE model with a lumped mass matrix.
+    /// Whole mass lumped before the modes are computed: an FE model with a lumped mass matrix.
     Whole(String),
 }
 
 impl LumpedMass {
-    /// Name of the scheme.
+    /// Returns the name of the scheme.
     pub fn scheme(&self) -> &str {
         match self {
             Self::Couplings(scheme) | Self::Whole(scheme) => scheme,
         }
     }
 
-    /// `couplings` or `whole`: what was lumped.
+    /// Returns the lumped part: `couplings` or `whole`.
     pub fn part(&self) -> &'static str {
         match self {
             Self::Couplings(_) => "couplings",
@@ -64,16 +63,16 @@ impl LumpedMass {
     }
 }
 
-/// A body that could be used for a scene.
+/// Body that could be used for a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Candidate {
-    /// Number of the [`Source`] that it is made of.
+    /// Index of the [`Source`] that it is made of.
     pub source: usize,
     /// Modes of the source that it has (from 0), ascending.
     pub modes: Vec<usize>,
     /// Groups of the kinetic energy that it has.
     pub groups: TermGroups,
-    /// What was lumped of its mass.
+    /// Lumped part of its mass; `None` for a consistent mass.
     pub lumped: Option<LumpedMass>,
     /// Precision of its numbers.
     pub storage: Storage,
@@ -90,7 +89,7 @@ impl Candidate {
         }
     }
 
-    /// The kind: in what it differs from the whole body of its source.
+    /// Returns the kind: the respect in which it differs from the whole body of its source.
     pub fn kind(&self) -> CandidateKind {
         match self {
             Self { lumped: Some(_), .. } => CandidateKind::Lumped,
@@ -100,15 +99,15 @@ impl Candidate {
         }
     }
 
-    /// Names of its groups.
+    /// Returns the names of its groups.
     pub fn group_names(&self) -> Vec<&'static str> {
         TermGroup::ALL.into_iter().filter(|group| self.groups.has(*group)).map(TermGroup::name).collect()
     }
 
-    /// The body.
+    /// Returns the body of the candidate.
     ///
     /// # Errors
-    /// Those of [`FlexBody::new`], which only lumped masses have.
+    /// The errors of [`FlexBody::new`], which only lumped masses cause.
     pub fn body(&self, source: &Source) -> Result<FlexBody> {
         let mut body = match &self.lumped {
             Some(LumpedMass::Couplings(scheme)) => source.with_lumped_couplings(scheme)?,
@@ -133,17 +132,17 @@ impl Candidate {
     }
 }
 
-/// Groups that a ladder of modes is tried with, the cheapest first.
+/// Sets of groups that are combined with numbers of modes, the cheapest first.
 const SETS: [TermGroups; 3] =
     [TermGroups::NONE, TermGroups { w1: true, ..TermGroups::NONE }, TermGroups::ALL];
 
-/// Errors over their tolerances of a set of groups with all modes: beyond the first it is hopeless, and below
-/// the second dearer sets cannot be told from it.
+/// Largest error over its tolerance, with all modes, at which a set of groups is combined with fewer modes.
 const HOPELESS: f64 = 10.0;
+/// Error over its tolerance below which more expensive sets of groups are not combined, since they cannot be
+/// distinguished.
 const PERFECT: f64 = 0.01;
 
-/// The candidates that have all modes of a source, the first of which is the reference. Bodies that are
-/// `carried` keep all groups.
+/// Returns the candidates with all modes of a source, the reference first. Bodies that are `carried` keep all groups.
 pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candidate> {
     let mut all = Vec::new();
     for (source, of) in sources.iter().enumerate() {
@@ -153,7 +152,7 @@ pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candida
             continue;
         }
         if source > 0 {
-            // Their modes are those of the reference, or others: what counts is how many and which.
+            // Modes of other sources differ from those of the reference: a few sets of groups suffice.
             all.extend(SETS.into_iter().rev().map(|groups| Candidate { groups, ..whole.clone() }));
             continue;
         }
@@ -167,8 +166,9 @@ pub(super) fn whole_candidates(sources: &[Source], carried: bool) -> Vec<Candida
     held(all, sources, carried)
 }
 
-/// The candidates that have some modes of the reference, the lowest and the `liveliest`, with the sets of
-/// groups that are worth it: `worst_of` answers the largest error over its tolerance of a set with all modes.
+/// Returns the candidates with some modes of the reference (the lowest, and the first of `liveliest`) and the sets of
+/// groups that are useful. `worst_of` receives a set of groups and returns its largest error over its tolerance with
+/// all modes.
 pub(super) fn ladder(
     sources: &[Source],
     liveliest: &[usize],
@@ -176,6 +176,7 @@ pub(super) fn ladder(
     worst_of: impl Fn(TermGroups) -> f64,
 ) -> Vec<Candidate> {
     let body = sources[0].body();
+    // Sets of groups whose errors with all modes are acceptable.
     let mut sets = Vec::new();
     for groups in SETS {
         let worst = worst_of(groups.and(body.groups()));
@@ -187,6 +188,7 @@ pub(super) fn ladder(
     let whole = Candidate::whole(0, body.n_modes());
     let mut all = Vec::new();
     for &count in LADDER.iter().filter(|&&count| count < body.n_modes()).rev() {
+        // The lowest modes, and the modes of largest contribution.
         for modes in [(0..count).collect(), first_of(liveliest, count)] {
             let with =
                 |groups: &TermGroups| Candidate { modes: modes.clone(), groups: *groups, ..whole.clone() };
@@ -196,14 +198,14 @@ pub(super) fn ladder(
     held(all, sources, carried)
 }
 
-/// So many modes of an order, ascending.
+/// Returns the first `count` modes of an order, ascending.
 pub(super) fn first_of(order: &[usize], count: usize) -> Vec<usize> {
     let mut modes = order[..count].to_vec();
     modes.sort_unstable();
     modes
 }
 
-/// Each candidate once, with the groups that its source holds.
+/// Restricts candidates to the groups that their source holds, and removes duplicates. Carried bodies keep all groups.
 fn held(mut all: Vec<Candidate>, sources: &[Source], carried: bool) -> Vec<Candidate> {
     for candidate in &mut all {
         let held = sources[candidate.source].body().groups();

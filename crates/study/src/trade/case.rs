@@ -1,4 +1,4 @@
-//! The motion of a load case that candidates are measured against.
+//! Reference motion of a load case, against which candidates are measured.
 
 use super::{Candidate, InCase, NodalReference, Source, timing};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -11,26 +11,26 @@ use flexbody_motion::dynamics::{EquationsOfMotion, Terms};
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::{Measure, Scene, Stage, Trace, trace, trace_at};
 
-/// A scene, one load case of several or alone, with the motion of the reference in it.
+/// Scene (a single one or a load case) with the motion of the reference in it.
 pub(super) struct StudyCase<'m> {
-    /// Name of the load case; `None` of a scene alone.
+    /// Name of the load case; `None` for a single scene.
     pub name: Option<String>,
-    /// The bodies in the frame of the scene, that of the reference first.
+    /// Bodies in the frame of the scene, the reference first.
     pub sources: Vec<Source>,
     pub scene: Scene,
     pub motion: Trace,
     pub nodal: Option<NodalReference<'m>>,
-    /// Part of the tolerances that the reference lacks of its model itself.
+    /// Part of the tolerances that the truncation error of the reference takes.
     pub reserved: f64,
     /// Warnings and notes about the motion of the reference.
     pub found: Vec<Diagnostic>,
 }
 
 impl<'m> StudyCase<'m> {
-    /// `scene` with the motion of the first of `sources` in it, and of all nodes of the model `nodal`.
+    /// Simulates the first of `sources` in `scene`, and all nodes of the model `nodal` if it is given.
     ///
     /// # Errors
-    /// As [`trade`](super::trade).
+    /// The errors of [`trade`](super::trade).
     pub(super) fn new(
         sources: &[Source],
         scene: &Scene,
@@ -44,7 +44,7 @@ impl<'m> StudyCase<'m> {
         nodal.map(|model| NodalReference::refuse(model, whole, scene, context)).transpose()?;
         let stage = Stage::new(whole, scene)?;
         let sources = sources.iter().map(|one| one.staged(scene)).collect::<Result<Vec<_>>>()?;
-        // Groups are what candidates differ in.
+        // The candidates decide about the groups, not the scene.
         let mut scene = stage.scene.into_owned();
         scene.run.terms = Terms { geometric_stiffness: scene.run.terms.geometric_stiffness, ..Terms::ALL };
         let (motion, said) = trace(sources[0].body(), &scene, context)?;
@@ -63,7 +63,7 @@ impl<'m> StudyCase<'m> {
         Ok(own)
     }
 
-    /// What is said about this load case, where there are several.
+    /// Returns the diagnostic with the name of the load case, if there are several.
     pub(super) fn about(&self, said: Diagnostic) -> Diagnostic {
         match &self.name {
             Some(name) => said.about(format!("case `{name}`")),
@@ -71,25 +71,25 @@ impl<'m> StudyCase<'m> {
         }
     }
 
-    /// Largest error over its tolerance that a candidate may have.
+    /// Returns the largest error over its tolerance that a candidate may have.
     pub(super) fn most(&self) -> f64 {
         (1.0 - self.reserved).max(0.0)
     }
 
-    /// The whole body of the reference as candidates are measured against it.
+    /// Returns the measure of errors relative to the motion of the reference.
     pub(super) fn measure(&self) -> Measure<'_> {
         Measure::new(self.sources[0].body(), &self.motion)
     }
 
-    /// The body of `candidate` in the frame of the case.
+    /// Returns the body of `candidate` in the frame of the case.
     ///
     /// # Errors
-    /// Those of [`Candidate::body`].
+    /// The errors of [`Candidate::body`].
     pub(super) fn body(&self, candidate: &Candidate) -> Result<FlexBody> {
         candidate.body(&self.sources[candidate.source])
     }
 
-    /// Errors of `candidate`, whose body is `body`, and the multiplications of an evaluation of its
+    /// Returns the errors of `candidate`, whose body is `body`, and the multiplications of an evaluation of its
     /// equations.
     pub(super) fn measured(
         &self,
@@ -119,8 +119,8 @@ impl<'m> StudyCase<'m> {
         Ok((InCase { errors, worst, growth }, multiplications))
     }
 
-    /// Seconds of the simulation of `candidate`, whose body is `body`, with its work, and those of an
-    /// evaluation of its equations.
+    /// Returns the duration of the simulation of `candidate`, whose body is `body`, its work, and the duration of one
+    /// evaluation of its equations. Unit: s.
     pub(super) fn time(
         &self,
         candidate: &Candidate,
@@ -139,10 +139,11 @@ impl<'m> StudyCase<'m> {
     }
 }
 
-/// Every thread has a body, its equations and its motion, beside that of the reference, which is there.
+/// Refuses a study that needs more than `memory` bytes. Each thread holds a body, its equations and its motion, in
+/// addition to those of the reference.
 fn refuse_too_much(sources: &[Source], reference: &Trace, memory: Option<u64>) -> Result<()> {
     const DOUBLE: f64 = 8.0;
-    /// W1 to W3, their panels and copies, and S: squares of the modes.
+    /// Number of arrays of size nf x nf: W1 to W3, their panels and copies, and S.
     const SQUARES: f64 = 40.0;
     let most = |count: &dyn Fn(&FlexBody) -> usize| {
         sources.iter().map(|s| count(s.body())).max().unwrap_or(0) as f64

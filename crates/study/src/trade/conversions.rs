@@ -1,4 +1,4 @@
-//! Bodies that the settings of a conversion make of one model.
+//! Bodies that different settings of a conversion make of one model.
 
 use super::Source;
 use crate::reference::{Enriched, Enrichment, MotionBodies, ReferenceError, enrich};
@@ -16,36 +16,36 @@ use std::collections::btree_map::Entry;
 use std::fmt::Write;
 use std::time::Instant;
 
-/// The bodies of a study.
+/// Bodies of a study.
 pub struct Conversions {
-    /// The reference first.
+    /// Bodies, the reference first.
     pub sources: Vec<Source>,
-    /// What the reference, and bodies before it that were enriched, lack of the model in each load case; the
-    /// last one is the reference.
+    /// Truncation errors of the reference and of its versions before enrichment, in each load case; the last belongs to
+    /// the reference.
     pub lacks: Vec<Vec<ReferenceError>>,
-    /// What was said about the reference.
+    /// Diagnostics about the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// What a study is to be made of.
+/// Request for the bodies of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct WantedBodies {
-    /// Free modes of a usual conversion.
+    /// Number of free modes of a usual conversion.
     pub modes: usize,
-    /// Whether the reference stands for the motion of all nodes: [`Enrichment::is_fine`].
+    /// True if the reference stands for the motion of all nodes: [`Enrichment::is_fine`].
     pub fine: bool,
 }
 
-/// Every conversion of a study in these load cases.
+/// Makes every conversion of a study for these load cases.
 ///
-/// The reference has twice as many modes as are wanted, residual vectors of spin and interfaces, and what
-/// [`enrich`] finds lacking in any case. Beside it stand as many as are wanted, their half and their quarter
-/// with residual vectors and without, the same at the other levels of accuracy, bodies of the shapes that the
-/// motions of the reference are made of, and what the settings of the reference make of the model with its
-/// whole mass lumped. Each is timed.
+/// The reference has twice the requested number of modes, residual vectors of spin and interfaces, and the static
+/// responses that [`enrich`] adds for any case. The other bodies have the requested number of modes, a half and a
+/// quarter of it, with residual vectors and without; the requested number at the other levels of accuracy; shapes of
+/// the motions of the reference; and the settings of the reference for the model with its whole mass lumped. Each
+/// conversion is timed.
 ///
 /// # Errors
-/// Those of [`convert`] and [`enrich`]. Accuracy `certified` is left out where it does not cover the model.
+/// The errors of [`convert`] and [`enrich`]. Accuracy `certified` is left out if it does not support the model.
 pub fn conversions(
     model: &FeModel,
     cases: &LoadCases,
@@ -54,6 +54,7 @@ pub fn conversions(
 ) -> Result<Conversions> {
     let making = Making::new(model, context);
     let WantedBodies { modes, fine } = wanted;
+    // Reference body, enriched for the load cases.
     let finest =
         Wish { count: modes.saturating_mul(2), residual: true, accuracy: Accuracy::Standard, lumped: None };
     let mut responses = Mat::new();
@@ -66,6 +67,7 @@ pub fn conversions(
     let Enriched { made: (reference, mut diagnostics), rounds: lacks } = enriched;
     diagnostics.extend(warnings(cases, &lacks, enrichment.enough()));
     let mut sources = vec![reference];
+    // Bodies with fewer modes or other accuracy.
     for wish in wishes(modes) {
         let source = match making.make(&wish, &Mat::new(), Vec::new()) {
             Ok((source, _)) => source,
@@ -79,6 +81,7 @@ pub fn conversions(
         let beside = source.beside(sources[0].body(), model);
         sources.push(beside.expect(OF_THE_MODEL));
     }
+    // Bodies of shapes of the motion, and bodies of a lumped mass.
     let lacking = |rounds: &Vec<ReferenceError>| rounds.last().map_or(0.0, |own| own.worst);
     let left: Vec<f64> = lacks.iter().map(|rounds| 1.0 - lacking(rounds)).collect();
     for source in making.make_of_motion(&sources[0], cases, &left)? {
@@ -93,7 +96,7 @@ pub fn conversions(
     Ok(Conversions { sources, lacks, diagnostics })
 }
 
-/// Warnings about what the reference lacks, each with its load case where there are several.
+/// Returns warnings about the truncation error of the reference, each with its load case if there are several.
 fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Vec<Diagnostic> {
     let of = |(at, rounds): (usize, &Vec<ReferenceError>)| {
         let warning = rounds.last()?.warning(&cases[at], enough)?;
@@ -105,14 +108,13 @@ fn warnings(cases: &LoadCases, lacks: &[Vec<ReferenceError>], enough: f64) -> Ve
     lacks.iter().enumerate().filter_map(of).collect()
 }
 
-/// Part of what is left of the tolerances that bodies of the fewest shapes may take: the rest is for terms
-/// that are left out beside.
+/// Part of the remaining tolerances that bodies of the fewest shapes may take. The rest is for dropped terms.
 const SHARE_OF_SHAPES: f64 = 0.9;
 
 const OF_THE_MODEL: &str = "bodies that were made of the model";
 
-/// Schemes that lump the whole mass of `model`; none where it is lumped already, or where rows without a
-/// place carry mass that belongs to no node.
+/// Returns schemes that lump the whole mass of `model`. Empty if the mass is lumped already, or if rows without a
+/// position carry mass that belongs to no node.
 fn lumpings(model: &FeModel) -> Vec<Lumping> {
     match model.has_diagonal_mass() || model.rows().vectors() > 0 {
         true => Vec::new(),
@@ -120,15 +122,15 @@ fn lumpings(model: &FeModel) -> Vec<Lumping> {
     }
 }
 
-/// A body that is wanted.
+/// Settings of a body of the study.
 #[derive(Clone, PartialEq)]
 struct Wish {
     /// Number of free modes.
     count: usize,
-    /// Whether it has residual vectors.
+    /// True if the body has residual vectors.
     residual: bool,
     accuracy: Accuracy,
-    /// Scheme by which the mass is lumped before.
+    /// Scheme by which the mass is lumped before the conversion; `None` for the consistent mass.
     lumped: Option<&'static str>,
 }
 
@@ -148,7 +150,7 @@ impl Wish {
     }
 }
 
-/// The bodies beside the reference, each once.
+/// Returns the settings of the bodies other than the reference, without duplicates.
 fn wishes(modes: usize) -> Vec<Wish> {
     let other = |accuracy| Wish { count: modes, residual: false, accuracy, lumped: None };
     let mut wishes = vec![other(Accuracy::Fast), other(Accuracy::Certified)];
@@ -164,7 +166,7 @@ fn wishes(modes: usize) -> Vec<Wish> {
     wishes
 }
 
-/// What all conversions of a study have in common.
+/// Common data of all conversions of a study.
 struct Making<'m> {
     model: &'m FeModel,
     /// Loads of the residual vectors.
@@ -181,7 +183,7 @@ impl<'m> Making<'m> {
         Self { model, loads, context: *context }
     }
 
-    /// Settings of a conversion with so many modes, without lumped comparators.
+    /// Returns the settings of a conversion with `modes` modes and without lumped comparators.
     fn settings(&self, modes: usize) -> ConvertSettings {
         ConvertSettings {
             modes: ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() },
@@ -190,7 +192,7 @@ impl<'m> Making<'m> {
         }
     }
 
-    /// Converts the model, with the static responses to `motion` as well, and takes the time of it.
+    /// Converts the model, with the static responses to `motion` in the basis, and measures the time.
     fn make(
         &self,
         wish: &Wish,
@@ -212,9 +214,9 @@ impl<'m> Making<'m> {
         Ok((Source::new(wish.in_words(), conversion.body, Some(seconds))?, conversion.diagnostics))
     }
 
-    /// Bodies of the shapes of the motion of `reference` in `cases`: of the numbers worth trying, and of the
-    /// fewest that are good enough where the parts `left` of the tolerances are left to them. Each takes the
-    /// time of the reference and its motion besides.
+    /// Makes bodies of shapes of the motion of `reference` in `cases`: for all candidate numbers of shapes, and for the
+    /// fewest whose errors are within the parts `left` of the tolerances. Their time includes that of the reference and
+    /// its motion.
     fn make_of_motion(&self, reference: &Source, cases: &LoadCases, left: &[f64]) -> Result<Vec<Source>> {
         if cases.iter().any(|scene| scene.run.duration.is_none()) {
             return Ok(Vec::new());
@@ -237,7 +239,7 @@ impl<'m> Making<'m> {
         Ok(made.into_iter().filter(|(count, _)| counts.contains(count)).map(|(_, own)| own).collect())
     }
 
-    /// The body of so many shapes of a motion that took `before` seconds.
+    /// Makes the body of the first `count` shapes of a motion that took `before` seconds.
     fn of_shapes(&self, bodies: &MotionBodies<'_>, count: usize, before: f64) -> Result<Source> {
         let start = Instant::now();
         let settings = ConvertSettings { basis: bodies.basis(count), ..self.settings(usize::MAX) };
@@ -246,7 +248,8 @@ impl<'m> Making<'m> {
         Source::new(name, body, Some(before + start.elapsed().as_secs_f64()))
     }
 
-    /// The same of the model with its whole mass lumped; the reason where this has no modes.
+    /// Makes the body of the model with its whole mass lumped. Returns the reason as a diagnostic if there is no such
+    /// body.
     fn make_lumped(
         &self,
         wish: &Wish,

@@ -1,21 +1,21 @@
-//! The best of the candidates.
+//! Pareto front and best of the candidates.
 
 use super::{Measured, TradeRow};
 
-/// The candidate to take.
+/// Recommended candidate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Recommendation {
-    /// This row is the cheapest that holds every tolerance.
+    /// Index of the cheapest row within every tolerance.
     Cheapest(usize),
-    /// This row is the most accurate that the allowed multiplications pay for.
+    /// Index of the most accurate row within the allowed multiplications.
     MostAccurate(usize),
-    /// No candidate holds the tolerances, or none is as cheap as allowed.
+    /// No candidate is within the tolerances, or none is as cheap as allowed.
     None,
 }
 
 impl Recommendation {
-    /// The row.
+    /// Returns the index of the recommended row.
     pub fn row(self) -> Option<usize> {
         match self {
             Self::Cheapest(row) | Self::MostAccurate(row) => Some(row),
@@ -23,7 +23,8 @@ impl Recommendation {
         }
     }
 
-    /// Of `rows`, with the multiplications that the scene allows instead of tolerances.
+    /// Chooses from `rows`: the cheapest within the tolerances or, if the scene states `allowed` multiplications, the
+    /// most accurate within these.
     pub(super) fn new(rows: &[TradeRow], allowed: Option<usize>) -> Self {
         let points = points(rows);
         match allowed {
@@ -37,7 +38,7 @@ impl Recommendation {
         }
     }
 
-    /// The cheapest of `rows` that is good enough.
+    /// Chooses the cheapest of `rows` that `is_enough` accepts.
     pub(super) fn cheapest(rows: &[TradeRow], is_enough: impl Fn(&Measured) -> bool) -> Self {
         let enough = |row: usize| rows[row].outcome.as_ref().is_ok_and(&is_enough);
         let cheapest = points(rows).into_iter().find(|point| enough(point.2));
@@ -45,10 +46,9 @@ impl Recommendation {
     }
 }
 
-/// Rows (from 0) that no other is cheaper than and as accurate as, ascending in cost: the Pareto front of
-/// multiplications per evaluation and the largest ratio of error to tolerance. Multiplications stand for the
-/// time of an evaluation, which is their number but for what clocks add: the front does not depend on the
-/// machine and its load.
+/// Returns the rows (from 0) of the Pareto front of multiplications per evaluation and the largest ratio of error to
+/// tolerance, ascending in cost. Multiplications represent the time of an evaluation, so that the front does not depend
+/// on the machine and its load.
 pub fn front(rows: &[TradeRow]) -> Vec<usize> {
     let mut best = f64::INFINITY;
     let better = |point: &(usize, f64, usize)| {
@@ -61,8 +61,8 @@ pub fn front(rows: &[TradeRow]) -> Vec<usize> {
     points(rows).into_iter().filter(better).map(|point| point.2).collect()
 }
 
-/// (multiplications, worst ratio, row) of what was measured, ascending. A lumped mass is there to be compared
-/// with: it costs what the consistent one does.
+/// Returns (multiplications, worst ratio, row) of all measured candidates, ascending. Lumped masses are left out: they
+/// serve for comparison and cost as much as the consistent mass.
 fn points(rows: &[TradeRow]) -> Vec<(usize, f64, usize)> {
     let point = |(at, row): (usize, &TradeRow)| {
         let measured = row.outcome.as_ref().ok().filter(|_| row.candidate.lumped.is_none())?;

@@ -1,4 +1,5 @@
-//! What accuracy costs: candidate bodies for a scene or its load cases, measured against a reference, and the best of them.
+//! Trade study of accuracy and cost: candidate bodies for a scene or its load cases are measured against a reference,
+//! and the best is recommended.
 
 mod candidate;
 mod case;

@@ -1,81 +1,81 @@
-//! A candidate with its errors, cost and times.
+//! Candidate with its errors, cost and times.
 
 use super::Candidate;
 use flexbody_base::diagnostic::Diagnostic;
 use flexbody_motion::integration::Work;
 use flexbody_motion::scene::OutputErrors;
 
-/// What a candidate takes, one run after the other on one thread.
+/// Times of a candidate, measured one after the other on one thread.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timed {
     /// Time of one evaluation of the equations, the longest of any load case. Unit: s.
     pub evaluation: f64,
     /// Time of the simulations of all load cases. Unit: s.
     pub integration: f64,
-    /// Work of these, with the steps that a scene without a given step takes for the candidate.
+    /// Work of these simulations, with the steps that a scene without a stated step takes for the candidate.
     pub work: Work,
 }
 
-/// Errors of a candidate in a load case, or in a scene alone.
+/// Errors of a candidate in a load case, or in a single scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InCase {
     /// Largest errors, with the steps of the reference.
     pub errors: OutputErrors,
     /// Largest ratio of error to tolerance.
     pub worst: f64,
-    /// [`ErrorHistory::growth`](flexbody_motion::scene::ErrorHistory::growth).
+    /// Growth of the errors over the run, see [`ErrorHistory::growth`](flexbody_motion::scene::ErrorHistory::growth).
     pub growth: Option<f64>,
 }
 
 /// Errors, cost and times of a candidate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// Errors in every load case; of a scene alone there is one.
+    /// Errors in every load case; one entry for a single scene.
     pub by_case: Vec<InCase>,
-    /// The case (from 0) with the largest ratio of error to tolerance.
+    /// Index (from 0) of the load case with the largest ratio of error to tolerance.
     pub case: usize,
-    /// Cases whose errors are beyond what the reference leaves of their tolerances.
+    /// Number of load cases whose errors exceed the tolerances that the reference leaves.
     pub beyond: usize,
-    /// Multiplications of one evaluation of the equations, the most of any case.
+    /// Multiplications of one evaluation of the equations, the largest of any case.
     pub multiplications: usize,
-    /// Size of its file. Unit: bytes.
+    /// Size of the file of the body. Unit: bytes.
     pub bytes: u64,
-    /// Time to make the body that it is of, where that is known. Unit: s.
+    /// Time to make the source body; `None` if unknown. Unit: s.
     pub preprocessing: Option<f64>,
-    /// Of those that somebody may take: the reference, the front and the recommended one.
+    /// Times, for candidates that may be chosen: the reference, the front and the recommended one.
     pub timed: Option<Timed>,
 }
 
 impl Measured {
-    /// Whether the errors of every case are within what the reference leaves of its tolerances.
+    /// Returns true if the errors of every case are within the tolerances that the reference leaves.
     pub fn holds(&self) -> bool {
         self.beyond == 0
     }
 
-    /// The errors in the case where they are largest beside the tolerances.
+    /// Returns the errors in the case with the largest ratio of error to tolerance.
     pub fn deciding(&self) -> &InCase {
         &self.by_case[self.case]
     }
 
-    /// Largest ratio of error to tolerance in any case.
+    /// Returns the largest ratio of error to tolerance in any case.
     pub fn worst(&self) -> f64 {
         self.deciding().worst
     }
 }
 
-/// The diagnostic for a candidate that could not be measured.
+/// Diagnostic of a candidate that could not be measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Failed(pub Diagnostic);
 
-/// A candidate and its measurement.
+/// Candidate and its measurement.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TradeRow {
     /// Modes, groups and precision of the body.
     pub candidate: Candidate,
-    /// Name of the source that it is made of.
+    /// Name of the source that the candidate is made of.
     pub source: String,
-    /// Frequency of its last mode in hertz.
+    /// Frequency of its last mode, in hertz.
     pub last_frequency_hz: f64,
-    /// The measurement, or the reason why there is none.
+    /// Measurement, or the reason why there is none.
     pub outcome: std::result::Result<Measured, Failed>,
 }

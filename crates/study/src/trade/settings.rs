@@ -1,19 +1,19 @@
-//! Settings of a study.
+//! Settings of a trade study.
 
 use crate::reference::ReferenceError;
 
-/// Settings of a study.
+/// Settings of a trade study.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TradeSettings<'s> {
-    /// Integrations whose median time counts; of those that take long, fewer.
+    /// Number of integrations per candidate, of which the median time counts. Fewer if an integration takes long.
     pub repeat: usize,
-    /// Part of the tolerances that the reference lacks of its model itself, in each load case: candidates get
-    /// the rest. Nothing is known of cases that it does not reach.
+    /// Part of the tolerances that the truncation error of the reference takes, in each load case: candidates get the
+    /// rest. Cases beyond its length count as zero.
     pub reserved: &'s [f64],
 }
 
-/// What the reference of a study lacks of its model in each load case, by the rounds in which it was
-/// enriched; nothing where it is none. All nodes lack nothing.
+/// Returns the part of the tolerances that the reference takes in each load case, from its enrichment rounds. Zero if
+/// the truncation error is too large for a reference, and for the motion of all nodes (`nodal`).
 pub fn reserved(lacks: &[Vec<ReferenceError>], nodal: bool) -> Vec<f64> {
     let of = |rounds: &Vec<ReferenceError>| {
         rounds.last().filter(|own| !nodal && own.is_reference()).map_or(0.0, |own| own.worst)

@@ -1,4 +1,4 @@
-//! A body that candidates are made of.
+//! Bodies from which candidates are made.
 
 use faer::Mat;
 use flexbody_base::error::Result;
@@ -8,26 +8,27 @@ use flexbody_motion::dynamics::Configuration;
 use flexbody_motion::scene::{ErrorHistory, Measure, ModeStart, OtherModes, Scene, Stage, Trace};
 use nalgebra::DVector;
 
-/// A body, and how its modes are seen from those of the reference.
+/// Body, and the coupling of its modes to those of the reference.
 #[derive(Debug, Clone)]
 pub struct Source {
     name: String,
-    /// Without lumped comparators.
+    /// Body without lumped comparators.
     body: FlexBody,
     lumped: Vec<LumpedBody>,
-    /// Scheme by which the mass of the model was lumped before this body was made of it.
+    /// Scheme by which the mass of the model was lumped before the conversion; `None` for a consistent mass.
     lumped_by: Option<String>,
-    /// What it took to make it. Unit: s.
+    /// Time of the conversion; `None` if unknown. Unit: s.
     preprocessing: Option<f64>,
-    /// G = Psi'K Psi_r (nf x nr) with the modes Psi_r of the reference; none of the reference itself.
+    /// G = Psi'K Psi_r (nf x nr) with the modes Psi_r of the reference; `None` for the reference itself.
     shared: Option<Mat<f64>>,
 }
 
 impl Source {
-    /// The reference, or a body alone; with the time that it took to make it, where that is known.
+    /// Creates a source from the reference or a single body. `preprocessing` is the time of the conversion, if known.
+    /// Unit: s.
     ///
     /// # Errors
-    /// Every error of [`FlexBody::require_mean_axes`].
+    /// The errors of [`FlexBody::require_mean_axes`] and [`FlexBody::new`].
     pub fn new(name: impl Into<String>, body: FlexBody, preprocessing: Option<f64>) -> Result<Self> {
         body.require_mean_axes("trade")?;
         let mut parts = body.into_parts();
@@ -36,22 +37,22 @@ impl Source {
         Ok(Self { name, body, lumped, lumped_by: None, preprocessing, shared: None })
     }
 
-    /// The same, as a body of a model whose mass was lumped by a scheme.
+    /// Marks the source as a body of a model whose mass was lumped by `scheme`.
     pub fn of_lumped_mass(self, scheme: &str) -> Self {
         Self { lumped_by: Some(scheme.to_owned()), ..self }
     }
 
-    /// The same as a candidate beside the body `reference` of the same model; `None` when one of them is not
-    /// of `model`.
+    /// Relates the source to the body `reference` of the same model. Returns `None` if one of the two does not belong
+    /// to `model`.
     pub fn beside(mut self, reference: &FlexBody, model: &FeModel) -> Option<Self> {
         self.shared = Some(self.body.stiffness_beside(reference, model)?);
         Some(self)
     }
 
-    /// This source with its bodies in the frame of a scene.
+    /// Returns the source with its bodies in the frame of a scene.
     ///
     /// # Errors
-    /// Those of [`Stage::new`].
+    /// The errors of [`Stage::new`].
     pub(super) fn staged(&self, scene: &Scene) -> Result<Self> {
         let mut parts = self.body.clone().into_parts();
         parts.lumped = self.lumped.clone();
@@ -61,33 +62,33 @@ impl Source {
         Ok(Self { body: FlexBody::new(parts)?, lumped, ..self.clone() })
     }
 
-    /// Name of the source in reports.
+    /// Returns the name of the source in reports.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The body, without lumped comparators.
+    /// Returns the body, without lumped comparators.
     pub fn body(&self) -> &FlexBody {
         &self.body
     }
 
-    /// Seconds that it took to make it.
+    /// Returns the time of the conversion, if known. Unit: s.
     pub fn preprocessing(&self) -> Option<f64> {
         self.preprocessing
     }
 
-    /// Lumping schemes.
+    /// Returns the lumping schemes of the comparators.
     pub fn lumped(&self) -> impl Iterator<Item = &str> {
         self.lumped.iter().map(|lumped| lumped.scheme.as_str())
     }
 
-    /// The scheme by which the mass was lumped before the modes were computed; `None` of a consistent mass.
+    /// Returns the scheme by which the mass was lumped before the modes were computed; `None` for a consistent mass.
     pub fn lumped_by(&self) -> Option<&str> {
         self.lumped_by.as_deref()
     }
 
-    /// The body with its own modal mass and everything else summed over the nodal masses of a scheme; itself
-    /// where there is none of that name.
+    /// Returns the body with its own modal mass and all other invariants summed over the nodal masses of a scheme.
+    /// Returns the body unchanged if no comparator has that scheme.
     pub(super) fn with_lumped_couplings(&self, scheme: &str) -> Result<FlexBody> {
         let mut parts = self.body.clone().into_parts();
         if let Some(lumped) = self.lumped.iter().find(|lumped| lumped.scheme == scheme) {
@@ -97,11 +98,11 @@ impl Source {
         FlexBody::new(parts)
     }
 
-    /// `scene` for a candidate with the `modes` of this body, a motion that starts as `start` of the
-    /// reference does.
+    /// Returns `scene` for a candidate with the `modes` of this body, with a motion that starts like `start` of the
+    /// reference.
     ///
-    /// Modes of the start are those of the reference; other modes take the part of its deformation that is
-    /// nearest to it in elastic energy, q = L^-1 G q_r.
+    /// Initial values of modes refer to the reference. Other modes get the projection of its deformation in elastic
+    /// energy, q = L^-1 G q_r.
     pub(super) fn scene(
         &self,
         scene: &Scene,
@@ -126,8 +127,8 @@ impl Source {
         own
     }
 
-    /// Errors of the motion of a candidate with the `modes` of this body; `None` where its modes cannot be
-    /// compared.
+    /// Returns the errors of the motion of a candidate with the `modes` of this body; `None` if its modes cannot be
+    /// compared with those of the reference.
     pub(super) fn errors(
         &self,
         measure: &Measure<'_>,

@@ -1,4 +1,4 @@
-//! The study: every candidate simulated, its errors measured, then its times.
+//! Trade study: every candidate is simulated, its errors are measured, then its times.
 
 use super::candidate::{first_of, ladder, whole_candidates};
 use super::case::StudyCase;
@@ -17,17 +17,16 @@ use flexbody_motion::scene::{LoadCases, Measure, Scene, Tolerance, ends_a_run};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The motion that the errors of a study are asked to be measured against.
+/// Requested reference motion for the errors of a study.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ReferenceChoice {
-    /// The motion of the body with everything that it has.
+    /// Motion of the body with all its modes and groups.
     #[default]
     Full,
-    /// The motion of a body that is enriched until what it lacks of the motion of all nodes is estimated at no more than
-    /// a hundredth of the tolerances: what can be had of large models and long scenes. Where that is not reached a
-    /// warning says so.
+    /// Motion of a body that is enriched until its estimated truncation error is at most one hundredth of the
+    /// tolerances: suitable for large models and long scenes. A warning is given if this is not reached.
     Fine,
-    /// The motion of all nodes of the model.
+    /// Motion of all nodes of the model.
     Nodal,
 }
 
@@ -35,7 +34,7 @@ impl ReferenceChoice {
     /// Every choice, in the order of the documentation.
     pub const ALL: [Self; 3] = [Self::Full, Self::Fine, Self::Nodal];
 
-    /// Name on the command line.
+    /// Returns the name on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
@@ -45,78 +44,79 @@ impl ReferenceChoice {
     }
 }
 
-/// The motion that the errors of a study are measured against: of a body, be it a fine one, or of all nodes.
+/// Reference motion of the errors of a study: of a body (also a fine one), or of all nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ReferenceKind {
-    /// The motion of the first source, with everything that it has.
+    /// Motion of the first source with all its modes and groups.
     Full,
-    /// The unreduced equations of all nodes.
+    /// Unreduced equations of all nodes.
     Nodal,
 }
 
-/// A finished study.
+/// Result of a trade study.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trade {
     /// Name of the scene.
     pub scene: String,
-    /// Name of the body's model.
+    /// Name of the model of the body.
     pub body: String,
-    /// The motion that errors are measured against.
+    /// Reference motion of the errors.
     pub reference: ReferenceKind,
-    /// The load cases; of a scene without there is one.
+    /// Load cases; one for a scene without load cases.
     pub cases: Vec<TradeCase>,
-    /// The least tolerance of all load cases.
+    /// Smallest tolerances of all load cases.
     pub tolerance: Tolerance,
-    /// Multiplications that the scene allows instead.
+    /// Multiplications that the scene allows; `None` if tolerances decide.
     pub allowed: Option<usize>,
     /// All candidates; the first is the whole body of the reference.
     pub rows: Vec<TradeRow>,
     /// Rows of the Pareto front, ascending in cost.
     pub front: Vec<usize>,
-    /// The row to take.
+    /// Recommended row.
     pub recommended: Recommendation,
     /// Warnings and notes about the motion of the reference.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// A load case of a study, or the scene of one without.
+/// Load case of a study, or its single scene.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TradeCase {
-    /// Name of the load case; `None` of a scene alone.
+    /// Name of the load case; `None` for a single scene.
     pub name: Option<String>,
-    /// Its tolerances.
+    /// Tolerances of the load case.
     pub tolerance: Tolerance,
-    /// Part of them that the reference lacks of its model itself: candidates get the rest.
+    /// Part of the tolerances that the truncation error of the reference takes: candidates get the rest.
     pub reserved: f64,
-    /// How the equations of all nodes were integrated, where they are the reference.
+    /// Integration of the equations of all nodes; `None` if they are not the reference.
     pub nodal: Option<NodalIntegration>,
-    /// The row to take if there were no other case.
+    /// Recommended row if this were the only load case.
     pub alone: Recommendation,
-    /// Candidates that are cheaper than the recommended one and beyond the tolerances in this case.
+    /// Number of candidates that are cheaper than the recommended one and exceed the tolerances in this case.
     pub ruled_out: usize,
-    /// Those of them that no other case rules out.
+    /// Number of these candidates that no other case rules out.
     pub ruled_out_alone: usize,
 }
 
 impl Trade {
-    /// Tolerances of a load case (from 0).
+    /// Returns the tolerances of a load case (from 0).
     pub fn tolerance(&self, case: usize) -> &Tolerance {
         &self.cases[case].tolerance
     }
 }
 
-/// Measures every candidate of `sources` in each load case, which one body has to serve: a candidate is as good as
-/// it is in the worst. The first source is the reference; others are [`Source::beside`] it.
+/// Measures every candidate of `sources` in each load case. One body must serve all cases, so that the worst case
+/// counts. The first source is the reference; others must be related to it by [`Source::beside`].
 ///
-/// Errors are those of the model: all candidates are integrated with the method and the step of the
-/// reference. They are found on all threads; the times of those that somebody may take afterwards, one after
-/// the other: the simulations of all cases together. Everything but the times is the same at any number of threads.
+/// Errors are those of the model: all candidates are integrated with the method and the step of the reference, in
+/// parallel. Afterwards the candidates that may be chosen are timed one after the other, with the simulations of all
+/// cases together. All results except times are independent of the number of threads.
 ///
-/// * `nodal`: the model, where errors are to be measured against the motion of all its nodes.
+/// * `nodal`: the model, if errors are measured against the motion of all its nodes.
 ///
 /// # Errors
-/// Those of [`trace`](flexbody_motion::scene::trace) and [`NodalReference::new`] for the reference; FB601 when memory is short; those of writing a file to the temporary folder.
+/// The errors of [`trace`](flexbody_motion::scene::trace) and [`NodalReference::new`] for the reference; FB601 for too
+/// little memory; errors of writing a file to the temporary folder.
 pub fn trade(
     sources: &[Source],
     cases: &LoadCases,
@@ -132,6 +132,7 @@ pub fn trade(
         let name = cases.case_name(at).map(str::to_owned);
         StudyCase::new(sources, scene, name, nodal, reserved, context).map_err(|error| cases.about(at, error))
     };
+    // One body serves all load cases, so that the strictest limits apply.
     let allowed = cases.iter().filter_map(|scene| scene.requirements.multiplications).min();
     let (scene, tolerance) = (cases.name().to_owned(), cases.least_tolerance());
     let cases = cases.iter().enumerate().map(studied).collect::<Result<Vec<_>>>()?;
@@ -176,7 +177,7 @@ impl TradeCase {
     }
 }
 
-/// Candidates that are done, told as the fraction of all.
+/// Progress of a phase: reports the fraction of finished candidates.
 struct Progress<'w> {
     context: &'w Context<'w>,
     count: f64,
@@ -195,27 +196,27 @@ impl<'w> Progress<'w> {
     }
 }
 
-/// What all candidates have in common.
+/// Common data of all candidates.
 struct Job<'j> {
     cases: &'j [StudyCase<'j>],
-    /// Of each case.
+    /// Measure of each load case.
     measures: Vec<Measure<'j>>,
-    /// Multiplications that are allowed instead of tolerances.
+    /// Multiplications that the scene allows; `None` if tolerances decide.
     allowed: Option<usize>,
 }
 
 impl Job<'_> {
-    /// The bodies that candidates are made of, as the first case has them.
+    /// Returns the bodies from which candidates are made, in the frame of the first case.
     fn sources(&self) -> &[Source] {
         &self.cases[0].sources
     }
 
-    /// Every candidate: what can be found on all threads, then the times of those that somebody may take, one
-    /// after the other.
+    /// Measures every candidate in parallel, then times those that may be chosen, one after the other.
     fn rows(&self, repeat: usize, context: &Context<'_>) -> Result<Vec<TradeRow>> {
         let carried = self.cases.iter().any(|case| case.scene.carried.is_some());
         let whole = whole_candidates(self.sources(), carried);
         let mut rows = self.errors(whole, "errors of whole bodies", context)?;
+        // Sets of groups that are hopeless with all modes are not combined with fewer.
         let worst_of = |groups: TermGroups| {
             let has_groups = |row: &&TradeRow| {
                 let own = &row.candidate;
@@ -228,13 +229,14 @@ impl Job<'_> {
         let liveliest = liveliest_modes(&motions.collect::<Vec<_>>())?;
         let some_modes = ladder(self.sources(), &liveliest, carried, worst_of);
         rows.extend(self.errors(some_modes, "errors of fewer modes", context)?);
+        // Refine the number of modes near the tolerance, then measure times.
         self.refine(&liveliest, &mut rows)?;
         self.time_what_is_worth_it(&mut rows, repeat, context)?;
         Ok(rows)
     }
 
-    /// Bisects between the cheapest rung of the ladder that is good enough and the highest one below it that
-    /// is not, as a selection does.
+    /// Bisects the number of modes between the cheapest candidate that holds and the largest smaller one that does not,
+    /// as a selection does.
     fn refine(&self, liveliest: &[usize], rows: &mut Vec<TradeRow>) -> Result<()> {
         if self.allowed.is_some() {
             return Ok(());
@@ -245,6 +247,7 @@ impl Job<'_> {
             let measured = row.outcome.as_ref().ok().filter(|measured| measured.holds())?;
             Some((measured.multiplications, &row.candidate))
         });
+        // Cheapest candidate that holds, and the order in which its modes were taken.
         let Some((_, best)) = enough.min_by_key(|own| own.0) else { return Ok(()) };
         let best = best.clone();
         let count = best.modes.len();
@@ -255,6 +258,7 @@ impl Job<'_> {
             return Ok(());
         }
         let with = |count: usize| Candidate { modes: first_of(order, count), ..best.clone() };
+        // Largest measured number of modes in this order that does not hold.
         let is_rung = |row: &&TradeRow| row.candidate == with(row.candidate.modes.len());
         let fewer = rows.iter().filter(|row| row.candidate.modes.len() < count).filter(is_rung);
         let (mut too_few, mut enough) =
@@ -291,7 +295,7 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// The rows of candidates, without times.
+    /// Returns the rows of candidates, without times.
     fn errors(
         &self,
         all: Vec<Candidate>,
@@ -307,13 +311,13 @@ impl Job<'_> {
         all.into_par_iter().map(measured).collect()
     }
 
-    /// Everything but the times. What keeps the motion of a candidate from being computed belongs to its row.
+    /// Measures a candidate, without times. An error that ends its simulation becomes the outcome of the row.
     fn measure(&self, candidate: Candidate) -> Result<TradeRow> {
         let source = &self.sources()[candidate.source];
         let last = candidate.modes.last().copied().unwrap_or(0);
         let outcome = match self.measured(&candidate) {
             Ok(measured) => Ok(measured),
-            // A lumped mass need not be the mass of anything: that is what the row says then.
+            // A lumped mass matrix may be unphysical: its error becomes the outcome of the row.
             Err(error)
                 if candidate.lumped.is_some() || error.diagnostics().iter().all(|d| ends_a_run(d.code())) =>
             {
@@ -343,7 +347,7 @@ impl Job<'_> {
             by_case.push(own);
         }
         let worst = |at: &usize| by_case[*at].worst;
-        // The first of equals; NaN is the largest of all.
+        // The first of equal cases; NaN counts as the largest.
         let largest = (0..by_case.len()).rev().max_by(|a, b| worst(a).total_cmp(&worst(b)));
         let within = |(own, case): (&InCase, &StudyCase<'_>)| own.worst <= case.most();
         let beyond = by_case.iter().zip(self.cases).filter(|pair| !within(*pair)).count();
@@ -382,7 +386,7 @@ impl Job<'_> {
     }
 }
 
-/// Size of the file of `body`, written to the temporary folder and removed.
+/// Returns the size of the file of `body` in bytes, which is written to the temporary folder and removed.
 fn file_size(body: &FlexBody) -> Result<u64> {
     let name = format!("flexbody-trade-{}.flex.h5", std::process::id());
     let slot = flexbody_file::prepare_output(std::env::temp_dir().join(name))?;

@@ -1,4 +1,4 @@
-//! Times, one after the other on one thread.
+//! Times, measured one after the other on one thread.
 
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
@@ -9,14 +9,15 @@ use flexbody_motion::scene::{Scene, simulate};
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// Evaluations are timed in batches of at least this long, whose median counts.
+/// Shortest batch of evaluations that is timed. A longer batch reduces the effect of the clock's resolution.
 const BATCH: Duration = Duration::from_micros(400);
+/// Number of batches, of which the median counts.
 const BATCHES: usize = 15;
 
-/// Integrations that take this long together are not repeated: the clock is sharper than that.
+/// Total time of integrations after which they are not repeated: the clock is accurate enough for that.
 const LONG: Duration = Duration::from_secs(2);
 
-/// Seconds that one evaluation of the equations of `body` with `terms` takes: state, forces of inertia and
+/// Returns the seconds of one evaluation of the equations of `body` with `terms`: state, inertia forces and
 /// accelerations.
 pub(super) fn evaluation(body: &FlexBody, terms: Terms) -> std::result::Result<f64, NotPositiveDefinite> {
     let equations = EquationsOfMotion::new(body, terms);
@@ -39,7 +40,8 @@ pub(super) fn evaluation(body: &FlexBody, terms: Terms) -> std::result::Result<f
     Ok(median(&mut times).as_secs_f64() / f64::from(count))
 }
 
-/// Seconds that the simulation of `scene` takes, the median of `repeat` where that is not long, and its work.
+/// Returns the seconds of the simulation of `scene`, and its work. The time is the median of `repeat` simulations, or
+/// of fewer if these take long.
 pub(super) fn integration(body: &FlexBody, scene: &Scene, repeat: usize) -> Result<(f64, Work)> {
     let (mut times, mut work) = (Vec::new(), Work::default());
     while times.len() < repeat.max(1) && times.iter().sum::<Duration>() < LONG {
@@ -50,7 +52,7 @@ pub(super) fn integration(body: &FlexBody, scene: &Scene, repeat: usize) -> Resu
     Ok((median(&mut times).as_secs_f64(), work))
 }
 
-/// The middle one, of an even number the later.
+/// Returns the median; of an even number, the larger of the middle two.
 fn median(times: &mut [Duration]) -> Duration {
     times.sort_unstable();
     times[times.len() / 2]

@@ -1,4 +1,4 @@
-//! What the motion of all nodes takes, before it is computed.
+//! Estimate of time and memory for the motion of all nodes, before it is computed.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -9,44 +9,45 @@ use flexbody_model::FeModel;
 use flexbody_motion::scene::{Scene, Scheme, fastest_history};
 use std::f64::consts::TAU;
 
-/// Seconds of a multiplication with an entry of a sparse matrix or factor, and of one in a factorisation.
+/// Seconds per multiplication with an entry of a sparse matrix or factor.
 const PER_ENTRY: f64 = 1.5e-9;
+/// Seconds per floating-point operation of a factorisation.
 const PER_FLOP: f64 = 1.0e-9;
 
-/// Passes over the rows in an evaluation, besides the products.
+/// Number of passes over the rows in an evaluation, besides the products.
 const PASSES: f64 = 60.0;
 
-/// Solves with the factor of M in an evaluation where rotations carry mass: 7 to 14 where nodes turn by 0.03, 8 to 22
-/// where they turn by 0.1 (frames of beams, a folded shell, a rigid region).
+/// Number of solves with the factor of M in an evaluation if rotations carry mass: 7 to 14 where nodes turn by 0.03, 8
+/// to 22 where they turn by 0.1 (frames of beams, a folded shell, a rigid region).
 const TURNED_SOLVES: f64 = 15.0;
 
-/// Evaluations per shortest period that an explicit method of order 8 takes at the least.
+/// Smallest number of evaluations per shortest period of an explicit method of order 8.
 const EVALUATIONS: f64 = 15.0;
 
-/// Iterations of an implicit step.
+/// Number of iterations of an implicit step.
 const ITERATIONS: f64 = 5.0;
 
-/// Real solves that a complex one takes as long as.
+/// Duration of a complex solve, relative to a real one.
 const COMPLEX: f64 = 3.0;
 
-/// Explicit integrations of so many seconds are taken however cheap implicit ones are: nothing is left to be
-/// said of their steps.
+/// Duration of an explicit integration, in seconds, up to which it is preferred even if an implicit one is cheaper,
+/// since its step error is controlled.
 const COMFORTABLE: f64 = 30.0;
 
-/// The fastest motion that counts turns by this angle in the first implicit steps that are tried.
+/// Angle (rad) of the fastest relevant motion per step in the first implicit integration.
 const FIRST_ANGLE: f64 = 1.5;
 
-/// Order of implicit steps that the scene does not ask for.
+/// Order of implicit steps that the scene does not prescribe.
 pub(super) const ORDER: usize = 6;
 
-/// Parts at the most that a step is divided into.
+/// Largest number of parts that a step is divided into.
 const MOST_PARTS: u32 = 1024;
 
-/// Times that implicit steps are halved at the least, to see what they were worth: relative to the first
-/// ones, 1 + 2.
+/// Number of steps of the implicit integrations relative to the first one, at least: the first plus one with half the
+/// step, 1 + 2.
 const RUNS: f64 = 3.0;
 
-/// Numbers of a model that work depends on.
+/// Properties of a model that determine the work.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Effort {
     rows: f64,
@@ -54,26 +55,26 @@ pub(super) struct Effort {
     evaluation: f64,
     solve: f64,
     factorisation: f64,
-    /// Entries of that factor.
+    /// Number of entries of that factor.
     entries: f64,
-    /// The largest circular frequency, estimated.
+    /// Estimated largest circular frequency.
     fastest: f64,
     duration: f64,
-    /// Stretches between breaks.
+    /// Number of stretches between breaks.
     pieces: f64,
 }
 
-/// How the motion is integrated.
+/// Method of integration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Way {
-    /// Explicitly, of order 8, with error control.
+    /// Explicit method of order 8 with error control.
     Explicit,
-    /// In implicit steps; `given` by the scene, or halved until they no longer count.
+    /// Implicit steps, `given` by the scene or halved until the change is small.
     Implicit { order: usize, step: f64, given: bool },
 }
 
 impl Effort {
-    /// What `model` takes in `scene`, with `modes` damped modes.
+    /// Estimates the work of `model` in `scene`, with `modes` damped modes.
     pub(super) fn new(model: &FeModel, scene: &Scene, modes: usize) -> Self {
         let (pencil, rows) = (model.pencil(), model.rows().len() as f64);
         let analysis = Analysis::new(&pencil);
@@ -82,7 +83,8 @@ impl Effort {
         });
         let block = pencil.block() as f64;
         let stiffness = pencil.stiffness().as_csc().nnz() as f64;
-        // Both triangles of a factor of M, of which one component is stored.
+        // Multiplications with K, both triangles of a factor of M (of which one component is stored), and passes over
+        // the rows.
         let (solves, of_directors) = match model.director_mass() {
             None => (1.0, 0.0),
             Some(mass) => (TURNED_SOLVES, PASSES * mass.rows() as f64),
@@ -102,12 +104,12 @@ impl Effort {
         }
     }
 
-    /// Seconds of the explicit method.
+    /// Returns the seconds of the explicit method.
     fn explicit(&self) -> f64 {
         EVALUATIONS * self.duration * self.fastest / TAU * self.evaluation
     }
 
-    /// Seconds of `runs` times as many implicit steps.
+    /// Returns the seconds of implicit integration with steps of length `step`, multiplied by `runs`.
     pub(super) fn implicit(&self, order: usize, step: f64, runs: f64) -> f64 {
         let (stages, solves) = match order {
             2 => (1.0, 1.0),
@@ -119,17 +121,17 @@ impl Effort {
         steps * one + self.pieces * (1.0 + COMPLEX) * self.factorisation
     }
 
-    /// Whether implicit steps may be divided into so many parts.
+    /// Returns true if implicit steps may be divided into `parts` parts within the time limit.
     pub(super) fn is_allowed(&self, order: usize, step: f64, parts: u32, longest: Option<f64>) -> bool {
         let seconds = self.implicit(order, step, f64::from(parts));
         parts <= MOST_PARTS && longest.is_none_or(|longest| seconds <= longest)
     }
 
-    /// How to integrate what a scene asks for by `scheme`, with circular frequencies up to `liveliest` that
-    /// count; and the seconds that it takes.
+    /// Chooses the method of integration for a scene with `scheme`. `liveliest` is the largest circular frequency that
+    /// counts. Also returns the estimated seconds.
     pub(super) fn plan(&self, scene: &Scene, scheme: Scheme, liveliest: f64) -> (Way, f64) {
         match scheme {
-            // Implicit steps solve what is stiff of a body with mean axes.
+            // Implicit steps solve for the stiff part of a body in mean axes only.
             _ if scene.carried.is_some() => (Way::Explicit, self.explicit()),
             Scheme::Conserving { order, step } => {
                 let step = step.unwrap_or(TAU / (20.0 * liveliest)).min(self.duration);
@@ -147,10 +149,10 @@ impl Effort {
         }
     }
 
-    /// Refuses what takes longer than `longest` seconds.
+    /// Refuses work that takes longer than `longest` seconds.
     ///
     /// # Errors
-    /// FB604.
+    /// FB604 if the estimate exceeds the limit.
     pub(super) fn refuse_long(&self, seconds: f64, longest: Option<f64>) -> Result<()> {
         let Some(longest) = longest.filter(|longest| seconds.is_nan() || seconds > *longest) else {
             return Ok(());
@@ -163,14 +165,14 @@ impl Effort {
         Err(Diagnostic::new(Code::WorkLong, message).with_help(help).into())
     }
 
-    /// Refuses what does not fit the memory: the displacements of all rows at `instants` of `runs` motions,
+    /// Refuses work that does not fit into `memory`: the displacements of all rows at the `instants` of the motions,
     /// and the factors of implicit steps.
     ///
     /// # Errors
-    /// FB601.
+    /// FB601 if the estimate exceeds the memory.
     pub(super) fn refuse_large(&self, instants: f64, way: Way, memory: Option<u64>) -> Result<()> {
         const DOUBLE: f64 = 8.0;
-        /// A real and a complex factor with their indices.
+        /// Bytes per entry of a real and a complex factor with their indices.
         const FACTORS: f64 = 12.0 + 20.0;
         let (runs, factors) = match way {
             Way::Explicit => (1.0, 0.0),
@@ -182,19 +184,19 @@ impl Effort {
         refuse_beyond(memory, needed, "the motion of all nodes", help)
     }
 
-    /// Instants at which implicit steps are looked at.
+    /// Returns the number of instants at which implicit steps are evaluated.
     pub(super) fn instants(&self, step: f64) -> f64 {
         self.duration / step + 2.0 * self.pieces
     }
 }
 
-/// The largest circular frequency of the modes of `body`.
+/// Returns the largest circular frequency of the modes of `body`.
 pub(super) fn fastest_mode(body: &FlexBody) -> f64 {
     body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt()
 }
 
-/// An estimate of the largest circular frequency: sqrt(3 max K_ii / M_ii), an element of three dimensions
-/// with consistent mass.
+/// Returns an estimate of the largest circular frequency: sqrt(3 max K_ii / M_ii), as for a solid element with
+/// consistent mass.
 fn fastest(model: &FeModel) -> f64 {
     let mass = model.pencil().mass_diagonal();
     let ratios = model.stiffness().diagonal().into_iter().zip(mass).filter(|(_, m)| *m > 0.0);

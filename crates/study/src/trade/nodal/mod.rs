@@ -1,4 +1,4 @@
-//! The motion of all nodes as the reference.
+//! Motion of all nodes as the reference of a study.
 
 mod effort;
 mod reference;

@@ -1,4 +1,4 @@
-//! The motion of all nodes as the reference of a study.
+//! Motion of all nodes as the reference of a study.
 
 use super::effort::{Effort, ORDER, Way, fastest_mode};
 use super::seen::Seen;
@@ -10,32 +10,31 @@ use flexbody_linalg::context::Context;
 use flexbody_model::FeModel;
 use flexbody_motion::scene::{ErrorHistory, Scene, Scheme, Trace, liveliest_rate, nodal_point};
 
-/// Tolerance of the explicit integration unless the scene has one: errors of reduced models that are smaller
-/// are not told.
+/// Tolerance of the explicit integration unless the scene states a larger one. Smaller errors of reduced models are not
+/// reported.
 const TOLERANCE: f64 = 1e-8;
 
-/// Part of the tolerances of the scene that steps which are halved may be worth before they are halved again.
+/// Part of the tolerances of the scene below which the effect of halving the steps is accepted.
 const PART_OF_STEPS: f64 = 0.01;
 
-/// Part that is a reference for others no longer without a word.
+/// Part of the tolerances above which the integration error of the reference causes a warning.
 const WORTH_A_WORD: f64 = 0.1;
 
-/// How the equations of all nodes were integrated.
+/// Integration of the equations of all nodes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NodalIntegration {
-    /// Rows of the model.
+    /// Number of rows of the model.
     pub rows: usize,
-    /// With the tolerance, or the step that was taken.
+    /// Scheme, with the tolerance or the step that was used.
     pub scheme: Scheme,
-    /// Steps taken.
+    /// Number of steps.
     pub steps: u64,
-    /// What steps of twice the length make of the motion, over the tolerances of the scene: an upper estimate
-    /// of the error of the integration. `None` where the scene gives the step, as of all candidates, or the
-    /// tolerance.
+    /// Change of the motion by steps of twice the length, over the tolerances of the scene: an upper estimate of the
+    /// integration error. `None` if the scene states the step or the tolerance.
     pub error: Option<f64>,
 }
 
-/// The motion of all nodes of a model, in the places where those of bodies of it are to be looked at.
+/// Motion of all nodes of a model, evaluated like the motions of its bodies.
 #[derive(Debug, Clone)]
 pub struct NodalReference<'m> {
     model: &'m FeModel,
@@ -45,11 +44,11 @@ pub struct NodalReference<'m> {
 }
 
 impl<'m> NodalReference<'m> {
-    /// Refuses, before any work, what the nodal equations do not have, and more work than is allowed for the
-    /// motion of `body`.
+    /// Refuses, before any work, a scene that the nodal equations do not support, or whose motion of `body` needs more
+    /// work than allowed.
     ///
     /// # Errors
-    /// FB801 for geometric stiffness; FB212 for places that the model does not have; FB604.
+    /// FB801 for geometric stiffness; FB212 for points that the model does not have; FB604 for too much work.
     pub fn refuse(model: &FeModel, body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<()> {
         let stiffened =
             body.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)));
@@ -61,7 +60,7 @@ impl<'m> NodalReference<'m> {
             nodal_point(model, place)?;
         }
         let effort = Effort::new(model, scene, body.n_modes());
-        // At the least the first mode counts.
+        // The first mode counts at least.
         let first = body.modes().eigenvalue[0].sqrt();
         let liveliest = match scene.run.scheme {
             Scheme::Adaptive { .. } => first,
@@ -71,16 +70,15 @@ impl<'m> NodalReference<'m> {
         effort.refuse_long(seconds, context.longest)
     }
 
-    /// Integrates the unreduced equations of `model` in `scene` from where `motion`, that of a body of the
-    /// model, starts.
+    /// Integrates the unreduced equations of `model` in `scene`, from the initial state of `motion`, the motion of a
+    /// body of the model.
     ///
-    /// A scene with a method of implicit steps gets these steps. One with error control gets them from the
-    /// explicit method, or where that takes long in implicit steps that are halved until they no longer
-    /// change what is measured.
+    /// A scene with implicit steps is integrated with these steps. A scene with error control is integrated with the
+    /// explicit method or, if this takes long, with implicit steps that are halved until the measured change is small.
     ///
     /// # Errors
-    /// Those of [`NodalReference::refuse`], FB801 for models without nodal equations, FB601; FB540 when the
-    /// integration cannot go on.
+    /// The errors of [`NodalReference::refuse`], FB801 for models without nodal equations, FB601 for too little memory;
+    /// FB540 if the integration fails.
     pub fn new(
         model: &'m FeModel,
         body: &FlexBody,
@@ -89,7 +87,7 @@ impl<'m> NodalReference<'m> {
         context: &Context<'_>,
     ) -> Result<Self> {
         let effort = Effort::new(model, scene, body.n_modes());
-        // Modes that count less need no steps of their own to begin with.
+        // Modes of small amplitude do not need steps of their own at first.
         let liveliest = liveliest_rate(body, scene, motion, 1.0).max(body.modes().eigenvalue[0].sqrt());
         let (way, seconds) = effort.plan(scene, motion.scheme, liveliest);
         effort.refuse_long(seconds, context.longest)?;
@@ -125,12 +123,12 @@ impl<'m> NodalReference<'m> {
         }
     }
 
-    /// Where the motion is looked at.
+    /// Returns the instants of the motion.
     pub fn time(&self) -> &[f64] {
         &self.seen.trace.time
     }
 
-    /// How it was integrated.
+    /// Returns the scheme, the steps and the error of the integration.
     pub fn integration(&self) -> NodalIntegration {
         let Trace { scheme, work, .. } = &self.seen.trace;
         NodalIntegration {
@@ -141,7 +139,7 @@ impl<'m> NodalReference<'m> {
         }
     }
 
-    /// The warning about steps that still count when no more of them were allowed.
+    /// Returns a warning if the step error was still large when no further halving was allowed.
     pub fn warning(&self) -> Option<Diagnostic> {
         let error = self.error.filter(|error| error.is_nan() || *error > WORTH_A_WORD)?;
         let message = format!(
@@ -152,11 +150,11 @@ impl<'m> NodalReference<'m> {
         Some(Diagnostic::new(Code::ReferenceLacks, message).with_help(help))
     }
 
-    /// Errors of the motion of `body`, which was looked at where this one was; `None` when it is no body of
-    /// the model.
+    /// Returns the errors of the motion of `body`, evaluated at the instants of this motion; `None` if the body has
+    /// other rows than the model.
     ///
     /// # Panics
-    /// When it was looked at elsewhere.
+    /// If the motion was evaluated at other instants.
     pub fn errors(&self, body: &FlexBody, candidate: &Trace) -> Option<ErrorHistory> {
         let vectors = body.vectors_of(self.model)?;
         let own = |first: usize, count: usize| Seen::of_modes(vectors.as_ref(), candidate, first, count);
@@ -164,7 +162,7 @@ impl<'m> NodalReference<'m> {
     }
 }
 
-/// Implicit steps that are halved until they no longer count.
+/// Implicit integration with steps that are halved until the change is small.
 struct Halving<'h, 'm> {
     model: &'m FeModel,
     staged: &'h Staged<'m>,
@@ -174,8 +172,8 @@ struct Halving<'h, 'm> {
 }
 
 impl Halving<'_, '_> {
-    /// The motion with the shortest steps, looked at where the first ones of length `step` end, and what
-    /// twice their length changes of it over the tolerances of the scene.
+    /// Returns the motion with the shortest steps, at the ends of the first steps of length `step`, and its change
+    /// against steps of twice the length, over the tolerances of the scene.
     fn run(&self, step: f64, context: &Context<'_>) -> Result<(Seen, f64)> {
         let tolerance = &self.staged.scene.requirements.tolerance;
         let is_allowed = |parts| self.effort.is_allowed(ORDER, step, parts, self.longest);
@@ -184,8 +182,9 @@ impl Halving<'_, '_> {
         let mut refinement = 2 * parts;
         loop {
             let mut fine = self.staged.implicit(ORDER, step, refinement, self.end, context)?;
-            // Ends of the same steps, whose times differ by rounding.
+            // The instants are equal except for rounding.
             fine.trace.time.clone_from(&coarse.trace.time);
+            // Error of the coarser steps, relative to the finer ones.
             let scale = fine.largest_deflection(self.model);
             let own = |first: usize, count: usize| coarse.displacements().subcols(first, count).to_owned();
             let error = fine.errors(self.model, &coarse.trace, scale, own).largest().worst(tolerance);
@@ -198,8 +197,8 @@ impl Halving<'_, '_> {
     }
 }
 
-/// The motion `in_parts` of a step, as few as can be solved for and do not take longer than is allowed, and
-/// how many these are.
+/// Returns the motion with the fewest parts per step for which the implicit equations can be solved within the time
+/// limit, and this number of parts. `in_parts` receives the number of parts and integrates.
 fn divided(
     mut in_parts: impl FnMut(u32) -> Result<Seen>,
     is_allowed: impl Fn(u32) -> bool,

@@ -1,4 +1,4 @@
-//! The motion of all nodes, as errors are measured against it.
+//! Motion of all nodes in the form in which errors are measured against it.
 
 use faer::{Mat, MatRef};
 use flexbody_linalg::{combine, larger, multiply, not_negative};
@@ -7,24 +7,23 @@ use flexbody_motion::dynamics::{NodalEvaluation, NodalMotion, NodalPoint};
 use flexbody_motion::integration::{Failure, Work};
 use flexbody_motion::scene::{Apart, ErrorHistory, Extremes, Peak, Scheme, Trace};
 
-/// Instants whose errors are computed together.
+/// Number of instants whose errors are computed together.
 const BLOCK: usize = 256;
 
-/// Displacements, and what a [`Trace`] has of a motion.
+/// Displacements of all rows, with the data of a [`Trace`].
 #[derive(Debug, Clone)]
 pub(super) struct Seen {
-    /// Displacements (N of every instant), rows and axes of the model.
+    /// Displacements (N x instants), in rows and axes of the model.
     displacements: Vec<f64>,
     rows: usize,
-    /// Without modal coordinates.
+    /// Trace without modal coordinates.
     pub trace: Trace,
     spin: Peak,
     internal: Peak,
 }
 
 impl Seen {
-    /// Nothing yet of a motion of `rows` rows that goes as that of a body, `motion`, which was integrated in
-    /// another way.
+    /// Creates an empty motion of `rows` rows with the layout of `motion`, the trace of a body.
     pub(super) fn new(rows: usize, motion: &Trace) -> Self {
         let trace = Trace {
             scheme: motion.scheme,
@@ -43,7 +42,8 @@ impl Seen {
         Self { displacements: Vec::new(), rows, trace, spin: Peak::default(), internal: Peak::default() }
     }
 
-    /// Sees the state at a time, and the points that are `watched`. `room` has N entries.
+    /// Records the state at a time, and the displacements of the `watched` points. `room` is scratch space of N
+    /// entries.
     pub(super) fn see<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)>(
         &mut self,
         time: f64,
@@ -53,6 +53,7 @@ impl Seen {
         room: &mut [f64],
     ) -> Result<(), Failure> {
         let trace = &mut self.trace;
+        // Only reactions need the accelerations.
         match &mut trace.reactions {
             Some(reactions) => {
                 motion.accelerations(time, state, room)?;
@@ -69,6 +70,7 @@ impl Seen {
             path.push(to_frame * point.displacement(u));
         }
         let now = evaluation.configuration();
+        // Internal energy: total energy without that of the centre of mass, P^2 / (2m).
         let flight = 0.5 * evaluation.momenta().0.norm_squared() / trace.size.0;
         let energy = evaluation.equations().elastic_energy(u);
         self.spin.see(time, now.omega.norm());
@@ -79,26 +81,26 @@ impl Seen {
         Ok(())
     }
 
-    /// Ends the motion.
+    /// Completes the motion with its scheme, work and extremes.
     pub(super) fn finish(&mut self, scheme: Scheme, work: Work) {
         let extremes =
             Extremes { spin: self.spin.value, internal: self.internal.value.powi(2), ..Extremes::default() };
         self.trace = Trace { scheme, work, extremes, ..self.trace.clone() };
     }
 
-    /// Displacements (N x instants).
+    /// Returns the displacements (N x instants).
     pub(super) fn displacements(&self) -> MatRef<'_, f64> {
         MatRef::from_column_major_slice(&self.displacements, self.rows, self.trace.time.len())
     }
 
-    /// Length of the longest displacement of any node at any instant.
+    /// Returns the largest displacement of any node at any instant.
     pub(super) fn largest_deflection(&self, model: &FeModel) -> f64 {
         let lengths = self.displacements.chunks_exact(self.rows).map(|u| longest(model, u));
         Peak::of(&self.trace.time, lengths).value
     }
 
-    /// Errors of `candidate` with the displacements `of` (N x count) from an instant on, relative to this
-    /// motion.
+    /// Returns the errors of `candidate` relative to this motion. `of` receives the first instant and a count, and
+    /// returns the displacements of the candidate there (N x count).
     pub(super) fn errors(
         &self,
         model: &FeModel,
@@ -110,6 +112,7 @@ impl Seen {
         let instants = self.trace.time.len();
         for first in (0..instants).step_by(BLOCK) {
             let count = BLOCK.min(instants - first);
+            // Elastic energy and largest displacement of the difference.
             let difference = of(first, count) - self.displacements().subcols(first, count);
             let mut forces = Mat::zeros(difference.nrows(), count);
             multiply(model.stiffness(), 1, difference.as_ref(), forces.as_mut());
@@ -123,14 +126,15 @@ impl Seen {
         ErrorHistory::new(&self.trace, candidate, &Apart { energy, deflection, largest_deflection })
     }
 
-    /// Displacements of a body with the shapes `vectors` (N x nf) along a motion.
+    /// Returns the displacements of a body with the shapes `vectors` (N x nf), at `count` instants of a motion from
+    /// `first` on.
     pub(super) fn of_modes(vectors: MatRef<'_, f64>, motion: &Trace, first: usize, count: usize) -> Mat<f64> {
         let q = Mat::from_fn(vectors.ncols(), count, |j, i| motion.q[first + i][j]);
         combine(vectors, q.as_ref())
     }
 }
 
-/// Length of the longest displacement of a node.
+/// Returns the largest displacement of a node.
 fn longest(model: &FeModel, u: &[f64]) -> f64 {
     let d = model.dimension();
     let squares = u[..d * model.nodes().len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());

@@ -1,4 +1,4 @@
-//! All nodes of a model in a scene, ready to be integrated.
+//! Equations of all nodes of a model in a scene, prepared for integration.
 
 use super::seen::Seen;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -12,44 +12,45 @@ use flexbody_motion::dynamics::{
 use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, Sight, integrate_closely};
 use flexbody_motion::scene::{Axes, Driving, Load, Scene, Scheme, Trace, damped, nodal_point};
 
-/// What is left of the stages of implicit steps, in the scales of the motion: far below the errors of bodies
-/// that are told, far above rounding.
+/// Residual of the implicit stages, relative to the scales of the motion: far below the errors that are reported, far
+/// above rounding.
 const SOLVED: f64 = 1e-11;
 
-/// The equations of all nodes in a scene, with the damping of the modes of a body.
+/// Equations of all nodes in a scene, with the modal damping of a body.
 pub(super) struct Staged<'a> {
     pub equations: NodalEquations<'a>,
     pub scene: &'a Scene,
     loads: Vec<(NodalPoint, &'a Load)>,
     pub watched: Vec<NodalPoint>,
     driving: Driving<'a>,
-    /// State at the start.
+    /// Initial state.
     start: Vec<f64>,
-    /// The motion of the body.
+    /// Motion of the body.
     motion: &'a Trace,
 }
 
-/// The error for what the nodal equations do not have.
+/// Returns the error for a scene that the nodal equations do not support.
 pub(super) fn refused(what: impl std::fmt::Display) -> Error {
     let diagnostic = Diagnostic::new(Code::Usage, format!("--reference nodal: {what}"));
     diagnostic.with_help("take --reference full").into()
 }
 
-/// Why an integration of `scene` ended.
+/// Returns the error for an integration of `scene` that failed.
 fn stopped(scene: &Scene, failure: Failure) -> Error {
     let message = format!("the nodal reference of `{}` stopped: {failure}", scene.name);
     Diagnostic::new(Code::SimulationStopped, message).into()
 }
 
 impl<'a> Staged<'a> {
-    /// `model` in `scene`, both in the frame of `body`, a body of the model whose motion starts as `motion`
-    /// does.
+    /// Prepares `model` in `scene`, both in the frame of `body`, a body of the model. The initial state is that of
+    /// `motion`.
     pub(super) fn new(
         model: &'a FeModel,
         body: &FlexBody,
         scene: &'a Scene,
         motion: &'a Trace,
     ) -> Result<Self> {
+        // The frame of a carried body is fixed to its carrier; that of a free body has mean axes.
         let conditions = match &scene.carried {
             Some(carried) => ReferenceConditions::AtRest(nodal_point(model, &carried.by)?),
             None => ReferenceConditions::MeanAxes,
@@ -71,6 +72,7 @@ impl<'a> Staged<'a> {
             scene,
             motion,
         };
+        // Initial state: that of the modal motion, or the static deformation of the model.
         let modes =
             NodalModes::new(&staged.equations, body).ok_or_else(|| refused("the body has other rows"))?;
         let mut start = modes.lift(&motion.start);
@@ -83,7 +85,7 @@ impl<'a> Staged<'a> {
         Ok(staged)
     }
 
-    /// The system that is integrated.
+    /// Returns the system of equations that is integrated.
     pub(super) fn system<'s>(&'s self) -> NodalMotion<'s, impl FnMut(f64, &mut NodalEvaluation<'s>) + 's> {
         let motion = NodalMotion::new(&self.equations, |time, evaluation: &mut NodalEvaluation<'s>| {
             self.act(time, evaluation);
@@ -112,7 +114,7 @@ impl<'a> Staged<'a> {
         }
     }
 
-    /// Integrates with the explicit method and sees the motion at `instants`.
+    /// Integrates with the explicit method, and records the motion at `instants`.
     pub(super) fn explicit(&self, tolerance: f64, instants: &[f64], context: &Context<'_>) -> Result<Seen> {
         let end = instants.last().copied().unwrap_or(0.0);
         let method = Method::Explicit(Explicit::new(self.start.len(), tolerance, end));
@@ -120,8 +122,8 @@ impl<'a> Staged<'a> {
         self.integrate(method, scheme, instants, context, |sight| sight == Sight::Instant)
     }
 
-    /// Integrates to `end` with the collocation of an `order` in steps of at most `step`, each divided into
-    /// `refinement`, and sees the motion at the ends of the undivided steps and at both sides of every break.
+    /// Integrates to `end` by collocation of the given order, in steps of at most `step`, each divided into
+    /// `refinement` parts. Records the motion at the ends of the undivided steps and at both sides of every break.
     pub(super) fn implicit(
         &self,
         order: usize,
