@@ -1,11 +1,11 @@
-//! Linear conditions solved for some of their unknowns.
+//! Solution of linear conditions for some of their unknowns.
 
 use faer::Mat;
 
-/// The reduced echelon form \[1, W\] of a matrix A (r x n) with its columns in another order: of the rank of A, with
-/// pivots that are the largest entries left.
+/// Reduced echelon form \[1, W\] of a matrix A (r x n) with reordered columns. Its number of rows is the
+/// rank of A; the pivots are found by complete pivoting.
 pub(super) struct Echelon {
-    /// Columns of A of the unit matrix, and all others.
+    /// Columns of A that form the unit matrix, and all others.
     pub pivots: Vec<usize>,
     pub others: Vec<usize>,
     /// W (rank x others).
@@ -13,10 +13,10 @@ pub(super) struct Echelon {
 }
 
 impl Echelon {
-    /// Pivots below this part of the first one are rounding.
+    /// Pivots below this part of the first pivot count as rounding.
     const ROUNDING: f64 = 1e-9;
 
-    /// The form of `a`.
+    /// Computes the echelon form of `a`.
     pub(super) fn new(mut a: Mat<f64>) -> Self {
         let (r, columns) = (a.nrows(), a.ncols());
         let mut pivots: Vec<usize> = Vec::new();
