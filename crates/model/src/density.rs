@@ -99,18 +99,21 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(own, _)| own).is_ok();
     let mut near = coupled(node);
     near.retain(|&j| (j as usize) < n);
+    // Nodes with rotations, bars and crowded nodes are not evaluated.
     if turns(node as u32) || near.iter().any(|&j| turns(j)) || near.is_empty() {
         return None;
     }
     if near.len() > COUPLED || near.iter().all(|&j| is_bar(body, node, j as usize)) {
         return None;
     }
+    // Coupling among the neighbours as bit masks.
     let mask = |i: &u32| {
         let others = coupled(*i as usize);
         let shared = near.iter().enumerate().filter(|(_, other)| others.binary_search(other).is_ok());
         shared.fold(0u64, |mask, (bit, _)| mask | 1 << bit)
     };
     let adjacent: Vec<u64> = near.iter().map(mask).collect();
+    // Every maximal clique with the node is an element around it.
     let mut cliques = Vec::new();
     if !maximal_cliques(&adjacent, 0, (1 << near.len()) - 1, 0, &mut cliques) {
         return None;

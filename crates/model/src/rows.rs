@@ -148,6 +148,7 @@ impl Rows {
         if self.rotations.is_empty() && self.others.is_empty() {
             return connected_components(matrices, self.dimension);
         }
+        // Components of single rows first, then union of those that share a vertex.
         let by_row = connected_components(matrices, 1);
         let mut root: Vec<usize> = (0..by_row.iter().max().map_or(0, |last| last + 1)).collect();
         let find = |root: &[usize], mut c: usize| {
@@ -167,6 +168,7 @@ impl Rows {
                 }
             }
         }
+        // Number the components in the order of their first vertices.
         let mut number = vec![usize::MAX; root.len()];
         let mut count = 0;
         let numbered = |&c: &usize| {

@@ -52,11 +52,13 @@ impl Basis for CraigBampton {
         check_possible(model, settings, context)?;
         let joints = coupled_interfaces(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
+        // Fixed-interface modes and constraint modes.
         let parts = Parts::new(model, &joints, settings, context)?;
         let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref());
         context.phase("pseudo-free-surface modes");
         let failed = |failure| explain(model, failure);
+        // Remove rigid motion and dependent shapes.
         let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
         let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
@@ -65,6 +67,7 @@ impl Basis for CraigBampton {
         if found.kept.is_empty() {
             return Err(nothing_deforms().into());
         }
+        // Solve the small eigenproblem in the span.
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
         let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
         let span = found.vectors;
@@ -74,6 +77,7 @@ impl Basis for CraigBampton {
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
+        // Memory of the dense shapes counts if it exceeds that of the search.
         let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
         solution.plan = parts.fixed.plan.map(|plan| plan.with_bytes(|search| search.max(bytes)));
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;

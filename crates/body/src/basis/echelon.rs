@@ -22,6 +22,7 @@ impl Echelon {
         let mut pivots: Vec<usize> = Vec::new();
         let mut first = 0.0;
         for step in 0..r.min(columns) {
+            // Largest entry among the remaining rows and columns.
             let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
             let open = places.filter(|(_, j)| !pivots.contains(j));
             let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
@@ -31,6 +32,7 @@ impl Echelon {
             if a[(i, j)].abs() <= Self::ROUNDING * first {
                 break;
             }
+            // Exchange rows, scale the pivot row, and eliminate its column in all other rows.
             for column in 0..columns {
                 let (upper, lower) = (a[(step, column)], a[(i, column)]);
                 (a[(step, column)], a[(i, column)]) = (lower, upper);
@@ -43,6 +45,7 @@ impl Echelon {
             }
             pivots.push(j);
         }
+        // The remaining columns are W.
         let others: Vec<usize> = (0..columns).filter(|j| !pivots.contains(j)).collect();
         let weights = Mat::from_fn(pivots.len(), others.len(), |i, j| a[(i, others[j])]);
         Self { pivots, others, weights }

@@ -26,11 +26,13 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
     let motions = massless_motions(model);
     let work = |load: &[f64]| -> Vec<f64> { motions.iter().map(|motion| work_on(motion, load)).collect() };
     let is_loaded = |j: &usize| work(loads.col_as_slice(*j)).iter().any(|work| *work != 0.0);
+    // Only loads that do work on massless motions change.
     let loaded: Vec<usize> = (0..loads.ncols()).filter(is_loaded).collect();
     if loaded.is_empty() {
         return Ok(loads);
     }
     let stiffness = model.stiffness();
+    // Factor Z'K Z; it must be regular.
     let factor =
         SparseLdl::new(&stiffness_of(stiffness, &motions), 0.0).filter(|own| own.null_rows().is_empty());
     let Some(factor) = factor else {
@@ -40,6 +42,7 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
     };
     let mut scratch = vec![0.0; motions.len()];
     for j in loaded {
+        // Amplitudes (Z'K Z)^-1 Z'f, then f - K Z times them.
         let mut amplitudes = work(loads.col_as_slice(j));
         factor.solve_in_place(1, &mut amplitudes, &mut scratch);
         let load = contiguous_mut(loads.col_mut(j));

@@ -201,6 +201,7 @@ fn in_equilibrium(
     }
     let motions = side_by_side(&without_mass.iter().map(Mat::as_ref).collect::<Vec<_>>());
     let forces = pencil.apply_stiffness(motions.as_ref());
+    // K-orthonormalise Z, without directions of rounding.
     let energy = gram(motions.as_ref(), forces.as_ref());
     let sizes: Vec<f64> = (0..energy.nrows()).map(|j| energy[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = Mat::from_fn(sizes.len(), sizes.len(), |i, j| energy[(i, j)] / (sizes[i] * sizes[j]));
@@ -210,10 +211,13 @@ fn in_equilibrium(
     let unit = Mat::from_fn(sizes.len(), kept.len(), unit);
     let (motions, forces) =
         (combine(motions.as_ref(), unit.as_ref()), combine(forces.as_ref(), unit.as_ref()));
+    // V - Z Z'K V.
     let part = gram(forces.as_ref(), vectors.as_ref());
     subtract_combination(vectors.as_mut(), motions.as_ref(), part.as_ref());
+    // M-orthogonal to rigid motion again.
     let along = gram(rigid, pencil.apply_mass(vectors.as_ref()).as_ref());
     subtract_combination(vectors.as_mut(), rigid, along.as_ref());
+    // M-orthonormal again, in the order of the columns.
     let mut products = pencil.apply_mass(vectors.as_ref());
     for j in 0..vectors.ncols() {
         let (vector, _) = beside_first(j, &vectors, &products, j);

@@ -75,6 +75,7 @@ impl Interface {
                 (Some(row), Some(rotation)) => rotation[(3 * self.nodes[row / 3] + row % 3, j)],
                 _ => shape[(3 * self.nodes[row / d] + row % d, j)],
             });
+        // Best-fitting rigid motion, and the deviation of the displacements from it.
         let q = motion.fit(all.as_ref());
         let u = all.as_ref().subrows(0, d * k).to_owned();
         let left = &u - combine(motion.rigid().subrows(0, d * k), q.as_ref());

@@ -142,10 +142,12 @@ fn gram_block(
             for first in nodes.clone().step_by(CHUNK) {
                 let chunk = first..(first + CHUNK).min(nodes.end);
                 let rows = chunk.len();
+                // Rows of the chunk of X, column-wise.
                 by_column(columns, chunk.clone(), left.subrows_mut(0, rows));
                 with_fma(
                     #[inline(always)]
                     || {
+                        // Ms X of the chunk in double-double arithmetic.
                         for (target, i) in product.iter_mut().zip(chunk) {
                             let (mut hi, mut lo) = ([0.0; WIDTH], [0.0; WIDTH]);
                             let (neighbours, values) = mass.row(i);
@@ -154,6 +156,7 @@ fn gram_block(
                             }
                             *target = [hi, lo];
                         }
+                        // Add the products X' (Ms X) of the chunk.
                         for (c, sum) in sums.iter_mut().enumerate() {
                             let [mut hi, mut lo] = *sum;
                             for (&a, [y, z]) in left.col_as_slice(c)[..rows].iter().zip(&product) {
@@ -167,6 +170,7 @@ fn gram_block(
             sums
         })
         .collect();
+    // Add the groups in a fixed order: the result does not depend on the number of threads.
     let mut total = vec![[DoubleDouble::default(); WIDTH]; n_left];
     for part in &partial {
         for (sum, [hi, lo]) in total.iter_mut().zip(part) {

@@ -253,12 +253,14 @@ impl Products {
     fn in_space(&self, modal_stiffness: Mat<f64>) -> Invariants {
         let (g, nf) = (&self.gram, self.nf);
         let (mass, first_moment, second_moment) = self.rigid_inertia();
+        // Ibar from B_x' M B_j and B_x' M psi_j.
         let ibar: Vec<Matrix3<f64>> = (0..nf)
             .map(|j| {
                 let half = Matrix3::from_fn(|k, b| g[(3 + k, self.turned(b, j))]);
                 ibar_of(&half, &Vector3::from_fn(|k, _| g[(3 + k, self.mode(j))]))
             })
             .collect();
+        // S from W2 = B_i' M B_j.
         let mut s = [(); 3].map(|()| [(); 3].map(|()| Mat::zeros(nf, nf)));
         for i in 0..nf {
             for j in 0..nf {

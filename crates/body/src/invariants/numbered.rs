@@ -70,6 +70,7 @@ impl Invariants {
         let nf = numbered.i8.len();
         let Numbered { i5, i6, i8, i9, .. } = numbered;
         let groups = TermGroups { w2: i9.is_some(), w3: i5.is_some(), ..numbered.groups };
+        // Invert the formulas of I8 (Ibar) and I9 (S).
         let ibar = |k: usize, l: usize| {
             let entry = |i8: &Matrix3<f64>| if k == l { 0.5 * i8.trace() } else { 0.0 } - i8[(l, k)];
             i8.iter().map(entry).collect()
@@ -92,6 +93,7 @@ impl Invariants {
             general: None,
             groups,
         });
+        // Compare I6 and I5 with the values that follow from S.
         let solid = (body.modal_mass(), body.w3());
         let bound = CauchySchwarz::of(&body);
         let apart = |own: &Mat<f64>, told: &Mat<f64>| {
@@ -104,6 +106,7 @@ impl Invariants {
         };
         let differs =
             apart(&solid.0, i6) || solid.1.zip(i5.as_ref()).is_some_and(|(own, told)| apart(&own, told));
+        // The mass does not commute with rotations: store I5 and I6 themselves.
         if differs {
             body.0.general = Some(GeneralTerms {
                 w0: body.w0(),

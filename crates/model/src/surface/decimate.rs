@@ -190,6 +190,7 @@ impl Decimation {
 
     fn collapse(&mut self, from: u32, to: u32) {
         let moved = std::mem::take(&mut self.at_node[from as usize]);
+        // Remove the triangles that contain both nodes; the others move to `to`.
         for t in moved {
             let corners = &mut self.triangles[t as usize];
             if !corners.contains(&from) {
@@ -203,6 +204,7 @@ impl Decimation {
                 self.at_node[to as usize].push(t);
             }
         }
+        // Feature edges follow the node.
         for other in std::mem::take(&mut self.features[from as usize]) {
             let of_other = &mut self.features[other as usize];
             of_other.retain(|node| *node != from && *node != to);
@@ -212,6 +214,7 @@ impl Decimation {
                 self.features[to as usize].push(other);
             }
         }
+        // The error accumulates; moves that were rated before are outdated.
         let error = self.error[from as usize];
         self.error[to as usize] += error;
         self.changes[to as usize] += 1;

@@ -127,6 +127,7 @@ impl<'a> Evaluation<'a> {
         let body = self.equations;
         let nf = body.nf;
         let q = &self.q[..];
+        // Terms linear in q: first moment, lever -c~ + W0 Q, and I0 + W1 Q.
         let mut linear_q = [0.0; WIDTH];
         body.linear_panels.times(q, &mut linear_q);
         self.first_moment = body.first_moment + Vector3::from_fn(|k, _| linear_q[C1 + k]);
@@ -135,12 +136,14 @@ impl<'a> Evaluation<'a> {
         for (pair, &axes) in PAIRS.iter().enumerate() {
             add_symmetric(&mut self.inertia, axes, linear_q[W1 + pair]);
         }
+        // I(q) += Q' W2 Q.
         if let Some(w2) = &body.w2 {
             w2.times(q, &mut self.w2_q);
             for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
                 add_symmetric(&mut self.inertia, pair, dot(q, product));
             }
         }
+        // C1(q) and C(q), with K^a q in the rows of C1 and W3' q in those of C.
         self.coupling.copy_from_slice(&body.linear[C1 * nf..]);
         if let Some(accelerated) = &body.accelerated {
             accelerated.times(q, &mut self.accelerated_q);
@@ -176,11 +179,13 @@ impl<'a> Evaluation<'a> {
         let body = self.equations;
         let nf = body.nf;
         let qd = &self.qd[..];
+        // Rates of the terms linear in q.
         let mut linear_qd = [0.0; WIDTH];
         body.linear_panels.times(qd, &mut linear_qd);
         self.c1_qd = Vector3::from_fn(|k, _| linear_qd[C1 + k]);
         self.lever_rate = Matrix3::from_fn(|k, b| linear_qd[W0 + 3 * k + b]);
         let mut c1_rate_qd = Vector3::zeros();
+        // Geometric stiffness: rate q' K^a qd of the first moment, and qd' K^a qd.
         if let Some(accelerated) = &body.accelerated {
             accelerated.times(qd, &mut self.accelerated_qd);
             let mut rate = Vector3::zeros();
@@ -191,6 +196,7 @@ impl<'a> Evaluation<'a> {
             self.c1_qd += rate;
             self.lever_rate -= rate.cross_matrix();
         }
+        // Rate of I(q): W1 Qd + 2 Q' W2 Qd.
         self.inertia_rate = Matrix3::zeros();
         for (pair, &axes) in PAIRS.iter().enumerate() {
             add_symmetric(&mut self.inertia_rate, axes, linear_qd[W1 + pair]);

@@ -249,12 +249,14 @@ impl Evaluation<'_> {
         }
         for i in 0..nf {
             let row = &mut by_q[(r + i) * nf..][..nf];
+            // -omega' E_ij omega.
             if let Some(w2) = &body.w2 {
                 for (at, &pair) in body.pairs.iter().enumerate() {
                     let factor = spin_product(w, pair);
                     row.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
                 }
             }
+            // K^a_ij . (V' + omega x V).
             if let Some(accelerated) = &body.accelerated {
                 for k in 0..body.translations() {
                     row.iter_mut()
@@ -262,6 +264,7 @@ impl Evaluation<'_> {
                         .for_each(|(sum, e)| *sum += linear[k] * e);
                 }
             }
+            // alpha' (W3)_ji, and sum_a omega_a (W3_a' - W3_a) by qd.
             if let Some(w3) = &body.w3 {
                 for (at, &a) in body.axes.iter().enumerate() {
                     for (j, transposed) in w3.row(at * nf + i).enumerate() {

@@ -182,6 +182,7 @@ impl<'m> NodalEquations<'m> {
         }
 
         let (_, length) = centre_and_length(&model.nodes().positions);
+        // The conditions fix the frame if C R is regular.
         let conditions_rigid = products(&rigid, &columns, moving);
         let independent = match conditions {
             ReferenceConditions::MeanAxes => true,
@@ -192,6 +193,7 @@ impl<'m> NodalEquations<'m> {
         };
         let rigid_part = conditions_rigid.transpose().try_inverse().filter(|_| independent);
         let rigid_part = rigid_part.ok_or(NodalError::ConditionsDependent)?;
+        // For mean axes C' = M R, so that M^-1 C' = R.
         let answered = match conditions {
             ReferenceConditions::MeanAxes => rigid.clone(),
             _ => answers(model, &factor, &columns, moving),

@@ -90,6 +90,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
             let state = body
                 .state(&settled)
                 .map_err(|_| lost("the deformation does not fulfil the reference conditions"))?;
+            // Residual M u'' with u' = 0, and the step (K + sigma M) x = M u'' + C'mu.
             self.accelerations(time, &state, &mut acceleration)?;
             body.weigh(&acceleration, &mut step);
             steps.solve(body, &mut step, &mut scratch);
@@ -98,6 +99,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
                 return Ok(settled);
             }
             settled.u.iter_mut().zip(&step).for_each(|(u, step)| *u += step);
+            // Accept a small step, or one at rounding level that no longer shrinks.
             let (size, largest) = (size(&step), size(&settled.u));
             if size <= SETTLED * largest || (size <= NEAR_ROUNDING * largest && size > 0.5 * before) {
                 return Ok(settled);
