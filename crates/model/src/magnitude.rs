@@ -24,7 +24,7 @@ pub(super) fn check_magnitudes(
     let far = nodes.positions.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let size = extents(&nodes.positions).into_iter().fold(0.0, f64::max);
     if [k, m, size].contains(&0.0) {
-        return None; // said by name elsewhere
+        return None; // other checks report zeros
     }
     let (stiffness_file, mass_file, nodes_file) = (&raw.stiffness.path, &raw.mass.path, &raw.nodes_path);
     let quantities = [

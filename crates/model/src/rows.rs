@@ -225,8 +225,8 @@ impl Rows {
         }
     }
 
-    /// Returns the rigid fields (one row per row of the model): unit translations, then rotations e_k x (x
-    /// - `centre`) / `length` with e_k / `length` at the rotations; in the plane those that stay in it.
+    /// Returns the rigid fields (one row per row of the model): unit translations, then rotations
+    /// e_k x (x - `centre`) / `length` with e_k / `length` at the rotations; in the plane those that stay in it.
     pub fn rigid_fields(&self, positions: &[[f64; 3]], centre: [f64; 3], length: f64) -> Mat<f64> {
         let (d, count) = (self.dimension, rigid_count(self.dimension));
         let mut fields = rigid_fields(positions, d, centre, length);

@@ -9,8 +9,8 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{combine, gram, side_by_side, subtract_combination};
 use nalgebra::DMatrix;
 
-/// Returns the responses x = (K - w^2 M)^-1 f to harmonic `loads` f (N x m) at w, and the responses y = (K
-/// - w^2 M)^-1 M x to their inertia, as \[x, y\]. With x and y in its basis, a reduced model has the exact
+/// Returns the responses x = (K - w^2 M)^-1 f to harmonic `loads` f (N x m) at w, and the responses
+/// y = (K - w^2 M)^-1 M x to their inertia, as \[x, y\]. With x and y in its basis, a reduced model has the exact
 /// transfer functions of the loads at w, and their slope. Returns `None` if w^2 is an eigenvalue to
 /// rounding.
 ///

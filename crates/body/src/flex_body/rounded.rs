@@ -28,7 +28,7 @@ impl FlexBody {
 
 /// Returns the nearest 32-bit float.
 fn nearest_f32(value: f64) -> f64 {
-    #[allow(clippy::cast_possible_truncation)] // what it is for
+    #[allow(clippy::cast_possible_truncation)] // rounding is the purpose
     let rounded = value as f32;
     f64::from(rounded)
 }

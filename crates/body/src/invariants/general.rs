@@ -351,7 +351,7 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
     (mass, Vector3::from_fn(|k, _| moment(k)), second_moment_of(&inertia))
 }
 
-/// Returns m and c from the matrix R'MR that [`rigid_inertia`] takes.
+/// Returns m and c from the matrix R'MR of unit translations and unit rotations R.
 pub fn rigid_first_moment(g: MatRef<'_, f64>) -> (f64, Vector3<f64>) {
     let (mass, first_moment, _) = rigid_inertia(g);
     (mass, first_moment)

@@ -6,7 +6,8 @@
 //! of the whole body, the stiffness of that motion is
 //!
 //! ```text
-//! K_jk = sum over the directors g_a . u_jk = sum over the nodes theta' H phi,   H = sym(G) - tr(G) I,   G = sum_a e_a g_a'
+//! K_jk = sum over the directors g_a . u_jk = sum over the nodes theta' H phi,
+//! H    = sym(G) - tr(G) I,   G = sum_a e_a g_a'
 //! ```
 //!
 //! with g_a = h_a e_k for the acceleration along e_k, e_k x z_a for the angular acceleration about e_k and

@@ -40,7 +40,8 @@ impl Evaluation<'_> {
     ///
     /// ```text
     /// dF/dq_j      = N_j alpha + omega x N_j omega
-    /// dtau/dq_j    = N_j^T V' + I_j alpha + (W3)_j qdd + 2 (E qd)_j omega + omega x (N_j^T V + I_j omega + (W3)_j qd) + V x N_j omega
+    /// dtau/dq_j    = N_j^T V' + I_j alpha + (W3)_j qdd + 2 (E qd)_j omega
+    ///                + omega x (N_j^T V + I_j omega + (W3)_j qd) + V x N_j omega
     /// dQ_i/dq_j    = alpha^T (W3)_ji - omega^T E_ij omega + (K_ff)_ij
     /// dF/dV        = m omega~
     /// dtau/dV      = dN^T - p~ + omega~ N^T + m V~

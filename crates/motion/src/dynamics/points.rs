@@ -121,7 +121,7 @@ impl BodyPoint {
     /// its nodes (theory 5.3). The point has an orientation if the nodes determine one. Geometric stiffness
     /// for forces and moments at the interface is included if `terms` contain it. Returns `None` for an
     /// interface without a reference point.
-    #[doc(hidden)] // As above.
+    #[doc(hidden)] // Its arguments are no part of the interface of the library.
     pub fn interface(body: &FlexBody, interface: &Interface, terms: Terms) -> Option<Self> {
         let (modes, nf) = (body.modes(), body.n_modes());
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
@@ -250,7 +250,8 @@ impl BodyPoint {
     /// Adds the derivatives of [`BodyPoint::add_force`]: with r_j = dr/dq_j
     ///
     /// ```text
-    /// dtau/dq_j = r_j x b,    dQ_i/dq_j = d2r/dq_i dq_j . b,    d/dphi = (b~, r~ b~, (dr/dq)'b~) of a force in world axes
+    /// dtau/dq_j = r_j x b,    dQ_i/dq_j = d2r/dq_i dq_j . b
+    /// d/dphi    = (b~, r~ b~, (dr/dq)'b~) of a force in world axes
     /// ```
     ///
     /// # Panics

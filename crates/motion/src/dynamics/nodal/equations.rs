@@ -47,7 +47,8 @@ const INDEPENDENT: f64 = 1e-8;
 /// solves and products with E.
 ///
 /// ```
-/// # fn check(model: &flexbody_model::FeModel, body: &flexbody_body::flex_body::FlexBody, start: &flexbody_motion::dynamics::Configuration)
+/// # fn check(model: &flexbody_model::FeModel, body: &flexbody_body::flex_body::FlexBody,
+/// # start: &flexbody_motion::dynamics::Configuration)
 /// # -> Result<(), Box<dyn std::error::Error>> {
 /// use flexbody_motion::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
 /// use flexbody_motion::integration::{Explicit, Failure, Method, integrate};

@@ -17,7 +17,8 @@ const NOTHING: f64 = 1e-9;
 /// with the diagonal of M) plus the elastic energy, and n entries of y, the scales are
 ///
 /// ```text
-/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    G, D: length / sqrt(n)    e: 1 / sqrt(n)
+/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)
+/// G, D: length / sqrt(n)    e: 1 / sqrt(n)
 /// ```
 ///
 /// so that the mean square of error over scale is the energy of the error relative to E, with the diagonals
@@ -25,8 +26,8 @@ const NOTHING: f64 = 1e-9;
 /// at rest E is the energy of a deformation by 1e-9 of its size; for a driven body the energy of its spin
 /// is added.
 ///
-/// Implicit steps solve the stiff part, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of M + z D
-/// + z^2 K.
+/// Implicit steps solve the stiff part, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of
+/// M + z D + z^2 K.
 pub struct NodalMotion<'e, L> {
     pub(super) evaluation: NodalEvaluation<'e>,
     loads: L,

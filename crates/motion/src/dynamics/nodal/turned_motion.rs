@@ -28,8 +28,8 @@ impl NodalEvaluation<'_> {
     /// Computes V' and omega' in the axes of the frame, and u'' (N), with the `given` rates. Sets lambda,
     /// and the reaction of driving forces on the frame.
     ///
-    /// With the forces g on the rows and the drifts d and e of w and (p, h) at constant velocities, M(u) v = g - d
-    /// + C'(B'C')^-1 ((p', h') - e - B'(g - d)) for v = B (V', omega') + u''.
+    /// With the forces g on the rows and the drifts d and e of w and (p, h) at constant velocities, M(u) v =
+    /// g - d + C'(B'C')^-1 ((p', h') - e - B'(g - d)) for v = B (V', omega') + u''.
     pub(super) fn turned_accelerations(
         &mut self,
         given: &Given,
