@@ -303,8 +303,8 @@ fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) ->
 }
 
 /// Returns the largest relative distance of the Rayleigh quotient of a mode from the bounds of its
-/// eigenvalue; not positive if all quotients lie inside. Stored modes are rounded, so their quotients
-/// follow the eigenvalues to the limit of the other checks of modes.
+/// eigenvalue, zero if all quotients lie inside. Stored modes are rounded, so their quotients follow the
+/// eigenvalues to the limit of the other checks of modes.
 fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
     let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
     let modal_mass = own.modal_mass();

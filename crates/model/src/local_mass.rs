@@ -21,18 +21,20 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// diamond 15,000 to 20,000.
 const SPEEDS: (f64, f64) = (20.0, 25_000.0);
 
-/// Density (kg/m^3) above which materials are faster than the given speed of sound (m/s): lead has 3500,
-/// aluminium 8000; filled rubbers are lighter.
+/// Density (kg/m^3) above which no material has a speed of sound below [`SLOWEST_OF_HEAVY`]: filled rubbers
+/// are lighter.
 const HEAVY: f64 = 2500.0;
+/// Lower bound of that speed of sound (m/s): lead has 3500, aluminium 8000.
 const SLOWEST_OF_HEAVY: f64 = 1000.0;
 
 /// Row sum of a node, relative to its diagonal entry, below which it is too small to divide by.
 const MASSLESS: f64 = 0.01;
 
-/// Difference of the mass of a node from the mass expected from its stiffness, relative to the largest
-/// expected mass of its group: up to the first value the mass fits, above the second the mismatch is
-/// reported. Nodes of equal elements stay within 0.12 on all models in docs/plausibility.md.
+/// Largest difference of the mass of a node from the mass expected from its stiffness, relative to the
+/// largest expected mass of its group, for a mass that fits. Nodes of equal elements stay within 0.12 on all
+/// models in docs/plausibility.md.
 const FITS: f64 = 0.15;
+/// Smallest such difference that is reported.
 const MISFITS: f64 = 0.3;
 
 /// Stiffness and mass of every node.

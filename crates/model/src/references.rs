@@ -12,15 +12,15 @@ use std::collections::HashMap;
 const FARTHEST: f64 = 100.0;
 
 /// Distance of a reference point from the middle of its nodes, relative to the extent of the nodes, above
-/// which a warning is given. Nodes closer together than the second part of the body count as if they had
-/// that extent.
+/// which a warning is given.
 const REACH: f64 = 3.0;
+/// Smallest extent of the nodes of an interface, relative to the body, that [`REACH`] is applied to.
 const SMALLEST: f64 = 0.05;
 
 /// Distance of the default point of an interface from the mean of its nodes, relative to the largest
-/// distance between two of them, above which a warning is given; distances below the second part of the
-/// body are rounding.
+/// distance between two of them, above which a warning is given.
 const ASIDE: f64 = 0.01;
+/// Length, relative to the body, below which a distance or a coordinate counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// Replaces the definitions of reference points by positions, and adds errors for invalid ones.

@@ -8,9 +8,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Part of the stiffness of a motion above which the centrifugal term is significant.
 pub const SOFTENING: f64 = 0.01;
 
-/// Limit of the steps of the search for the worst axis, and the relative growth below which the search
-/// ends.
+/// Limit of the steps of the search for the worst axis.
 const STEPS: usize = 40;
+/// Relative growth of the softened part below which the search ends.
 const GROWTH: f64 = 1e-9;
 
 impl FlexBody {

@@ -7,8 +7,8 @@ use faer::Mat;
 use flexbody_linalg::{gram, larger};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-/// Largest difference between partial and full inertia relief, relative to the latter, for a load that
-/// counts as balanced.
+/// Largest difference between partial and full inertia relief, relative to the partial one, for a
+/// load that counts as balanced.
 const NEARLY_BALANCED: f64 = 1e-3;
 
 /// Part of the nodes, those with the smallest differences, that must carry the load: the others may be

@@ -6,8 +6,9 @@ use super::{Failure, System, Work};
 /// Safety factor: the next step is chosen for an error of this part of the tolerance.
 const SAFETY: f64 = 0.9;
 
-/// Largest reduction and growth of the step length at once.
+/// Smallest factor of the step length from one attempt to the next.
 const SHRINK: f64 = 1.0 / 3.0;
+/// Largest factor of the step length from one step to the next.
 const GROW: f64 = 6.0;
 
 /// Step length, relative to the time, below which a step does not advance the time.

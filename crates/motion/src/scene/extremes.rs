@@ -139,9 +139,9 @@ impl<'b> Survey<'b> {
     }
 }
 
-/// Largest number of angular velocities that are kept, and the cosine between two axes above which they
-/// count as one axis.
+/// Largest number of stored angular velocities.
 const AXES: usize = 32;
+/// Cosine between two axes from which on they count as one axis.
 const SAME_AXIS: f64 = 0.95;
 
 /// Largest angular velocities about distinct axes.

@@ -24,8 +24,9 @@ const UNSETTLED: f64 = 1e-2;
 /// turns about a perpendicular axis has a rate about this axis that is rounding.
 const SMALL_RATE: f64 = 1e-3;
 
-/// Tolerance and step length of the finer run, relative to those of the scene.
+/// Tolerance of the finer run, relative to that of the scene.
 const FINER_TOLERANCE: f64 = 1e-2;
+/// Step length of the finer run, relative to that of the scene.
 const FINER_STEP: f64 = 0.5;
 
 /// Finest tolerance requested from the adaptive method.

@@ -7,8 +7,9 @@ use crate::integration::Failure;
 use flexbody_linalg::{MatrixSum, SparseLdl, larger};
 use nalgebra::Matrix6;
 
-/// Limit of the steps, and the relative step size at which they end.
+/// Limit of the number of steps.
 const MOST_STEPS: usize = 300;
+/// Size of a step, relative to the largest displacement, at which the iteration ends.
 const SETTLED: f64 = 1e-12;
 
 /// Relative size below which steps that no longer shrink are rounding of K u.
