@@ -30,7 +30,7 @@ const CLIQUES: usize = 200;
 /// Root of the determinant of the covariance, relative to that of a ball with equal trace, below which
 /// nodes lie in a plane.
 const FLAT: f64 = 1e-6;
-/// Limit [`FLAT`] for four nodes: those of a curved membrane come close to a plane.
+/// Limit in place of [`FLAT`] for linear elements of four nodes: those of a curved membrane come close to a plane.
 const FLAT_FOUR: f64 = 0.02;
 
 /// Largest deviation of the squared Mahalanobis distance of a corner from that of an affine element.

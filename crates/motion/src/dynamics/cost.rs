@@ -20,7 +20,7 @@ impl EquationsOfMotion {
     /// | W2 | rows nf + 3 p nf |
     /// | W3 | 2 rows nf + 2 a nf; skew blocks of their own: rows nf more |
     /// | geometric stiffness for acceleration | 2 rows nf + 5 t nf |
-    /// | elimination of the modes | (r (r + 1) / 2 + 2 r) nf, and r + 2 solutions with a factor of m_ff unless it is the identity |
+    /// | elimination of the modes | (r (r + 1) / 2 + 2 r) nf, and r + 2 solutions with the factor of a full m_ff |
     /// | K_ff and D | 2 nf each, or nf (nf + 1) where they are full |
     ///
     /// Some hundred operations with 3-vectors and 6 x 6 matrices, independent of nf, and the forces of the
