@@ -1,16 +1,17 @@
-//! What is wrong with a set of arrays, collected: shapes, numbers and texts that no body may have.
+//! Collection of the errors in a set of arrays: shapes, numbers and texts that no body may have.
 
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::collections::HashSet;
 
-/// Invariants are sums of products: numbers beyond this overflow in them.
+/// Largest number allowed in the arrays: invariants are sums of products, which overflow beyond it.
 pub(crate) const LARGEST: f64 = 1e300;
 
-/// Longest name of an interface or lumping scheme in bytes: it names a group in the file.
+/// Longest name of an interface or lumping scheme in bytes, since the name becomes a group name in the
+/// file.
 const LONGEST_NAME: usize = 1000;
 
-/// The problems found so far.
+/// Errors found so far.
 #[derive(Default)]
 pub(crate) struct Problems(Vec<Diagnostic>);
 
@@ -31,7 +32,7 @@ impl Problems {
         self.0.push(Diagnostic::new(Code::BodySchema, message));
     }
 
-    /// Reports the first value that is not finite, or so large that what follows from it would not be.
+    /// Reports the first value that is not finite, or so large that results computed from it overflow.
     pub(crate) fn finite(&mut self, name: &str, values: impl IntoIterator<Item = f64>) {
         if let Some((i, v)) = values.into_iter().enumerate().find(|(_, v)| v.is_nan() || v.abs() > LARGEST) {
             self.add(format!(
@@ -54,7 +55,7 @@ impl Problems {
         self.finite(name, values(m.as_ref()));
     }
 
-    /// A text that the file can hold.
+    /// Reports a text that the file cannot hold.
     pub(crate) fn text(&mut self, name: &str, text: &str) {
         if text.contains('\0') {
             self.add(format!("`{name}` contains a NUL character, expected text"));

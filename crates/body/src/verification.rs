@@ -1,4 +1,5 @@
-//! A body against the model it was made of: every invariant and every mode recomputed from the matrices.
+//! Verification of a body against its model: every invariant and every mode is recomputed from the
+//! matrices.
 
 use crate::convert::{BodyModes, NodesInFrame, modal_damping, modal_geometric_stiffness, rigid_mass};
 use crate::flex_body::{FlexBody, Guarantee, ReferenceConditions, Storage};
@@ -18,34 +19,35 @@ use recounts::recounts;
 mod interfaces;
 mod recounts;
 
-/// Recomputed invariants agree to rounding of their sums, relative to their Cauchy-Schwarz bounds.
+/// Limit for recomputed invariants, relative to their Cauchy-Schwarz bounds: the rounding of their sums.
 const RECOMPUTED: f64 = 1e-12;
 
-/// Name of K_ff among the [`primary_differences`].
+/// Name of K_ff in [`primary_differences`].
 const STIFFNESS: &str = "modal_stiffness";
 
-/// What another evaluation of K psi may leave, in units of the rounding estimate eps | |K| |psi| |: the
-/// shapes were also turned into body axes and back.
+/// Allowed difference between two evaluations of K psi, in units of the rounding estimate eps | |K| |psi|
+/// |. The shapes were also turned to body axes and back.
 const ROUNDING: f64 = 30.0;
 
-/// Everything that must hold for `body` without its model: the identities of theory section 10, and the statements
-/// of the file that its own numbers can be held to.
+/// Evaluates all checks of `body` that need no model: the identities of theory section 10, and the
+/// consistency of the numbers stored in the file.
 pub fn own_identities(body: &FlexBody) -> Vec<IdentityCheck> {
     let mut checks = body.identities(frame_of(body));
     checks.extend(recounts(body));
     checks
 }
 
-/// What the frame of `body` was meant to be.
+/// Returns the intended frame of `body`, as recorded in its settings.
 fn frame_of(body: &FlexBody) -> BodyFrame {
     let name = body.source().settings["frame"].as_str();
     name.and_then(BodyFrame::from_name).unwrap_or(BodyFrame::Model)
 }
 
-/// Refuses a body that [`own_identities`] would not pass: what is written is what `flexbody check` accepts.
+/// Rejects a body that breaks one of [`own_identities`], so that every body written passes `flexbody
+/// check`.
 ///
 /// # Errors
-/// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one for every identity that does not hold.
+/// [`BodyUntrustworthy`](Code::BodyUntrustworthy), one diagnostic per identity that does not hold.
 pub fn accept(body: &FlexBody) -> Result<()> {
     let failed = own_identities(body).into_iter().filter(|check| !check.passed);
     let told: Vec<Diagnostic> = failed
@@ -63,7 +65,7 @@ pub fn accept(body: &FlexBody) -> Result<()> {
 /// Recomputes invariants, residuals and orthogonality of `body` from the matrices of `model`.
 ///
 /// # Errors
-/// [`BodyIncomparable`](Code::BodyIncomparable) when the nodes differ.
+/// [`BodyIncomparable`](Code::BodyIncomparable) if dimension, nodes or rows of the modes differ.
 pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     let against = Recomputed::new(body, model)?;
     let mut checks = vec![against.positions()];
@@ -77,7 +79,7 @@ pub fn verify(body: &FlexBody, model: &FeModel) -> Result<Vec<IdentityCheck>> {
     Ok(checks)
 }
 
-/// Refuses a model with another dimension or other nodes.
+/// Returns an error if the model has another dimension or other nodes than the body.
 fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
     if body.dimension() != model.dimension() {
         let message = format!("the body has dimension {}, the model {}", body.dimension(), model.dimension());
@@ -94,7 +96,7 @@ fn check_comparable(body: &FlexBody, model: &FeModel) -> Result<()> {
     Ok(())
 }
 
-/// A body beside what the matrices of its model say of the same modes.
+/// A body and the data recomputed for its modes from the matrices of its model.
 struct Recomputed<'a> {
     body: &'a FlexBody,
     model: &'a FeModel,
@@ -103,9 +105,9 @@ struct Recomputed<'a> {
     /// K and M times the modes.
     kx: Mat<f64>,
     mx: Mat<f64>,
-    /// The invariants, condensed anew.
+    /// Invariants condensed from the model.
     own: Invariants,
-    /// How far the stored ones are from these, by name.
+    /// Difference of each stored invariant from the recomputed one, by name.
     differences: Vec<(String, f64)>,
 }
 
@@ -126,7 +128,7 @@ impl<'a> Recomputed<'a> {
         Ok(Self { body, model, place, modes, kx, mx, own, differences })
     }
 
-    /// The positions of the nodes in the body frame.
+    /// Compares the positions of the nodes in the body frame.
     fn positions(&self) -> IdentityCheck {
         let own = self.place.positions.iter().flatten();
         let size = own.clone().fold(f64::MIN_POSITIVE, |m, x| m.max(x.abs()));
@@ -135,22 +137,22 @@ impl<'a> Recomputed<'a> {
         IdentityCheck::new("positions", "x_body = A' (x_model - origin)", moved / size, 1e-12)
     }
 
-    /// The largest difference of those invariants whose names are `kept`.
+    /// Returns the largest difference of the invariants whose names pass `kept`.
     fn difference_of(&self, kept: impl Fn(&str) -> bool) -> f64 {
         let kept = self.differences.iter().filter(|(name, _)| kept(name));
         largest(kept.map(|(_, difference)| *difference))
     }
 
-    /// What the body has of its mass, by two paths.
+    /// Compares the mass invariants with two independent computations.
     fn invariants(&self) -> [IdentityCheck; 2] {
         let body = self.body;
-        // Shapes and rigid motions are rounded when they are turned: beside the small moment of a needle that
-        // is more.
+        // Turning shapes and rigid motions rounds them; relative to the small moment of a needle that
+        // rounding is larger.
         let inertia = body.invariants().inertia().diagonal();
         let recomputed = RECOMPUTED
             + body.storage().rounding()
             + 8.0 * f64::EPSILON * (inertia.max() / inertia.min()).sqrt();
-        // Where m_ff = I was taken for granted, `orthonormal_recomputed` is about it.
+        // If the condensation assumed m_ff = I, `orthonormal_recomputed` checks the modal mass.
         let is_of_mass = |name: &str| name != STIFFNESS && (body.groups().w2 || name != "modal_mass");
         [
             IdentityCheck::new(
@@ -168,7 +170,7 @@ impl<'a> Recomputed<'a> {
         ]
     }
 
-    /// K_ff, the residuals and the orthonormality of the modes.
+    /// Checks K_ff, the residuals and the orthonormality of the modes.
     fn modes(&self) -> [IdentityCheck; 3] {
         let (storage, modes) = (self.body.storage(), &self.modes.vectors);
         let ModeErrors { residual, allowed_residual, stiffness } = self.mode_errors();
@@ -196,8 +198,8 @@ impl<'a> Recomputed<'a> {
         ]
     }
 
-    /// Residuals, and what rounding of products with K explains: K is huge beside its lowest eigenvalues, and
-    /// what its products round away is no error of the body.
+    /// Computes the residuals and the part of them explained by rounding of products with K. K is large
+    /// compared with its lowest eigenvalues, and the rounding of its products is no error of the body.
     fn mode_errors(&self) -> ModeErrors {
         let (modes, storage) = (self.body.modes(), self.body.storage());
         let rounding: Vec<f64> = rounding_residual(self.model.stiffness(), self.modes.vectors.as_ref())
@@ -233,7 +235,7 @@ impl<'a> Recomputed<'a> {
         }))
     }
 
-    /// The stiffness of inertia, by the moments of the nodes and by the matrices.
+    /// Compares the stiffness of inertia, computed from the moments of the nodes and from the matrices.
     fn inertia_stiffness(&self) -> Option<IdentityCheck> {
         let own = self.modes.inertia_stiffness(self.model, &self.place.frame);
         let formula = "moments of the nodes and stiffness of inertia from M";
@@ -244,12 +246,12 @@ impl<'a> Recomputed<'a> {
         match (self.body.inertia_stiffness(), own) {
             (None, None) => None,
             (Some(stored), Some(own)) => check(own.largest_difference(stored)),
-            // Of a body that was made before there was any, or of another model.
+            // The body was made by a version without stiffness of inertia, or from another model.
             (None, Some(_)) | (Some(_), None) => check(f64::INFINITY),
         }
     }
 
-    /// What accuracy `certified` guarantees, where it does.
+    /// Checks the bounds that accuracy `certified` guarantees, if the body has them.
     fn guarantee(&self) -> Vec<IdentityCheck> {
         let body = self.body;
         if body.certificate().guarantee.is_some() && !self.model.has_exact_scalar_mass() {
@@ -279,17 +281,18 @@ impl<'a> Recomputed<'a> {
     }
 }
 
-/// Errors of modes that were computed anew, and what is allowed.
+/// Errors of recomputed modes, and their limits.
 struct ModeErrors {
-    /// Largest K-residual.
+    /// Largest residual.
     residual: f64,
-    /// The largest that was stored, or that rounding explains.
+    /// Largest residual stored or explained by rounding.
     allowed_residual: f64,
-    /// What rounding explains in K_ff, relative to sqrt(lambda_p lambda_q).
+    /// Rounding error of K_ff, relative to sqrt(lambda_p lambda_q).
     stiffness: f64,
 }
 
-/// Largest difference of the invariants in units of what their guaranteed digits allow.
+/// Returns the largest difference of the invariants in units of the difference that their guaranteed digits
+/// allow.
 fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) -> f64 {
     let excess = |(name, difference): (String, f64)| {
         let digits = DIGITS.iter().zip(&guarantee.digits).find(|(known, _)| **known == name);
@@ -299,9 +302,9 @@ fn excess_of_digits(body: &FlexBody, guarantee: &Guarantee, own: &Invariants) ->
     largest(primary_differences(body.invariants(), own).into_iter().map(excess))
 }
 
-/// How far the Rayleigh quotient of a mode lies outside of the bounds of its eigenvalue at the most,
-/// relative. Stored modes are rounded: their quotients follow the eigenvalues to what any other check of
-/// modes allows.
+/// Returns the largest relative distance of the Rayleigh quotient of a mode from the bounds of its
+/// eigenvalue, zero if all quotients lie inside. Stored modes are rounded, so their quotients follow the
+/// eigenvalues to the limit of the other checks of modes.
 fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
     let bounds = guarantee.eigenvalue_lower.iter().zip(&guarantee.eigenvalue_upper);
     let modal_mass = own.modal_mass();
@@ -311,7 +314,7 @@ fn outside_of_bounds(guarantee: &Guarantee, own: &Invariants) -> f64 {
     }))
 }
 
-/// How far stored and recomputed matrices are from each other, relative to the largest entry, and what
+/// Difference between stored and recomputed matrices relative to the largest entry, and the difference that
 /// rounding allows.
 #[derive(Clone, Copy)]
 struct Difference {
@@ -320,23 +323,23 @@ struct Difference {
 }
 
 impl Difference {
-    /// Of entries up to `size`, recomputed with a rounding of `rounding`.
+    /// Creates the difference of entries up to `size`, recomputed with an absolute rounding error
+    /// `rounding`.
     fn new(largest: f64, size: f64, rounding: f64) -> Self {
         let relative = |value: f64| if value == 0.0 { 0.0 } else { value / size };
         let rounding = if rounding > 0.0 { rounding } else { 0.0 };
-        // Twice the size is what two matrices of nothing but rounding differ by at the most.
+        // Two matrices that consist of rounding errors differ by at most twice the size.
         Self { largest: relative(largest), allowed: RECOMPUTED + relative(rounding).min(2.0) }
     }
 
-    /// The one that comes closer to what is allowed, or goes further beyond it; one that is no number is
-    /// worst.
+    /// Returns the difference with the larger ratio of actual to allowed value; NaN counts as worst.
     fn worse(self, other: Self) -> Self {
         let is_worse = other.largest.is_nan() || other.largest * self.allowed > self.largest * other.allowed;
         if is_worse { other } else { self }
     }
 }
 
-/// What rounding leaves in |psi_p' A psi_q|, at the most.
+/// Returns an upper bound of the rounding error of |psi_p' A psi_q|.
 fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 {
     let longest = shapes.col_iter().fold(0.0f64, |m, column| m.max(column.norm_l2()));
     ROUNDING
@@ -345,7 +348,7 @@ fn rounding_of(a: &SymmetricMatrix, shapes: &Mat<f64>, storage: Storage) -> f64 
         * rounding_residual(a, shapes.as_ref()).into_iter().fold(0.0, f64::max)
 }
 
-/// Stored damping against that of the model; `None` when neither has any.
+/// Compares the stored damping with that of the model. Returns `None` if neither has damping.
 fn damping_check(
     body: &FlexBody,
     model: &FeModel,
@@ -377,11 +380,11 @@ fn damping_check(
     Ok(Some(Difference::new(largest, matrix.norm_max().max(stored.norm_max()), rounding)))
 }
 
-/// Stored geometric stiffness against that of the model; `None` when neither has any.
+/// Compares the stored geometric stiffness with that of the model. Returns `None` if neither has any.
 fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Result<Option<Difference>> {
     let nf = shapes.ncols();
     let shift = match body.conditions() {
-        // Given about the centre of mass.
+        // The model gives geometric stiffness about the centre of mass.
         ReferenceConditions::Interface(_) => -body.invariants().first_moment() / body.invariants().mass(),
         _ => Vector3::zeros(),
     };
@@ -403,22 +406,24 @@ fn geometric_check(body: &FlexBody, model: &FeModel, shapes: &Mat<f64>) -> Resul
     Ok(loads.map(difference).reduce(Difference::worse))
 }
 
-/// How far R'MR of the unit translations and rotations of the body frame (in the plane 3 x 3) is from m, c
-/// and I0 of the body, relative to their Cauchy-Schwarz bounds: another path to them than the condensation.
+/// Returns the largest difference between R'MR of the unit translations and rotations of the body frame (3
+/// x 3 in the plane) and m, c and I0 of the body, relative to the Cauchy-Schwarz bounds. R'MR is computed
+/// independently of the condensation.
 fn rigid_inertia_error(body: &FlexBody, found: &Mat<f64>) -> f64 {
     let own = body.parts().rigid_mass();
     let error = |i: usize, j: usize| (found[(i, j)] - own[(i, j)]).abs() / (own[(i, i)] * own[(j, j)]).sqrt();
     largest((0..own.nrows()).flat_map(|i| (0..own.ncols()).map(move |j| error(i, j))))
 }
 
-/// Warnings for every file of `body`'s provenance whose fingerprint differs from the model's.
+/// Returns a warning for every file in the provenance of `body` whose fingerprint differs from that of the
+/// model.
 pub fn changed_sources(body: &FlexBody, model: &FeModel) -> Vec<Diagnostic> {
     let files = &body.source().files;
     files
         .iter()
         .enumerate()
         .filter_map(|(i, file)| {
-            // Several files may have one role: they are compared in their order.
+            // Several files may have one role: compare them in their order.
             let before = files[..i].iter().filter(|other| other.role == file.role).count();
             let now = model.sources().iter().filter(|other| other.role == file.role).nth(before)?;
             (now.sha256 != file.sha256).then(|| {

@@ -1,5 +1,5 @@
-//! From a model as the readers deliver it to matrices in the internal order, with the checks of matrices and
-//! tables by themselves.
+//! Conversion from a model as delivered by the readers to matrices in the internal order, with the checks
+//! of matrices and tables by themselves.
 
 use super::assembled::Assembled;
 use super::drilling::{Following, with_following_rotations};
@@ -19,8 +19,8 @@ use std::collections::HashSet;
 /// Name of geometric stiffness in messages.
 const GEOMETRIC: &str = "geometric stiffness";
 
-/// The checks of the matrices and tables by themselves, and the internal order; with the warnings and notes
-/// so far.
+/// Checks the matrices and tables by themselves and converts them to the internal order; also returns the
+/// warnings and notes so far.
 pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)> {
     let mut found = std::mem::take(&mut raw.diagnostics);
     check_as_read(&raw, &mut found);
@@ -54,7 +54,7 @@ pub(super) fn assemble(mut raw: RawModel) -> Result<(Assembled, Vec<Diagnostic>)
     Ok((body, found))
 }
 
-/// The matrices before their rows are known, and the numbers beside them.
+/// Checks the matrices before their rows are known, and the numbers beside them.
 fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
     check_matrix(&raw.stiffness, "stiffness", found);
     check_matrix(&raw.mass, "mass", found);
@@ -82,7 +82,7 @@ fn check_as_read(raw: &RawModel, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// What the tables say about the `nodes` that have rows: places, interfaces with their reference points,
+/// Checks the tables for the `nodes` that have rows: positions, interfaces with their reference points,
 /// loads.
 fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     check_places(raw, nodes, found);
@@ -98,7 +98,8 @@ fn check_tables(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
     }
 }
 
-/// The surface on the `nodes` that have rows. What it loses with the others is told: it leaves holes.
+/// Returns the surface on the `nodes` that have rows; adds a diagnostic about triangles that are lost with
+/// other nodes, since they leave holes.
 fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) -> Option<SurfaceMesh> {
     let mesh = raw.mesh.take()?;
     if mesh.least_nodes() > raw.nodes.len() {
@@ -119,7 +120,7 @@ fn mesh_of_used(raw: &mut RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) 
     used
 }
 
-/// Coordinates are finite, and those of a plane model lie in its plane.
+/// Checks that coordinates are finite, and that those of a plane model lie in its plane.
 fn check_places(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     if nodes.positions.iter().flatten().any(|x| !x.is_finite()) {
         let message = "a node coordinate is not a finite number";
@@ -131,7 +132,7 @@ fn check_places(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Interfaces name nodes that have rows.
+/// Checks that interfaces refer to nodes that have rows.
 fn check_members(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     let known: HashSet<i64> = nodes.ids.iter().copied().collect();
     let placed: HashSet<i64> = raw.nodes.ids.iter().copied().collect();
@@ -148,8 +149,8 @@ fn check_members(raw: &RawModel, nodes: &Nodes, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Brings the matrices of a model into the internal order, one after the other: each is given back before the
-/// next is copied.
+/// Conversion of the matrices of a model to the internal order, one after the other: each is released
+/// before the next is copied.
 struct InternalOrder<'o> {
     layout: &'o Layout,
     nodes: &'o Nodes,
@@ -157,13 +158,13 @@ struct InternalOrder<'o> {
 }
 
 impl InternalOrder<'_> {
-    /// The matrix, taken out of `raw`; `None` with a diagnostic where it is not symmetric.
+    /// Takes a matrix out of `raw` and returns it; `None` with a diagnostic if it is not symmetric.
     fn symmetric(&mut self, raw: &mut RawMatrix, name: &str) -> Option<SymmetricMatrix> {
         let (layout, nodes) = (self.layout, self.nodes);
         symmetric(raw, layout, name, |row| layout.rows.label(nodes, row), self.found)
     }
 
-    /// Without its matrix, where that has to be refused: then there is an error among the diagnostics.
+    /// Converts damping; `None` if its matrix is invalid, which an error reports.
     fn damping(&mut self, damping: Damping<RawMatrix>) -> Option<Damping<SymmetricMatrix>> {
         let (layout, nodes) = (self.layout, self.nodes);
         let mut ordered = |mut matrix: RawMatrix| {
@@ -175,7 +176,7 @@ impl InternalOrder<'_> {
         damping.try_map(|matrix| ordered(matrix).ok_or(())).ok()
     }
 
-    /// Geometric stiffness in the internal order, which may have negative diagonal entries; files and digits stay in
+    /// Converts geometric stiffness, which may have negative diagonal entries; files and digits stay in
     /// `given`.
     fn geometric_stiffness(
         &mut self,
@@ -189,7 +190,7 @@ impl InternalOrder<'_> {
     }
 }
 
-/// Names that no file could hold, before the long run rather than after it.
+/// Checks for names that no file can hold, before a long run instead of after it.
 fn check_names(raw: &RawModel, found: &mut Vec<Diagnostic>) {
     let mut seen = HashSet::new();
     for set in &raw.interfaces {

@@ -1,16 +1,16 @@
-//! The number of a body among several in the same matrices.
+//! Number of a body among several in one pair of matrices.
 
-/// Which of several bodies in the same matrices a model is.
+/// Number of a model among several bodies in one pair of matrices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BodyNumber {
-    /// From 1, in the order of the first node of each body in the node table.
+    /// Number from 1, in the order of the first node of each body in the node table.
     pub number: usize,
-    /// How many bodies there are.
+    /// Number of all bodies.
     pub of: usize,
 }
 
 impl std::fmt::Display for BodyNumber {
-    /// `body 1 of 2`.
+    /// Formats the number as `body 1 of 2`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "body {} of {}", self.number, self.of)
     }

@@ -1,4 +1,4 @@
-//! What must hold before any work is done on a model: each failure named with its facts.
+//! Checks of a model before any work: each failure is reported with its facts.
 
 use super::assemble::assemble;
 use super::assembled::Assembled;
@@ -20,47 +20,47 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Result, stop_on_error};
 use flexbody_linalg::{SymmetricMatrix, largest};
 
-/// A model that passed, with the warnings and notes on the way.
+/// Model that passed the checks, with the warnings and notes found.
 #[derive(Debug, Clone)]
 pub struct CheckedModel {
-    /// The model.
+    /// Checked model.
     pub model: FeModel,
     /// Warnings and notes, in the order found.
     pub diagnostics: Vec<Diagnostic>,
-    /// What they say of the place and the size of the mass was judged by.
+    /// Figures behind the warnings about position and size of the mass.
     pub plausibility: Plausibility,
 }
 
-/// How the mass fits the stiffness and the positions; in the units of the model.
+/// Consistency of the mass with the stiffness and the positions, in the units of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plausibility {
-    /// Pairs of nodes that the mass couples.
+    /// Number of pairs of nodes coupled by the mass.
     pub mass_pairs: usize,
-    /// Those of them that the stiffness does not couple.
+    /// Number of these pairs that the stiffness does not couple.
     pub foreign_pairs: usize,
-    /// Pairs of nodes whose masses fit their stiffness only when exchanged.
+    /// Number of pairs of nodes whose masses fit their stiffness only if exchanged.
     pub exchanged_pairs: usize,
-    /// Speeds of sound; none where no motion stretches the body.
+    /// Speeds of sound; `None` if no motion stretches the body.
     pub sound_speed: Option<SoundSpeed>,
-    /// Densities of solid elements; none where too few are recognised.
+    /// Densities of solid elements; `None` if too few are recognised.
     pub densities: Option<Densities>,
 }
 
 impl FeModel {
-    /// Checks a model as a reader delivered it, and brings it into the internal order.
+    /// Checks a model as delivered by a reader, and converts it to the internal order.
     ///
     /// # Errors
-    /// See [`check`].
+    /// The errors of [`check`].
     pub fn from_raw(raw: RawModel) -> Result<CheckedModel> {
         check(raw)
     }
 }
 
-/// Checks `raw` and brings it into the internal order.
+/// Checks `raw` and converts it to the internal order.
 ///
 /// # Errors
-/// All errors found in the first stage that has any: matrices by themselves; labels; mass; connections and
-/// rigid motion.
+/// All errors of the first stage that has any: matrices by themselves; labels; mass; connections and rigid
+/// motion.
 pub fn check(raw: RawModel) -> Result<CheckedModel> {
     let (assembled, found) = assemble(raw)?;
     check_body(assembled, None, found)
@@ -81,7 +81,7 @@ pub(super) fn check_body(
     let rigid_residual = check_rigid_motions(&mut body, &mut found)?;
     stop_on_error(&mut found)?;
     let mut form = form.expect("a missing mass comes with an error");
-    // Vectors that rigid motion moves have no x of their own in the formulas for Ms.
+    // Vectors that rigid motion moves have no position x in the formulas for Ms.
     form.commutes &= body.rows.are_still();
     if !form.commutes {
         check_inertia(&body, rounding(body.raw.mass.digits, 3).max(1e-9), &mut found);
@@ -105,22 +105,22 @@ pub(super) fn check_body(
     found.extend(kept.map(|note| note.in_file(&mass_path)));
     check_stress(&model, &stress_files, plausibility.densities.is_some(), &mut found);
     stop_on_error(&mut found)?;
-    // Now, so that the files need not stay open.
+    // Compute the fingerprints now, so that the files need not stay open.
     model.find_sources()?;
     Ok(CheckedModel { model, diagnostics: found, plausibility })
 }
 
-/// What kind of mass it is; `None` with a diagnostic when it is that of no body.
+/// Returns the form of the mass matrix; `None` with a diagnostic if it belongs to no physical body.
 fn form_of_mass(body: &Assembled, found: &mut Vec<Diagnostic>) -> Option<MassForm> {
     let form = mass_form(&body.mass, &body.rows, block_tolerance(body.raw.mass.digits));
     form.map_err(|diagnostic| found.push(diagnostic.in_file(&body.raw.mass.path))).ok()
 }
 
-/// How every row moves with the rigid body, and whether K and the other matrices leave it free. Returns the
+/// Finds the rigid motion of every row, and checks that K and the other matrices leave it free. Returns the
 /// residual of K.
 ///
 /// # Errors
-/// Rows without a place whose motion K does not tell, with all that was found before.
+/// Rows without a position whose motion K does not determine, with all earlier findings.
 fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Result<f64> {
     if let Err(diagnostic) = recover(&body.stiffness, &mut body.rows, &body.nodes) {
         found.push(diagnostic.in_file(&body.raw.stiffness.path));
@@ -141,8 +141,8 @@ fn check_rigid_motions(body: &mut Assembled, found: &mut Vec<Diagnostic>) -> Res
     Ok(rigid_residual)
 }
 
-/// Where the mass sits, and whether density and speed of sound are those of matter; the pairs are not counted
-/// here.
+/// Checks the position of the mass, and that density and speed of sound are those of real materials; pairs
+/// of nodes are not counted here.
 fn check_local_mass(
     body: &Assembled,
     form: &MassForm,
@@ -150,7 +150,7 @@ fn check_local_mass(
     found: &mut Vec<Diagnostic>,
 ) -> Plausibility {
     let local = LocalMass::new(body, &form.scalar);
-    // Lumping has moved mass between the nodes of an element.
+    // Lumping moves mass between the nodes of an element: skip the check.
     let exchanged_pairs = if diagonal_mass { 0 } else { check_exchanged(body, &local, found) };
     let before = found.len();
     let densities = Densities::new(body, &local, diagonal_mass);
@@ -167,7 +167,7 @@ fn is_diagonal(m: &SymmetricMatrix) -> bool {
     (0..m.n()).all(|i| m.row(i).0.iter().all(|&j| j as usize == i))
 }
 
-/// What kind of mass and of rows the body has, where it is not the plain one.
+/// Adds notes about the kind of mass and of rows, unless they are plain.
 fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnostic>) {
     let (raw, rows) = (&body.raw, &body.rows);
     if diagonal_mass {
@@ -190,8 +190,8 @@ fn note_structure(body: &Assembled, diagonal_mass: bool, found: &mut Vec<Diagnos
     }
 }
 
-/// A note about the part of the mass that is kept along the axes of the body while its nodes turn; `worst` labels
-/// the rows of the block of displacements that differs most by direction.
+/// Returns a note about the part of the mass that keeps the axes of the body while its nodes turn; `worst`
+/// labels the rows of the displacement block that differs most by direction.
 fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2]) -> Option<Diagnostic> {
     let share = model.fixed_mass_share();
     let deviation = model.mass_deviation();
@@ -209,9 +209,9 @@ fn mass_that_does_not_turn(model: &FeModel, rounding: f64, worst: [DofLabel; 2])
     })
 }
 
-/// A warning when D damps rigid motion: what acts on the motion of the whole body is not in the modes.
+/// Adds a warning if D damps rigid motion: forces on the motion of the whole body are not in the modes.
 fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
-    /// As much as node tables written with few digits leave.
+    /// Residual due to node tables with few digits.
     const LIMIT: f64 = 1e-6;
     let Some(damping) = body.damping.as_ref().and_then(Damping::matrix) else { return };
     let (centre, length) = centre_and_length(&body.nodes.positions);
@@ -228,8 +228,8 @@ fn check_rigid_damping(body: &Assembled, found: &mut Vec<Diagnostic>) {
     }
 }
 
-/// Densities between aerogel and osmium, for the box around the nodes: all that is known of bodies other than
-/// solids.
+/// Range of plausible densities in kg/m^3, from aerogel to osmium, for the bounding box of the nodes; used
+/// for bodies other than solids.
 const DENSITY: (f64, f64) = (0.1, 30_000.0);
 
 fn check_plausibility(mass: &SymmetricMatrix, nodes: &Nodes, raw: &RawModel, found: &mut Vec<Diagnostic>) {

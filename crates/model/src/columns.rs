@@ -1,4 +1,4 @@
-//! Sparse columns that several threads make.
+//! Sparse columns computed by several threads.
 
 use flexbody_linalg::CscMatrix;
 
@@ -11,12 +11,12 @@ pub(super) struct Columns {
 }
 
 impl Columns {
-    /// `count` columns without entries.
+    /// Creates `count` columns without entries.
     pub(crate) fn empty(count: usize) -> Self {
         Self { ends: vec![0; count], ..Self::default() }
     }
 
-    /// Adds an entry to the present column, unless it is zero; rows ascend.
+    /// Adds an entry to the present column, unless it is zero; rows must ascend.
     pub(crate) fn push(&mut self, row: usize, value: f64) {
         if value != 0.0 {
             self.row_idx.push(row as u32);
@@ -29,7 +29,7 @@ impl Columns {
         self.ends.push(self.row_idx.len());
     }
 
-    /// The n x n matrix whose columns are these parts in their order.
+    /// Returns the n x n matrix whose columns are these parts in their order.
     pub(crate) fn joined(n: usize, parts: Vec<Self>) -> CscMatrix {
         let entries = parts.iter().map(|part| part.values.len()).sum();
         let (mut row_idx, mut values) = (Vec::with_capacity(entries), Vec::with_capacity(entries));

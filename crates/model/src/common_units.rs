@@ -1,6 +1,6 @@
-//! Units in which numbers of a model are those of common materials.
+//! Common units in which numbers of a model agree with materials.
 
-/// Advice on numbers whose units nothing states, with the units in which they are those of matter.
+/// Returns advice on numbers without stated units, with the units in which they are plausible.
 pub(super) fn state_units(fitting: &str) -> String {
     let those = match fitting {
         "" => "state the units".to_owned(),
@@ -20,7 +20,7 @@ const COMMON: [(&str, f64, f64); 5] = [
     ("ft, slug, s", 0.3048, 14.593_902_937_206_364),
 ];
 
-/// Common units in which a density and a speed of sound are those of common materials.
+/// Returns the common units in which a density and a speed of sound are plausible.
 pub(super) fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
     let of_speed = units_of_speed(speed);
     let fits = |&&(name, length, mass): &&(&str, f64, f64)| {
@@ -29,7 +29,7 @@ pub(super) fn fitting_units(density: f64, speed: f64) -> Vec<&'static str> {
     COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()
 }
 
-/// Common units in which a speed of sound is that of common materials.
+/// Returns the common units in which a speed of sound is plausible.
 pub(super) fn units_of_speed(speed: f64) -> Vec<&'static str> {
     let fits = |&&(_, length, _): &&(&str, f64, f64)| (500.0..20_000.0).contains(&(speed * length));
     COMMON.iter().filter(fits).map(|&(name, ..)| name).collect()

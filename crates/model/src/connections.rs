@@ -1,11 +1,11 @@
-//! Which nodes the matrices connect: one body, or several parts.
+//! Check of the connection of the nodes by the matrices: one body, or several parts.
 
 use super::assembled::Assembled;
 use super::wording::in_words;
 use super::{Nodes, Rows};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// K and M together make one body, and K alone holds it together.
+/// Checks that K and M together make one body, and that K alone holds it together.
 pub(super) fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
     let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
     let component = rows.components(&[stiffness]);
@@ -18,7 +18,7 @@ pub(super) fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
         found.push(Diagnostic::new(Code::BodiesSeveral, message).in_file(&raw.stiffness.path));
         return;
     }
-    // K R = 0 holds for each part by itself: each has rigid motions of its own, whatever the mass couples.
+    // K R = 0 holds for each part by itself: each has rigid motions of its own for any mass coupling.
     let parts = groups(&component, rows, nodes);
     let message = format!(
         "stiffness leaves {} parts that only the mass couples, each with rigid motions of its own: {}",
@@ -28,7 +28,7 @@ pub(super) fn check_connections(body: &Assembled, found: &mut Vec<Diagnostic>) {
     found.push(Diagnostic::new(Code::Mechanism, message).in_file(&raw.stiffness.path));
 }
 
-/// Node numbers of every component, in the order of their first nodes.
+/// Returns the node numbers of every component, in the order of their first nodes.
 pub(super) fn groups(component: &[usize], rows: &Rows, nodes: &Nodes) -> Vec<Vec<i64>> {
     let mut groups = vec![Vec::new(); component.iter().max().map_or(0, |last| last + 1)];
     for (vertex, &c) in component.iter().enumerate() {

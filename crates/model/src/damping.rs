@@ -1,42 +1,42 @@
-//! Damping as a user states it.
+//! Damping given by the user.
 
-/// Damping of a body. `D` stands for the matrix: its place in a file, what was read, or the matrix itself.
+/// Damping of a body. `D` is the type of the matrix: a path, a matrix as read, or the checked matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Damping<D> {
-    /// One ratio for every mode.
+    /// One ratio for all modes.
     Ratio(f64),
-    /// Ratios by frequency, bands ascending, the last without end.
+    /// Ratios by frequency; bands ascend, the last has no end.
     Bands(Vec<DampingBand>),
     /// D = alpha M + beta K.
     Rayleigh {
-        /// Unit: 1/time.
+        /// Mass-proportional factor. Unit: 1/time.
         alpha: f64,
-        /// Unit: time.
+        /// Stiffness-proportional factor. Unit: time.
         beta: f64,
     },
     /// D (N x N, rows as K), symmetric and positive semidefinite. Unit: mass/time.
     Matrix(D),
 }
 
-/// A range of frequencies with one damping ratio.
+/// Range of frequencies with one damping ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DampingBand {
-    /// The band ends here, the limit included, in hertz whatever the unit of time; infinite for the last.
+    /// End of the band, included, in hertz for any unit of time; infinite for the last band.
     pub to_hz: f64,
-    /// Damping ratio of its modes.
+    /// Damping ratio of the modes in the band.
     pub ratio: f64,
 }
 
-/// Damping ratios of modes by their frequencies: bands ascending, the last without end.
+/// Damping ratios of modes by their frequencies; bands ascend, the last has no end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DampingRatios(Vec<DampingBand>);
 
 impl DampingRatios {
-    /// The ratios of `bands`; `Err` says what is wrong with them.
+    /// Creates the ratios from `bands`.
     ///
     /// # Errors
-    /// No band; a ratio that is negative or not finite; ends that are not positive or do not ascend; a last band with
-    /// an end.
+    /// A text with the reason: no band; a ratio that is negative or not finite; ends that are not positive
+    /// or do not ascend; a last band with an end.
     pub fn new(bands: Vec<DampingBand>) -> Result<Self, String> {
         match Damping::<()>::Bands(bands.clone()).problem() {
             Some(problem) => Err(problem),
@@ -44,26 +44,27 @@ impl DampingRatios {
         }
     }
 
-    /// The bands.
+    /// Returns the bands.
     pub fn bands(&self) -> &[DampingBand] {
         &self.0
     }
 
-    /// The ratio at a frequency in hertz: that of the first band whose end the frequency does not exceed.
+    /// Returns the ratio at a frequency in hertz: that of the first band whose end is not below the
+    /// frequency.
     pub fn at(&self, hertz: f64) -> f64 {
         ratio_at(&self.0, hertz)
     }
 }
 
 impl From<f64> for DampingRatios {
-    /// The same ratio at every frequency.
+    /// Creates one ratio for all frequencies.
     fn from(ratio: f64) -> Self {
         Self(vec![DampingBand { to_hz: f64::INFINITY, ratio }])
     }
 }
 
 impl std::fmt::Display for DampingRatios {
-    /// `0.02`, or `0.01 to 100 Hz, 0.1 to 1000 Hz, 1 above`.
+    /// Formats the ratios as `0.02`, or `0.01 to 100 Hz, 0.1 to 1000 Hz, 1 above`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let (last, closed) = self.0.split_last().expect("at least one band");
         closed.iter().try_for_each(|band| write!(f, "{} to {} Hz, ", band.ratio, band.to_hz))?;
@@ -71,13 +72,13 @@ impl std::fmt::Display for DampingRatios {
     }
 }
 
-/// The ratio of the first band that reaches up to `hertz`; the last one has no end.
+/// Returns the ratio of the first band that reaches `hertz`; the last one has no end.
 pub fn ratio_at(bands: &[DampingBand], hertz: f64) -> f64 {
     bands.iter().find(|band| hertz <= band.to_hz).map_or(0.0, |band| band.ratio)
 }
 
 impl<D> Damping<D> {
-    /// `ratio`, `bands`, `rayleigh`, `matrix`: the key of the manifest.
+    /// Returns the key of the manifest: `ratio`, `bands`, `rayleigh` or `matrix`.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Ratio(_) => "ratio",
@@ -87,7 +88,7 @@ impl<D> Damping<D> {
         }
     }
 
-    /// The matrix, where damping is one.
+    /// Returns the matrix, if damping is given by one.
     pub fn matrix(&self) -> Option<&D> {
         match self {
             Self::Matrix(matrix) => Some(matrix),
@@ -95,7 +96,7 @@ impl<D> Damping<D> {
         }
     }
 
-    /// The same with a borrowed matrix.
+    /// Returns the damping with a borrowed matrix.
     pub fn borrowed(&self) -> Damping<&D> {
         match self {
             Self::Ratio(ratio) => Damping::Ratio(*ratio),
@@ -105,10 +106,10 @@ impl<D> Damping<D> {
         }
     }
 
-    /// The same with another matrix in place of this one.
+    /// Returns the damping with its matrix converted by `f`, which is called only for a matrix.
     ///
     /// # Errors
-    /// Those of `f`.
+    /// The errors of `f`.
     pub fn try_map<E, X>(self, f: impl FnOnce(D) -> Result<E, X>) -> Result<Damping<E>, X> {
         Ok(match self {
             Self::Ratio(ratio) => Damping::Ratio(ratio),
@@ -118,7 +119,7 @@ impl<D> Damping<D> {
         })
     }
 
-    /// What is wrong with its numbers; nothing is known of the matrix here.
+    /// Returns the first error in the numbers; a matrix is not checked here.
     pub fn problem(&self) -> Option<String> {
         let wrong = |ratio: &f64| !(ratio.is_finite() && *ratio >= 0.0);
         let ratio = |ratio: &f64| {

@@ -1,4 +1,4 @@
-//! Damping ratios by frequency as the TOML files of users write them.
+//! Damping ratios by frequency in TOML files of users.
 
 use crate::DampingBand;
 use flexbody_base::text::walk::{Value, Walk};
@@ -7,8 +7,8 @@ use toml::de::DeValue;
 /// Keys of a damping band.
 pub const DAMPING_BAND_KEYS: &[&str] = &["to_hz", "ratio"];
 
-/// Reads damping ratios by frequency as manifests and scenes write them: a list of `{ to_hz, ratio }` with ends in
-/// hertz. The numbers are not judged. Returns `None` only after it has added a diagnostic to `walk`.
+/// Reads damping ratios by frequency from manifests and scenes: a list of `{ to_hz, ratio }` with ends in
+/// hertz. The values are not checked. If it returns `None`, it has added a diagnostic to `walk`.
 pub fn damping_bands(walk: &mut Walk<'_>, value: &Value) -> Option<Vec<DampingBand>> {
     const EXPECTED: &str = "a list of tables { to_hz, ratio }, the last without to_hz";
     let DeValue::Array(list) = value.get_ref() else {

@@ -1,11 +1,11 @@
 //! Densities of solid elements, from the mass of nodes and the volumes of the elements around them.
 //!
-//! No element is given, but K couples all nodes of an element with each other: elements are the largest sets
-//! of nodes of which each is coupled with each (cliques). Of a set that is an affine image of one of the
-//! usual elements the volume is a known multiple of the root of the determinant of the covariance of its
-//! positions, and each node has a known part of its mass. Beams, shells, bars and everything else have no
-//! such sets, or are left out by what marks them. Curved elements count with their corners, which changes
-//! their volume by some percent.
+//! No elements are given, but K couples all nodes of an element: elements are the maximal sets of mutually
+//! coupled nodes (cliques). If a set is an affine image of one of the usual elements, its volume is a known
+//! multiple of the root of the determinant of the covariance of its positions, and each node has a known
+//! part of its mass. Beams, shells, bars and other elements have no such sets, or are excluded by their
+//! characteristics. Curved elements are measured by their corners, which changes their volume by some
+//! percent.
 
 use super::assembled::Assembled;
 use super::common_units::{fitting_units, state_units};
@@ -15,33 +15,34 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// Densities of matter in kg/m^3, from light foams to osmium.
+/// Range of densities of materials in kg/m^3, from light foams to osmium.
 const DENSITIES: (f64, f64) = (10.0, 25_000.0);
 
-/// At most so many nodes are looked at, at equal distances in the node table.
+/// Largest number of sampled nodes, at equal distances in the node table.
 const SAMPLED: usize = 400;
 
-/// Coupled nodes of a node that is looked at: the bits of a word.
+/// Largest number of nodes coupled with a sampled node: the bits of a word.
 const COUPLED: usize = 63;
 
-/// Cliques of one node; elements of a mesh are fewer.
+/// Largest number of cliques of one node; elements of a mesh are fewer.
 const CLIQUES: usize = 200;
 
-/// Root of the determinant of the covariance relative to that of a ball of the same trace, below which nodes
-/// lie in a plane: four nodes of a curved membrane do nearly.
+/// Root of the determinant of the covariance, relative to that of a ball with equal trace, below which
+/// nodes lie in a plane.
 const FLAT: f64 = 1e-6;
+/// Limit in place of [`FLAT`] for linear elements of four nodes: those of a curved membrane come close to a plane.
 const FLAT_FOUR: f64 = 0.02;
 
 /// Largest deviation of the squared Mahalanobis distance of a corner from that of an affine element.
 const CORNER: f64 = 1.0;
 
-/// Distance of the middle of an edge from the middle between its ends, relative to their distance, in a
-/// curved element.
+/// Distance of a mid-edge node of a curved element from the middle between the ends of the edge, relative
+/// to the length of the edge.
 const CURVED: f64 = 0.2;
 
-/// A solid element with `nodes` nodes, `corners` of them corners and the others the middles of edges: its
-/// volume is `volume` times the root of the determinant of the covariance of the corners, and the row sums of
-/// the consistent mass give each corner and each middle these parts of its mass.
+/// Solid element with `nodes` nodes, `corners` of them corners and the others mid-edge nodes. Its volume is
+/// `volume` times the root of the determinant of the covariance of the corners, and the row sums of the
+/// consistent mass give each corner and each mid-edge node these parts of its mass.
 struct Element {
     nodes: usize,
     corners: usize,
@@ -64,12 +65,12 @@ const ELEMENTS: [Element; 5] = [
 pub struct Densities {
     /// Lower quartile, median and upper quartile of the nodes, in the units of the model.
     pub quartiles: [f64; 3],
-    /// How many nodes tell.
+    /// Number of evaluated nodes.
     pub nodes: usize,
 }
 
 impl Densities {
-    /// Of a body in space; `None` where too few nodes belong to solid elements alone.
+    /// Computes the densities of a body in space; `None` if too few nodes belong to solid elements only.
     pub(super) fn new(body: &Assembled, local: &LocalMass, diagonal_mass: bool) -> Option<Self> {
         let n = body.nodes.len();
         if body.rows.dimension != 3 {
@@ -90,8 +91,8 @@ impl Densities {
     }
 }
 
-/// The node's part of the volumes of the solid elements around it; `None` where there is something else, or
-/// too much to be taken apart.
+/// Returns the part of a node in the volumes of the solid elements around it. Returns `None` if there are
+/// other elements, or too many to separate.
 fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let Assembled { nodes, rows, stiffness, .. } = body;
     let coupled = |i: usize| neighbours(stiffness, rows, i, |_, _, value| value != 0.0);
@@ -99,18 +100,21 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     let turns = |i: u32| rows.rotations().binary_search_by_key(&i, |&(own, _)| own).is_ok();
     let mut near = coupled(node);
     near.retain(|&j| (j as usize) < n);
+    // Nodes with rotations, bars and crowded nodes are not evaluated.
     if turns(node as u32) || near.iter().any(|&j| turns(j)) || near.is_empty() {
         return None;
     }
     if near.len() > COUPLED || near.iter().all(|&j| is_bar(body, node, j as usize)) {
         return None;
     }
+    // Coupling among the neighbours as bit masks.
     let mask = |i: &u32| {
         let others = coupled(*i as usize);
         let shared = near.iter().enumerate().filter(|(_, other)| others.binary_search(other).is_ok());
         shared.fold(0u64, |mask, (bit, _)| mask | 1 << bit)
     };
     let adjacent: Vec<u64> = near.iter().map(mask).collect();
+    // Every maximal clique with the node is an element around it.
     let mut cliques = Vec::new();
     if !maximal_cliques(&adjacent, 0, (1 << near.len()) - 1, 0, &mut cliques) {
         return None;
@@ -124,7 +128,7 @@ fn around(body: &Assembled, node: usize, diagonal_mass: bool) -> Option<f64> {
     cliques.into_iter().map(part).sum()
 }
 
-/// Whether K couples two nodes along the line between them only.
+/// Returns true if K couples two nodes only along the line between them.
 fn is_bar(body: &Assembled, i: usize, j: usize) -> bool {
     let x = &body.nodes.positions;
     let along = (Vector3::from(x[j]) - Vector3::from(x[i])).normalize();
@@ -136,8 +140,8 @@ fn is_bar(body: &Assembled, i: usize, j: usize) -> bool {
     (block - axial).norm() <= 1e-6 * block.norm()
 }
 
-/// Bron and Kerbosch's search with a pivot: every largest extension of `chosen` by `candidates`, none with
-/// `excluded`. False when there are too many.
+/// Runs the search of Bron and Kerbosch with a pivot: finds every maximal extension of `chosen` by
+/// `candidates`, none with `excluded`. Returns false if there are too many.
 fn maximal_cliques(
     adjacent: &[u64],
     chosen: u64,
@@ -164,9 +168,9 @@ fn maximal_cliques(
     true
 }
 
-/// The part of an element's volume that belongs to its first node; `None` when these are not the nodes of an
-/// element that is known. A diagonal mass is spread over the nodes of quadratic elements in more than one
-/// way.
+/// Returns the part of the volume of an element that belongs to its first node; `None` if the nodes form no
+/// known element. The diagonal mass of quadratic elements is distributed in more than one way and gives
+/// `None`.
 fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64> {
     let element = ELEMENTS.iter().find(|element| element.nodes == positions.len())?;
     let linear = element.corners == element.nodes;
@@ -195,7 +199,7 @@ fn part_of_first(positions: &[Vector3<f64>], diagonal_mass: bool) -> Option<f64>
     Some(element.volume * root * part)
 }
 
-/// Whether a node lies in the middle between two others.
+/// Returns true if a node lies in the middle between two others.
 fn is_middle(positions: &[Vector3<f64>], node: usize) -> bool {
     let x = positions[node];
     let others = |i: usize| (i + 1..positions.len()).map(move |j| (i, j));
@@ -205,9 +209,9 @@ fn is_middle(positions: &[Vector3<f64>], node: usize) -> bool {
     })
 }
 
-/// An error for densities that no matter has, a warning where they may be meant: returns the density in SI where it is
-/// known. Numbers whose units nothing states are taken for m, kg, s; of matrices in memory, which may have no dimension,
-/// that is a warning.
+/// Adds an error for impossible densities, or a warning if they may be intended; returns the density in SI
+/// units if it is known. Numbers without stated units count as m, kg, s; for matrices in memory, which may
+/// be dimensionless, the finding is a warning.
 pub(super) fn check_density(
     body: &Assembled,
     densities: Option<Densities>,

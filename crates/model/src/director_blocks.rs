@@ -1,4 +1,4 @@
-//! The mass matrix of a model by blocks of nodes, as a mass of points and directors.
+//! Mass matrix of a model by node blocks, converted to a mass of points and directors.
 
 use super::columns::Columns;
 use super::rows::Rows;
@@ -6,13 +6,14 @@ use flexbody_linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Part of sqrt(M_ii M_jj) below which an entry of the rest is rounding of the values it is the difference of.
+/// Part of sqrt(M_ii M_jj) below which an entry of the rest is the rounding of the values that it is a
+/// difference of.
 pub(super) const ROUNDING: f64 = 1e-14;
 
-/// Vertices per parallel task.
+/// Number of vertices per parallel task.
 const CHUNK: usize = 1024;
 
-/// No director.
+/// Marks a vertex without directors.
 const NONE: u32 = u32::MAX;
 
 /// M by blocks of vertices.
@@ -21,7 +22,7 @@ pub(super) struct Blocks<'a> {
     rows: &'a Rows,
     /// Nodes whose rotations carry mass, ascending.
     nodes: Vec<u32>,
-    /// Place of every vertex among them.
+    /// Index in `nodes` of every vertex, or [`NONE`].
     place_of: Vec<u32>,
     points: usize,
 }
@@ -29,7 +30,7 @@ pub(super) struct Blocks<'a> {
 /// Local rows of a vertex: displacements 0, 1, 2, rotations 3, 4, 5.
 type Block = [[f64; 6]; 6];
 
-/// The symmetric matrix (n x n) of these columns.
+/// Returns the symmetric matrix (n x n) with these columns.
 fn symmetric(n: usize, parts: Vec<Columns>) -> SymmetricMatrix {
     SymmetricMatrix::new(Columns::joined(n, parts))
         .expect("entries are computed alike on both sides of the diagonal")
@@ -46,7 +47,7 @@ struct Part {
 }
 
 impl<'a> Blocks<'a> {
-    /// The mass `m` of these rows; `None` when no rotation carries mass.
+    /// Creates the blocks of the mass `m` of these rows; `None` if no rotation carries mass.
     pub(crate) fn new(m: &'a SymmetricMatrix, rows: &'a Rows) -> Option<Self> {
         let first = rows.displacements();
         let mut nodes: Vec<u32> = Vec::new();
@@ -61,22 +62,22 @@ impl<'a> Blocks<'a> {
         (!nodes.is_empty()).then_some(Self { m, rows, nodes, place_of, points })
     }
 
-    /// Number of vertices.
+    /// Returns the number of vertices.
     pub(crate) fn points(&self) -> usize {
         self.points
     }
 
-    /// Place of a vertex among the nodes whose rotations carry mass.
+    /// Returns the index of a vertex among the nodes whose rotations carry mass.
     pub(crate) fn place(&self, q: usize) -> Option<u32> {
         Some(self.place_of[q]).filter(|place| *place != NONE)
     }
 
-    /// Nodes whose rotations carry mass, ascending.
+    /// Returns the nodes whose rotations carry mass, ascending.
     pub(crate) fn into_nodes(self) -> Vec<u32> {
         self.nodes
     }
 
-    /// E_s, and the rest on extended rows where it is more than rounding.
+    /// Returns E_s, and the rest on extended rows if it is more than rounding.
     pub(crate) fn split(&self) -> (SymmetricMatrix, Option<SymmetricMatrix>) {
         let d = self.rows.dimension;
         let sizes = self.sizes();
@@ -105,12 +106,12 @@ impl<'a> Blocks<'a> {
         (scalar, Some(symmetric(n, rest_of_points)))
     }
 
-    /// Vertices of every parallel task.
+    /// Returns the vertices of every parallel task.
     fn chunks(&self) -> Vec<Range<usize>> {
         (0..self.points).step_by(CHUNK).map(|i| i..(i + CHUNK).min(self.points)).collect()
     }
 
-    /// Largest entry of the rest relative to sqrt(M_ii M_jj); 0 where it is rounding.
+    /// Returns the largest entry of the rest relative to sqrt(M_ii M_jj).
     pub(crate) fn share(&self) -> f64 {
         let sizes = self.sizes();
         let of_vertex = |p: usize| {
@@ -122,7 +123,7 @@ impl<'a> Blocks<'a> {
         shares.into_iter().fold(0.0, f64::max)
     }
 
-    /// The columns of these vertices.
+    /// Returns the columns of these vertices.
     fn part(&self, vertices: Range<usize>, sizes: &[[f64; 2]]) -> Part {
         let mut part = Part::default();
         for p in vertices {
@@ -137,7 +138,7 @@ impl<'a> Blocks<'a> {
         part
     }
 
-    /// Blocks M_pq of the vertex p with every vertex q that shares mass with it, ascending.
+    /// Returns the blocks M_pq of the vertex p with every vertex q that shares mass with it, ascending.
     fn neighbours(&self, p: usize) -> Vec<(usize, Block)> {
         let (first, d) = (self.rows.displacements(), self.rows.dimension);
         let local = |row: usize| match row.checked_sub(first) {
@@ -151,7 +152,7 @@ impl<'a> Blocks<'a> {
             let mut at = 0;
             for (&column, &value) in columns.iter().zip(values) {
                 let q = self.rows.vertex(column as usize);
-                // Columns of displacements ascend, and those of rotations.
+                // Columns ascend within displacements and within rotations.
                 at = match blocks.get(at) {
                     Some((known, _)) if *known == q => at,
                     _ => match blocks.binary_search_by_key(&q, |(known, _)| *known) {
@@ -168,14 +169,14 @@ impl<'a> Blocks<'a> {
         blocks
     }
 
-    /// mu of a block.
+    /// Returns mu of a block.
     fn mean(&self, block: &Block) -> f64 {
         let d = self.rows.dimension;
         (0..d).map(|k| block[k][k]).sum::<f64>() / d as f64
     }
 
-    /// h_a of the displacements of p and the rotations of q, M_tr = -h~ + N; `entry` has (displacement,
-    /// rotation).
+    /// Returns h_a of the displacements of p and the rotations of q, M_tr = -h~ + N; `entry` takes
+    /// (displacement, rotation).
     fn first_moment(&self, entry: impl Fn(usize, usize) -> f64, a: usize) -> f64 {
         if self.rows.dimension == 2 {
             return if a == 0 { entry(1, 5) } else { -entry(0, 5) };
@@ -184,7 +185,7 @@ impl<'a> Blocks<'a> {
         0.5 * (entry(k, 3 + l) - entry(l, 3 + k))
     }
 
-    /// P_ab of the rotations of p and q.
+    /// Returns P_ab of the rotations of p and q.
     fn second_moment(&self, block: &Block, a: usize, b: usize) -> f64 {
         if self.rows.dimension == 2 {
             return if a == b { 0.5 * block[5][5] } else { 0.0 };
@@ -193,7 +194,7 @@ impl<'a> Blocks<'a> {
             return -block[3 + b][3 + a];
         }
         let (k, l) = ((a + 1) % 3, (a + 2) % 3);
-        // tr/2 - M_aa, so that both sides of the diagonal round alike.
+        // tr/2 - M_aa, in an order that rounds equally on both sides of the diagonal.
         0.5 * ((block[3 + k][3 + k] + block[3 + l][3 + l]) - block[3 + a][3 + a])
     }
 
@@ -230,7 +231,8 @@ impl<'a> Blocks<'a> {
         }
     }
 
-    /// Square root of the largest diagonal entry of the displacements and of the rotations of every vertex.
+    /// Returns the square root of the largest diagonal entry of the displacements and of the rotations of
+    /// every vertex.
     fn sizes(&self) -> Vec<[f64; 2]> {
         let diagonal = self.m.diagonal();
         let (first, mut sizes) = (self.rows.displacements(), vec![[0.0f64; 2]; self.points]);
@@ -244,8 +246,8 @@ impl<'a> Blocks<'a> {
         sizes
     }
 
-    /// What E_s leaves of the rows of displacements of p and all rows of q, and the largest of it relative to
-    /// sqrt(M_ii M_jj); rounding is taken out.
+    /// Returns the rest in the rows of displacements of p and all rows of q, with rounding removed, and its
+    /// largest entry relative to sqrt(M_ii M_jj).
     fn rest_of(&self, p: usize, q: usize, block: &Block, sizes: &[[f64; 2]]) -> (Block, f64) {
         let d = self.rows.dimension;
         let mean = self.mean(block);
@@ -272,13 +274,13 @@ impl<'a> Blocks<'a> {
         (rest, largest)
     }
 
-    /// First extended row of the rotations of the node at a place.
+    /// Returns the first extended row of the rotations of the node at a place.
     fn rotation(&self, place: u32) -> usize {
         let d = self.rows.dimension;
         d * self.points + d * d * self.nodes.len() + 3 * place as usize
     }
 
-    /// The columns of the displacements of p. Returns their largest entry relative to sqrt(M_ii M_jj).
+    /// Adds the columns of the displacements of p. Returns their largest entry relative to sqrt(M_ii M_jj).
     fn rest_of_point(
         &self,
         p: usize,
@@ -307,7 +309,7 @@ impl<'a> Blocks<'a> {
         largest
     }
 
-    /// The columns of the rotations of the node p: N alone.
+    /// Adds the columns of the rotations of the node p, which contain N only.
     fn rest_of_rotations(
         &self,
         p: usize,

@@ -1,7 +1,7 @@
-//! The mass matrix of a model with nodal rotations as a mass of points and directors (theory section 6).
+//! Mass matrix of a model with nodal rotations as a mass of points and directors (theory section 6).
 //!
-//! A node with rotations is a point x and directors d_a = R e_a, a = 1..d, which turn with it. With the blocks
-//! of M between node i and node j,
+//! A node with rotations is a point x with directors d_a = R e_a, a = 1..d, which turn with it. With the
+//! blocks of M between node i and node j,
 //!
 //! ```text
 //! M_tr,ij = -h_ij~ + N_ij            h_ij: first moment, N_ij: symmetric
@@ -9,11 +9,11 @@
 //! M_tt,ij = mu_ij I + D_ij           mu_ij = tr(M_tt,ij)/d
 //! ```
 //!
-//! the kinetic energy of points and directors is that of a solid: their mass E_s = [mu, h; h', P], a number for
-//! every pair of points and directors, is the same along every axis and does not change with the rotations.
-//! The rest N and D, which it leaves of M, is multiplied by the velocities of the rows along the axes of the body: the
-//! rest. Of a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of the column M_tr, P = M_rr/2 I and
-//! N = 0.
+//! the kinetic energy of points and directors is that of a solid. Their mass E_s = [mu, h; h', P], one
+//! number for every pair of points and directors, is equal along every axis and does not change with the
+//! rotations. The remaining parts N and D of M are multiplied by the velocities of the rows along the axes
+//! of the body; they are called the rest. For a plane body, with the directors e_x, e_y, h = (M_y, -M_x) of
+//! the column M_tr, P = M_rr/2 I and N = 0.
 
 use super::director_blocks::{Blocks, ROUNDING};
 use super::node_moments::NodeMoments;
@@ -23,12 +23,12 @@ use flexbody_linalg::{SymmetricMatrix, contiguous, contiguous_mut, multiply, mul
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// M as a mass of points and directors, and what this leaves of it.
+/// M as a mass of points and directors, and the rest of M.
 ///
-/// Columns of *extended rows* are what it multiplies: displacements of the points (d for each), then of the
-/// directors (d for each of the d directors of a node with rotational mass), then, where there is a rest, the
-/// rotations of these nodes (three for each, in the plane one). [`DirectorMass::extend`] takes the columns of a
-/// model there, [`DirectorMass::restrict`] forces back.
+/// The mass multiplies columns of *extended rows*: displacements of the points (d each), then of the
+/// directors (d for each of the d directors of a node with rotational mass), then, if there is a rest, the
+/// rotations of these nodes (three each, in the plane one). [`DirectorMass::extend`] maps columns of a
+/// model to extended rows, [`DirectorMass::restrict`] maps forces back.
 #[derive(Debug, Clone)]
 pub struct DirectorMass {
     dimension: usize,
@@ -36,11 +36,11 @@ pub struct DirectorMass {
     points: usize,
     /// Nodes with directors, ascending.
     nodes: Vec<u32>,
-    /// Place of its node in `nodes`, axis and row of the model of every rotation of these nodes.
+    /// Rotations of these nodes: index of the node in `nodes`, axis, and row of the model.
     rotations: Vec<Rotation>,
-    /// E_s: points, then d directors of each of the nodes.
+    /// E_s: points, then the d directors of each of the nodes.
     scalar: SymmetricMatrix,
-    /// N and D, on extended rows.
+    /// Rest N and D on extended rows.
     rest: Option<SymmetricMatrix>,
 }
 
@@ -52,8 +52,8 @@ struct Rotation {
 }
 
 impl DirectorMass {
-    /// The mass `m` (rows of the model, symmetric) on points and directors; `None` when no rotation carries
-    /// mass.
+    /// Creates the mass of points and directors from `m` (rows of the model, symmetric); `None` if no
+    /// rotation carries mass.
     pub(super) fn new(m: &SymmetricMatrix, rows: &Rows) -> Option<Self> {
         let blocks = Blocks::new(m, rows)?;
         let rotations =
@@ -74,61 +74,64 @@ impl DirectorMass {
         })
     }
 
-    /// Largest entry of the rest of the mass `m`, as [`DirectorMass::new`] finds it, relative to sqrt(M_ii M_jj): how much
-    /// of M does not turn with the nodes. Zero for lumped masses and rigid regions of solids; of consistent beams and
-    /// shells it stays, and its effect falls with the square of the element size to that of the rotary inertia of their
-    /// sections. `None` when no rotation carries mass.
+    /// Returns the largest entry of the rest of the mass `m`, as [`DirectorMass::new`] finds it, relative
+    /// to sqrt(M_ii M_jj): the part of M that does not turn with the nodes. Zero for lumped masses and
+    /// rigid regions of solids. Consistent beams and shells have a rest; its effect falls with the square
+    /// of the element size to that of the rotary inertia of their sections. Returns `None` if no rotation
+    /// carries mass.
     pub(super) fn rest_share(m: &SymmetricMatrix, rows: &Rows) -> Option<f64> {
         let share = Blocks::new(m, rows)?.share();
         Some(if share > ROUNDING { share } else { 0.0 })
     }
 
-    /// Nodes with directors, ascending.
+    /// Returns the nodes with directors, ascending.
     pub fn nodes(&self) -> &[u32] {
         &self.nodes
     }
 
-    /// E_s: a number for every pair of points and directors, points first, then the directors of each of the nodes.
+    /// Returns E_s: one number for every pair of points and directors, points first, then the directors of
+    /// each of the nodes.
     pub fn scalar(&self) -> &SymmetricMatrix {
         &self.scalar
     }
 
-    /// N and D on extended rows; `None` where E_s is all of M.
+    /// Returns N and D on extended rows; `None` if E_s is all of M.
     pub fn rest(&self) -> Option<&SymmetricMatrix> {
         self.rest.as_ref()
     }
 
-    /// Number of extended rows.
+    /// Returns the number of extended rows.
     pub fn rows(&self) -> usize {
         self.turning_rows() + if self.rest.is_some() { self.turns() * self.nodes.len() } else { 0 }
     }
 
-    /// Extended rows that turn with the body, which come first: vectors of points and directors.
+    /// Returns the number of extended rows that turn with the body and come first: vectors of points and
+    /// directors.
     pub fn turning_rows(&self) -> usize {
         self.dimension * self.scalar.n()
     }
 
-    /// Rotations of a node that there can be.
+    /// Returns the number of rotations of a node.
     fn turns(&self) -> usize {
         if self.dimension == 2 { 1 } else { 3 }
     }
 
-    /// First extended row of director `a` of the node at `place`.
+    /// Returns the first extended row of director `a` of the node at `place`.
     fn director(&self, place: usize, a: usize) -> usize {
         let d = self.dimension;
         d * (self.points + d * place + a)
     }
 
-    /// First extended row of the rotations of the node at `place`, where there is a rest.
+    /// Returns the first extended row of the rotations of the node at `place`, if there is a rest.
     fn rotation(&self, place: usize) -> usize {
         self.turning_rows() + self.turns() * place
     }
 
-    /// Velocities of the extended rows for those of the rows of the model, both to first order and along the
-    /// axes of the model: theta x e_a of a director.
+    /// Returns velocities of the extended rows for those of the rows of the model, to first order and along
+    /// the axes of the model: theta x e_a for a director.
     ///
     /// # Panics
-    /// When there is not one row for each of the model.
+    /// When `shapes` does not have one row per row of the model.
     pub fn extend(&self, shapes: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(shapes.nrows(), self.model_rows, "one row per row of the model");
         let mut extended = zeros(self.rows(), shapes.ncols());
@@ -136,7 +139,7 @@ impl DirectorMass {
         extended
     }
 
-    /// [`DirectorMass::extend`] of one column, into another.
+    /// Extends one column into `extended`; see [`DirectorMass::extend`].
     pub fn extend_vector(&self, shape: &[f64], extended: &mut [f64]) {
         let points = self.dimension * self.points;
         extended[..points].copy_from_slice(&shape[..points]);
@@ -146,13 +149,13 @@ impl DirectorMass {
         }
     }
 
-    /// Displacements, velocities and accelerations of the extended rows to second order of the rotations: a director
-    /// is theta x e_a + theta x (theta x e_a) / 2 away from where it was.
+    /// Returns displacements, velocities and accelerations of the extended rows to second order of the
+    /// rotations: a director moves by theta x e_a + theta x (theta x e_a) / 2.
     ///
-    /// * `motion`: rows of the model with their rates and accelerations, along the axes of the model.
+    /// * `motion`: rows of the model, their rates and accelerations, along the axes of the model.
     ///
     /// # Panics
-    /// When there is not one row for each of the model, or not as many rates and accelerations.
+    /// When a matrix does not have one row per row of the model, or the numbers of columns differ.
     pub fn extend_turned(&self, motion: [MatRef<'_, f64>; 3]) -> [Mat<f64>; 3] {
         let mut extended = motion.map(|x| self.extend(x));
         for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
@@ -189,12 +192,12 @@ impl DirectorMass {
         }
     }
 
-    /// Unit translations and unit rotations of the extended rows, given those of the model (N x 6, in the plane
-    /// N x 3, along its axes, rotations not divided by a length): directors and rotations of nodes turn whatever
-    /// rows of rotations their nodes have.
+    /// Returns unit translations and unit rotations of the extended rows from those of the model (N x 6, in
+    /// the plane N x 3, along its axes, rotations not divided by a length). Directors and rotations of
+    /// nodes turn independently of the rows of rotations that their nodes have.
     ///
     /// # Panics
-    /// When there is not one row for each of the model.
+    /// When `fields` does not have one row per row of the model.
     pub fn extend_rigid(&self, fields: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(fields.nrows(), self.model_rows, "one row per row of the model");
         let (d, points) = (self.dimension, self.dimension * self.points);
@@ -208,11 +211,11 @@ impl DirectorMass {
         extended
     }
 
-    /// Forces on the rows of the model that do the power of forces on the extended rows: moments
-    /// sum_a e_a x f_a of those of the directors on the rotations of their node.
+    /// Returns forces on the rows of the model with the power of forces on the extended rows: forces f_a on
+    /// directors become moments sum_a e_a x f_a on the rotations of their node.
     ///
     /// # Panics
-    /// When there is not one row for each extended one.
+    /// When `forces` does not have one row per extended row.
     pub fn restrict(&self, forces: MatRef<'_, f64>) -> Mat<f64> {
         assert_eq!(forces.nrows(), self.rows(), "one row per extended row");
         let mut restricted = zeros(self.model_rows, forces.ncols());
@@ -220,7 +223,7 @@ impl DirectorMass {
         restricted
     }
 
-    /// [`DirectorMass::restrict`] of one column, into another.
+    /// Restricts one column into `restricted`; see [`DirectorMass::restrict`].
     pub fn restrict_vector(&self, forces: &[f64], restricted: &mut [f64]) {
         let points = self.dimension * self.points;
         restricted[..points].copy_from_slice(&forces[..points]);
@@ -234,7 +237,7 @@ impl DirectorMass {
         }
     }
 
-    /// y = E x of extended rows.
+    /// Computes y = E x of extended rows.
     ///
     /// # Panics
     /// When the sizes disagree.
@@ -251,7 +254,7 @@ impl DirectorMass {
         }
     }
 
-    /// [`DirectorMass::multiply`] of one column; `scratch` has as many entries.
+    /// Computes y = E x for one column; `scratch` has the length of `y`.
     pub fn multiply_vector(&self, x: &[f64], y: &mut [f64], scratch: &mut [f64]) {
         let turning = self.turning_rows();
         multiply_vector(&self.scalar, self.dimension, &x[..turning], &mut y[..turning]);
@@ -262,11 +265,11 @@ impl DirectorMass {
         }
     }
 
-    /// Adds H theta to the moments on the rotations of every node, in the rows of the model: theta of `u`, H of the
-    /// node at a place among [`DirectorMass::nodes`].
+    /// Adds H theta to the moments on the rotations of every node, in the rows of the model: theta from
+    /// `u`, H for the node at an index of [`DirectorMass::nodes`].
     ///
     /// # Panics
-    /// When there is not one row for each of the model.
+    /// When `u` or `forces` does not have one entry per row of the model.
     pub fn add_second_order(&self, h: impl Fn(usize) -> Matrix3<f64>, u: &[f64], forces: &mut [f64]) {
         assert!(u.len() == self.model_rows && forces.len() == u.len(), "one row per row of the model");
         for of_node in self.rotations.chunk_by(|a, b| a.place == b.place) {
@@ -277,10 +280,11 @@ impl DirectorMass {
         }
     }
 
-    /// The moments of the mass that turns with every node, about the point and along the axes that the rigid
-    /// motions `fields` of the extended rows have, columns of `axes` in the axes of the model.
+    /// Returns the moments of the mass that turns with every node, about the point and along the axes of
+    /// the rigid motions `fields` of the extended rows; the columns of `axes` are these axes in the axes of
+    /// the model.
     ///
-    /// * `fields`: [`DirectorMass::extend_rigid`], turned to these axes.
+    /// * `fields`: result of [`DirectorMass::extend_rigid`], turned to these axes.
     pub fn moments(&self, fields: MatRef<'_, f64>, axes: &Matrix3<f64>) -> Vec<NodeMoments> {
         let mut product = zeros(self.rows(), fields.ncols());
         self.multiply(fields, product.as_mut());
@@ -308,7 +312,7 @@ impl DirectorMass {
     }
 }
 
-/// Makes every column of `to` of that of `from`, by all threads.
+/// Computes every column of `to` from that of `from`, on all threads.
 fn each_column(from: MatRef<'_, f64>, to: &mut Mat<f64>, make: impl Fn(&[f64], &mut [f64]) + Sync) {
     let columns: Vec<_> = from.col_iter().zip(to.col_iter_mut()).collect();
     columns.into_par_iter().for_each(|(from, to)| make(contiguous(from), contiguous_mut(to)));

@@ -1,17 +1,18 @@
-//! Rotations about a direction that no matrix holds, as about the normal of a shell without drilling stiffness. Where the
-//! normal is an axis of the model the rows are empty and left out; elsewhere the direction is found by the block of each
-//! node, and the rotation follows the nodes of an element around it.
+//! Rotations about directions without any matrix entries, such as about the normal of a shell without
+//! drilling stiffness. If the normal is an axis of the model, the rows are empty and left out. Otherwise
+//! the direction is found from the block of each node, and the rotation is made to follow the nodes of an
+//! element around it.
 //!
-//! With n the direction at node i, and the rigid motion that fits the displacements of node i and of two nodes of one
-//! element with it, of angular velocity w(u), the term
+//! With n the direction at node i, and w(u) the angular velocity of the rigid motion that fits the
+//! displacements of node i and of two other nodes of an element, the term
 //!
 //! ```text
 //! k/2 (n' theta_i - n' w(u))^2
 //! ```
 //!
-//! is added to the elastic energy, k being the largest stiffness of the rotations of the node. Nothing else holds n'
-//! theta_i, so that the term is zero in every static response and every mode whatever k is: the body is the same, and the
-//! rotation moves with its element. Rigid motion leaves the term zero.
+//! is added to the elastic energy, where k is the largest stiffness of the rotations of the node. No other
+//! term depends on n' theta_i, so the term is zero in every static response and every mode for any k: the
+//! body does not change, and the rotation moves with its element. Rigid motion leaves the term zero.
 
 use super::node_pairs::neighbours;
 use super::tolerance::rounding;
@@ -21,21 +22,24 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// Area of the triangle of three nodes, across the direction and relative to the square of its longest side, below which
-/// they tell no rotation about it.
+/// Area of the triangle of three nodes, projected across the direction and relative to the square of its
+/// longest side, below which the nodes determine no rotation about it.
 const NARROW: f64 = 1e-3;
 
-/// Digits of M below which what they leave of a direction without mass is taken out: it makes M indefinite.
+/// Number of digits of M below which rounding entries along a direction without mass are removed: they
+/// would make M indefinite.
 const FULL_DIGITS: u8 = 15;
 
-/// K and M of a model whose rotations about directions without stiffness and mass follow, and a note about them.
+/// K and M of a model whose rotations about directions without stiffness and mass follow their elements,
+/// and a note about them.
 pub(super) struct Following {
     pub stiffness: SymmetricMatrix,
     pub mass: SymmetricMatrix,
     pub note: Option<Diagnostic>,
 }
 
-/// K and M as they are, or with what lets rotations about directions without stiffness and mass follow the nodes around.
+/// Returns K and M, with added terms that make rotations about directions without stiffness and mass follow
+/// the nodes around them, if there are any.
 pub(super) fn with_following_rotations(
     raw: &RawModel,
     rows: &Rows,
@@ -68,25 +72,25 @@ pub(super) fn with_following_rotations(
     Following { stiffness: held, mass, note: Some(note) }
 }
 
-/// A rotation of a node about a direction without stiffness and mass.
+/// Rotation of a node about a direction without stiffness and mass.
 struct Follower {
     node: usize,
-    /// Rows of the rotation and its parts in them: a unit vector.
+    /// Unit vector of the direction: rows of rotations and components.
     direction: Vec<(u32, f64)>,
-    /// g: the rotation less that of the nodes around.
+    /// g: the rotation minus that of the nodes around it.
     term: Vec<(u32, f64)>,
-    /// k.
+    /// Stiffness k of the added term.
     stiffness: f64,
 }
 
-/// k g g' by entries.
+/// Returns the entries of k g g'.
 fn square(term: &[(u32, f64)], size: f64) -> impl Iterator<Item = (u32, u32, f64)> {
     let pairs = term.iter().flat_map(move |a| term.iter().map(move |b| (a, b)));
-    // The product first: both triangles get the same bits.
+    // Multiply the components first: both triangles get equal bits.
     pairs.map(move |(a, b)| (a.0, b.0, (a.1 * b.1) * size))
 }
 
-/// Terms that take the products of M with a direction v out of it: (I - v v') M (I - v v') - M, by entries.
+/// Returns the entries of (I - v v') M (I - v v') - M, which removes the products of M with a direction v.
 fn rest(mass: &SymmetricMatrix, follower: &Follower) -> Vec<(u32, u32, f64)> {
     let v = &follower.direction;
     let mut product: Vec<(u32, f64)> = Vec::new();
@@ -102,7 +106,7 @@ fn rest(mass: &SymmetricMatrix, follower: &Follower) -> Vec<(u32, u32, f64)> {
     crossed.chain(square(v, along)).collect()
 }
 
-/// A matrix with further entries.
+/// Returns a matrix with further entries added.
 fn sum(matrix: &SymmetricMatrix, added: &[(u32, u32, f64)]) -> SymmetricMatrix {
     let n = matrix.n();
     let own = (0..n).flat_map(|row| {
@@ -113,7 +117,7 @@ fn sum(matrix: &SymmetricMatrix, added: &[(u32, u32, f64)]) -> SymmetricMatrix {
     SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &all))
 }
 
-/// A body with nodes that turn.
+/// Body with nodal rotations.
 struct Shell<'b> {
     rows: &'b Rows,
     nodes: &'b Nodes,
@@ -122,7 +126,8 @@ struct Shell<'b> {
 }
 
 impl Shell<'_> {
-    /// All rotations about directions without stiffness and mass, node by node; `digits` of K and M.
+    /// Returns all rotations about directions without stiffness and mass, node by node; `digits` are those
+    /// of K and M.
     fn followers(&self, digits: [u8; 2]) -> Vec<Follower> {
         let tolerances = digits.map(|digits| rounding(digits, 2));
         let mut found = Vec::new();
@@ -141,8 +146,9 @@ impl Shell<'_> {
         found
     }
 
-    /// Unit vectors in the rotations `own` of a node along which neither K nor M has an entry, and the largest stiffness of
-    /// these rotations. `tolerances`: what the digits of K and M leave of zero, relative.
+    /// Returns unit vectors in the rotations `own` of a node along which neither K nor M has entries, and
+    /// the largest stiffness of these rotations. `tolerances` are the relative rounding errors due to the
+    /// digits of K and M.
     fn empty_directions(&self, own: &[usize], tolerances: [f64; 2]) -> Vec<(Vec<f64>, f64)> {
         let block = DMatrix::from_fn(own.len(), own.len(), |i, j| entry(self.stiffness, own[i], own[j]));
         let eigen = block.symmetric_eigen();
@@ -159,7 +165,8 @@ impl Shell<'_> {
         vectors.filter(is_empty).map(|vector| (vector, largest)).collect()
     }
 
-    /// g with g'x = n' theta - n' w(u); `None` where no two nodes of an element with the node tell w.
+    /// Returns g with g'x = n' theta - n' w(u); `None` if no two nodes of an element with the node
+    /// determine w.
     fn term(&self, node: usize, axes: &[usize], direction: &[(u32, f64)]) -> Option<Vec<(u32, f64)>> {
         let mut normal = Vector3::zeros();
         axes.iter().zip(direction).for_each(|(&axis, &(_, part))| normal[axis] = part);
@@ -177,8 +184,8 @@ impl Shell<'_> {
         Some(direction.iter().copied().chain(moved).collect())
     }
 
-    /// The node and two others that K couples with it and with each other, those with the largest triangle across
-    /// `normal`.
+    /// Returns the node and two others that K couples with it and with each other: those with the largest
+    /// triangle across `normal`.
     fn element_around(&self, node: usize, normal: &Vector3<f64>) -> Option<[usize; 3]> {
         let coupled = |node: usize| neighbours(self.stiffness, self.rows, node, |_, _, value| value != 0.0);
         let near: Vec<usize> = coupled(node)
@@ -210,7 +217,8 @@ fn entry(matrix: &SymmetricMatrix, row: usize, column: usize) -> f64 {
     columns.binary_search(&(column as u32)).map_or(0.0, |at| values[at])
 }
 
-/// True if the combination `vector` of the columns `own` is zero but for `tolerance` of the largest of them.
+/// Returns true if the combination `vector` of the columns `own` is zero within `tolerance` of the largest
+/// of them.
 fn vanishes(matrix: &SymmetricMatrix, own: &[usize], vector: &[f64], tolerance: f64) -> bool {
     let mut entries: Vec<(u32, f64)> = Vec::new();
     let mut largest = 0.0f64;

@@ -1,10 +1,9 @@
-//! Elements by their nodes: what a part can be drawn by. Nothing here enters the mechanics, which are in the
-//! matrices.
+//! Elements by their nodes, for drawing only. The mechanics are in the matrices.
 
 use std::collections::BTreeMap;
 
-/// What an element looks like, whatever it does. Corner nodes come first, then one node for each edge of the
-/// shape in the order of its edges, or none of these.
+/// Geometry of an element, independent of its formulation. Corner nodes come first, then one node for each
+/// edge of the shape in the order of its edges, or none of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ElementShape {
     /// Two ends.
@@ -15,16 +14,16 @@ pub enum ElementShape {
     Quadrilateral,
     /// Four corners.
     Tetrahedron,
-    /// A base of four corners, and the apex.
+    /// Base of four corners, and the apex.
     Pyramid,
-    /// A triangle and the one above it.
+    /// Triangle and the triangle above it.
     Wedge,
-    /// A quadrilateral and the one above it.
+    /// Quadrilateral and the quadrilateral above it.
     Hexahedron,
 }
 
 impl ElementShape {
-    /// Number of corners.
+    /// Returns the number of corners.
     pub fn corners(self) -> usize {
         match self {
             Self::Line => 2,
@@ -36,7 +35,7 @@ impl ElementShape {
         }
     }
 
-    /// The corners that each edge joins.
+    /// Returns the corners joined by each edge.
     pub fn edges(self) -> &'static [[usize; 2]] {
         match self {
             Self::Line => &[[0, 1]],
@@ -62,8 +61,8 @@ impl ElementShape {
         }
     }
 
-    /// The corners of each face, counterclockwise seen from outside; a shell is a face by itself, a line has
-    /// none.
+    /// Returns the corners of each face, counterclockwise seen from outside; a shell is a face by itself, a
+    /// line has none.
     pub fn faces(self) -> &'static [&'static [usize]] {
         match self {
             Self::Line => &[],
@@ -78,19 +77,20 @@ impl ElementShape {
         }
     }
 
-    /// Whether it fills a volume.
+    /// Returns true if the shape fills a volume.
     pub fn is_solid(self) -> bool {
         matches!(self, Self::Tetrahedron | Self::Pyramid | Self::Wedge | Self::Hexahedron)
     }
 
-    /// Place of the node in the middle of the edge between two corners, behind the corners.
+    /// Returns the index of the mid-edge node between two corners; mid-edge nodes follow the corners.
     pub(super) fn middle(self, a: usize, b: usize) -> Option<usize> {
         let at = self.edges().iter().position(|&[c, d]| [c, d] == [a, b] || [d, c] == [a, b])?;
         Some(self.corners() + at)
     }
 }
 
-/// Elements of a model in the order of their file, by node numbers, and what was left out.
+/// Elements of a model in the order of their file, by node numbers, and the numbers of elements that were
+/// left out.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Elements {
     /// Shape, and the end of its nodes in `nodes`.
@@ -100,9 +100,9 @@ pub struct Elements {
 }
 
 impl Elements {
-    /// Adds an element: nodes beyond corners and the middles of edges (those of faces) are not taken, and
-    /// where there are not the middles of all edges, none is. An element with fewer nodes than corners is
-    /// left out as one of its `kind`.
+    /// Adds an element. Nodes beyond corners and mid-edge nodes (such as those of faces) are ignored, and
+    /// mid-edge nodes are used only if all are present. An element with fewer nodes than corners is counted
+    /// as left out under its `kind`.
     pub fn add(&mut self, kind: &str, shape: ElementShape, nodes: &[i64]) {
         let (corners, all) = (shape.corners(), shape.corners() + shape.edges().len());
         let taken = if nodes.len() >= all { all } else { corners };
@@ -115,28 +115,28 @@ impl Elements {
         }
     }
 
-    /// Tells of `count` elements of a kind that cannot be drawn.
+    /// Counts `count` elements of a kind that cannot be drawn.
     pub fn leave_out(&mut self, kind: &str, count: usize) {
         *self.left_out.entry(kind.to_owned()).or_default() += count;
     }
 
-    /// Number of elements that can be drawn.
+    /// Returns the number of elements that can be drawn.
     pub fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if no element can be drawn.
     pub fn is_empty(&self) -> bool {
         self.ends.is_empty()
     }
 
-    /// Shape and node numbers of each.
+    /// Returns shape and node numbers of each element.
     pub fn iter(&self) -> impl Iterator<Item = (ElementShape, &[i64])> {
         let starts = std::iter::once(0).chain(self.ends.iter().map(|(_, end)| *end));
         starts.zip(&self.ends).map(|(start, &(shape, end))| (shape, &self.nodes[start..end]))
     }
 
-    /// Kinds that cannot be drawn and how many elements there are of each, by name.
+    /// Returns the kinds that cannot be drawn, by name, and the number of elements of each.
     pub fn left_out(&self) -> impl Iterator<Item = (&str, usize)> {
         self.left_out.iter().map(|(kind, count)| (kind.as_str(), *count))
     }
@@ -147,8 +147,8 @@ mod tests {
     use super::ElementShape::{Hexahedron, Pyramid, Tetrahedron, Wedge};
     use super::*;
 
-    /// Every edge of a solid is passed by two faces, once in each direction: the faces close the solid and
-    /// all look the same way.
+    /// Every edge of a solid belongs to two faces, once in each direction: the faces close the solid with
+    /// consistent orientation.
     #[test]
     fn faces_close_every_solid() {
         for shape in [Tetrahedron, Pyramid, Wedge, Hexahedron] {

@@ -1,9 +1,9 @@
-//! Rows that no matrix holds: nodes that belong to no element, rotations of solids.
+//! Rows that are empty in all matrices: nodes without elements, rotations of solids.
 
 use flexbody_linalg::CscMatrix;
 
-/// Returns for each of `n` rows whether one of the matrices has an entry in its row or its column. Both count: whether
-/// the matrices are symmetric is checked later.
+/// Returns for each of `n` rows true if one of the matrices has an entry in its row or its column. Both are
+/// tested, since symmetry is checked later.
 pub fn filled_rows<'m>(matrices: impl IntoIterator<Item = &'m CscMatrix>, n: usize) -> Vec<bool> {
     let mut filled = vec![false; n];
     for matrix in matrices {

@@ -1,14 +1,15 @@
-//! Stiffness and mass given in each other's place.
+//! Check for exchanged stiffness and mass matrices.
 
 use super::assembled::Assembled;
 use super::rows::Rows;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::SymmetricMatrix;
 
-/// Row sum of a stiffness relative to that of its absolute values, when translations leave it free.
+/// Row sum of a stiffness, relative to that of its absolute values, below which translations leave the row
+/// free.
 const FREE: f64 = 1e-6;
 
-/// An error when translations leave M free but not K.
+/// Returns an error if translations leave M free but not K.
 pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
     let Assembled { raw, rows, stiffness, mass, .. } = body;
     let (free_in_mass, free_in_stiffness) = (free_rows(mass, rows), free_rows(stiffness, rows));
@@ -22,8 +23,7 @@ pub(super) fn check_exchanged_matrices(body: &Assembled) -> Option<Diagnostic> {
     })
 }
 
-/// Which part of the displacements of nodes that have entries feels no force when the body moves along any
-/// axis.
+/// Returns the part of the nonempty rows of displacements without force under translations along all axes.
 fn free_rows(matrix: &SymmetricMatrix, rows: &Rows) -> f64 {
     let (d, displacements) = (rows.dimension, rows.dimension * rows.nodes);
     let (mut held, mut free) = (0, 0);

@@ -1,5 +1,5 @@
-//! The checked model: every used node has d displacements (d: the dimension), row d i + k is direction k of
-//! node i; other rows follow as [`Rows`] has them.
+//! Checked model: every used node has d displacements (d: the dimension), and row d i + k is direction k of
+//! node i; other rows follow in the order of [`Rows`].
 
 use super::assembled::Assembled;
 use super::mass_structure::MassForm;
@@ -15,8 +15,8 @@ use flexbody_linalg::{CscMatrix, EliminationOrder, Pencil, SymmetricMatrix, larg
 use std::borrow::Cow;
 use std::sync::{Arc, OnceLock};
 
-/// A checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the
-/// order of `nodes`, then what else [`rows`](FeModel::rows) says.
+/// Checked free body. Internal order of degrees of freedom: node-major x, y, z (in the plane x, y) in the
+/// order of `nodes`, then the other rows given by [`rows`](FeModel::rows).
 #[derive(Debug, Clone)]
 pub struct FeModel {
     name: String,
@@ -25,12 +25,12 @@ pub struct FeModel {
     mesh: Option<SurfaceMesh>,
     rows: Rows,
     stiffness: SymmetricMatrix,
-    /// Ms, or what comes closest to it.
+    /// Ms, or its closest approximation.
     mean_mass: SymmetricMatrix,
-    /// M, where it is not Ms kron I_d.
+    /// M, if it is not Ms kron I_d.
     whole_mass: Option<SymmetricMatrix>,
     commutes: bool,
-    /// True if Ms kron I_d is M to the last bit.
+    /// True if M equals Ms kron I_d exactly.
     exact_scalar_mass: bool,
     damping: Option<Damping<SymmetricMatrix>>,
     geometric_stiffness: Vec<GeometricStiffness<SymmetricMatrix>>,
@@ -39,15 +39,16 @@ pub struct FeModel {
     digits: u8,
     rigid_residual: f64,
     mass_deviation: f64,
-    /// Part of the mass that does not turn with the nodes; zero where that is rounding.
+    /// Part of the mass that does not turn with the nodes; zero if it is rounding.
     fixed_mass_share: f64,
     diagonal_mass: bool,
-    /// Internal row of each matrix row, `u32::MAX` of those that are left out; none when they are the same.
+    /// Internal row of each matrix row, `u32::MAX` for rows that are left out; `None` if the orders are
+    /// equal.
     row_to_internal: Option<Vec<u32>>,
     given_rows: Arc<GivenRows>,
     number: Option<BodyNumber>,
     elimination: EliminationOrder,
-    /// M on points and directors, once somebody needs it.
+    /// M on points and directors, computed on demand.
     director_mass: OnceLock<Option<Arc<DirectorMass>>>,
 }
 
@@ -89,41 +90,41 @@ impl FeModel {
         }
     }
 
-    /// Model name.
+    /// Returns the name of the model.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// 3, or 2 for a body in the plane: displacements per node.
+    /// Returns the number of displacements per node: 3, or 2 for a body in the plane.
     pub fn dimension(&self) -> usize {
         self.rows.dimension
     }
 
-    /// Units of all numbers.
+    /// Returns the units of all numbers.
     pub fn units(&self) -> &UnitSystem {
         &self.units
     }
 
-    /// Nodes that carry degrees of freedom, in the order of the node table.
+    /// Returns the nodes with degrees of freedom, in the order of the node table.
     pub fn nodes(&self) -> &Nodes {
         &self.nodes
     }
 
-    /// The surface, by indices of the nodes, where elements are known.
+    /// Returns the surface, by indices of the nodes, if elements are known.
     pub fn mesh(&self) -> Option<&SurfaceMesh> {
         self.mesh.as_ref()
     }
 
-    /// K, row d i + k for direction k of node i, then the other rows.
+    /// Returns K: row d i + k for direction k of node i, then the other rows.
     pub fn stiffness(&self) -> &SymmetricMatrix {
         &self.stiffness
     }
 
-    /// The same model with its whole mass lumped: `masses` (one for each node) at the displacements of the
-    /// nodes, none at other rows. Damping in proportion to the mass follows it.
+    /// Returns the model with its whole mass lumped: `masses` (one per node) at the displacements of the
+    /// nodes, zero at other rows. Mass-proportional damping follows the new mass.
     ///
     /// # Panics
-    /// When there is not one mass for each node.
+    /// When the number of masses is not the number of nodes.
     pub fn with_nodal_masses(&self, masses: &[f64]) -> Self {
         assert_eq!(masses.len(), self.nodes.len(), "one mass for each node");
         let d = self.dimension();
@@ -147,24 +148,25 @@ impl FeModel {
         }
     }
 
-    /// What the rows of the matrices are.
+    /// Returns the meaning of the rows of the matrices.
     pub fn rows(&self) -> &Rows {
         &self.rows
     }
 
-    /// Ms: M = Ms kron I_d for the displacements, of nodes and then of vectors without a place, and no other
-    /// row carries mass. `None` when M has no such form.
+    /// Returns Ms with M = Ms kron I_d for the displacements of nodes and then of vectors without a
+    /// position, if no other row carries mass. Returns `None` if M does not have this form.
     pub fn scalar_mass(&self) -> Option<&SymmetricMatrix> {
         self.commutes.then_some(&self.mean_mass)
     }
 
-    /// True if [`scalar_mass`](Self::scalar_mass) is the mass matrix as stored, and no mean of directions that differ
-    /// by rounding.
+    /// Returns true if [`scalar_mass`](Self::scalar_mass) is the mass matrix as stored, and not the mean of
+    /// directions that differ by rounding.
     pub fn has_exact_scalar_mass(&self) -> bool {
         self.exact_scalar_mass
     }
 
-    /// M on points and directors; `None` when no rotation of a node carries mass. Made at the first call.
+    /// Returns M on points and directors; `None` if no rotation of a node carries mass. Computed at the
+    /// first call.
     pub fn director_mass(&self) -> Option<&Arc<DirectorMass>> {
         let made = || {
             let mass = self.whole_mass.as_ref()?;
@@ -173,8 +175,8 @@ impl FeModel {
         self.director_mass.get_or_init(made).as_ref()
     }
 
-    /// The mean over the directions of the mass between displacements of nodes (n x n): what lumping starts
-    /// from.
+    /// Returns the mean over the directions of the mass between displacements of nodes (n x n), the input
+    /// of lumping.
     pub fn nodal_mass(&self) -> Cow<'_, SymmetricMatrix> {
         let n = self.nodes.len();
         match self.rows.vectors() {
@@ -183,23 +185,23 @@ impl FeModel {
         }
     }
 
-    /// Damping, where it was given; a matrix D has the rows of K.
+    /// Returns the damping, if given; a matrix D has the rows of K.
     pub fn damping(&self) -> Option<&Damping<SymmetricMatrix>> {
         self.damping.as_ref()
     }
 
-    /// Geometric stiffness of unit loads along the axes of the model, where it was given, each with the rows
+    /// Returns the geometric stiffness of unit loads along the axes of the model, if given, with the rows
     /// of K.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<SymmetricMatrix>] {
         &self.geometric_stiffness
     }
 
-    /// The elimination order that all factors of [`pencil`](Self::pencil) share.
+    /// Returns the elimination order shared by all factors of [`pencil`](Self::pencil).
     pub fn elimination(&self) -> &EliminationOrder {
         &self.elimination
     }
 
-    /// K and M.
+    /// Returns K and M.
     pub fn pencil(&self) -> Pencil<'_> {
         match &self.whole_mass {
             None => Pencil::new(&self.stiffness, &self.mean_mass, self.dimension()),
@@ -207,61 +209,61 @@ impl FeModel {
         }
     }
 
-    /// The rigid fields (one row per row of K) about `centre`: translations, then rotations divided by
-    /// `length`. [`Rows::rigid_fields`].
+    /// Returns the rigid fields (one row per row of K) about `centre`: translations, then rotations divided
+    /// by `length`. See [`Rows::rigid_fields`].
     pub fn rigid_fields(&self, centre: [f64; 3], length: f64) -> Mat<f64> {
         self.rows.rigid_fields(&self.nodes.positions, centre, length)
     }
 
-    /// Length of the longest displacement of a node, of the displacements `u` of all rows.
+    /// Returns the length of the longest displacement of a node for the displacements `u` of all rows.
     pub fn longest_displacement(&self, u: &[f64]) -> f64 {
         let d = self.dimension();
         let squares = u[..d * self.nodes.len()].chunks_exact(d).map(|u| u.iter().map(|u| u * u).sum::<f64>());
         squares.fold(0.0, larger).sqrt()
     }
 
-    /// Named node sets.
+    /// Returns the named node sets.
     pub fn interfaces(&self) -> &[NodeSet] {
         &self.interfaces
     }
 
-    /// Takes the fingerprints of the files of the model that were not taken while reading.
+    /// Computes the fingerprints of the files of the model that were not computed while reading.
     ///
     /// # Errors
-    /// FB101, FB132 for a file that is no longer the one that was read.
+    /// FB101, FB132 for a file that changed since it was read.
     pub(super) fn find_sources(&self) -> Result<(), Diagnostic> {
         self.sources.find()
     }
 
-    /// Files it was read from.
+    /// Returns the files that the model was read from.
     pub fn sources(&self) -> &[SourceFile] {
         &self.sources
     }
 
-    /// Significant decimal digits of the stiffness values.
+    /// Returns the significant decimal digits of the stiffness values.
     pub fn digits(&self) -> u8 {
         self.digits
     }
 
-    /// max over the rows of |K R| / sum |K|: how well K annihilates rigid motion.
+    /// Returns max over the rows of |K R| / sum |K|: the accuracy with which K annihilates rigid motion.
     pub fn rigid_residual(&self) -> f64 {
         self.rigid_residual
     }
 
-    /// Largest deviation of a mass block from a multiple of the identity, relative to sqrt(alpha_ii
-    /// alpha_jj).
+    /// Returns the largest deviation of a mass block from a multiple of the identity, relative to
+    /// sqrt(alpha_ii alpha_jj).
     pub fn mass_deviation(&self) -> f64 {
         self.mass_deviation
     }
 
-    /// Largest entry of the part of M that is kept along the axes of the body while its nodes turn, relative to
-    /// sqrt(M_ii M_jj): blocks of displacements that are no multiples of I and, of [`DirectorMass`], symmetric
-    /// blocks between displacements and rotations. Zero where it is rounding.
+    /// Returns the largest entry of the part of M that keeps the axes of the body while its nodes turn,
+    /// relative to sqrt(M_ii M_jj): blocks of displacements that are no multiples of I and, for
+    /// [`DirectorMass`], symmetric blocks between displacements and rotations. Zero if it is rounding.
     pub fn fixed_mass_share(&self) -> f64 {
         self.fixed_mass_share
     }
 
-    /// Keeps the part of M that does not turn, unless it is at most `rounding`.
+    /// Finds the part of M that does not turn; parts up to `rounding` count as zero.
     pub(super) fn find_fixed_mass(&mut self, rounding: f64) {
         let share = match (self.scalar_mass(), &self.whole_mass) {
             (None, Some(mass)) => DirectorMass::rest_share(mass, &self.rows).unwrap_or(self.mass_deviation),
@@ -271,25 +273,25 @@ impl FeModel {
         self.fixed_mass_share = if share > rounding { share } else { 0.0 };
     }
 
-    /// Whether M is diagonal: lumped by the FE program.
+    /// Returns true if M is diagonal (lumped by the FE program).
     pub fn has_diagonal_mass(&self) -> bool {
         self.diagonal_mass
     }
 
-    /// Number of rows of the matrices as they were read, with those that no matrix holds.
+    /// Returns the number of rows of the matrices as read, including rows that are empty in all matrices.
     pub fn matrix_rows(&self) -> usize {
         self.row_to_internal.as_ref().map_or(self.stiffness.n(), Vec::len)
     }
 
-    /// True if a row of the matrices as they were read has neither stiffness nor mass and is left out.
+    /// Returns true if a row of the matrices as read has neither stiffness nor mass and is left out.
     pub fn is_left_out(&self, row: usize) -> bool {
         self.row_to_internal.as_ref().is_some_and(|to| to[row] == u32::MAX)
     }
 
-    /// Columns that are given by the rows of the matrices as they were read, in the internal order.
+    /// Returns columns given by the rows of the matrices as read, in the internal order.
     ///
     /// # Panics
-    /// When there are not as many rows.
+    /// When the number of rows differs.
     pub fn in_internal_order(&self, columns: Mat<f64>) -> Mat<f64> {
         assert_eq!(columns.nrows(), self.matrix_rows(), "rows of the matrices");
         let Some(to) = &self.row_to_internal else { return columns };
@@ -302,22 +304,23 @@ impl FeModel {
         ordered
     }
 
-    /// Maps for shapes and loads from the rows of the files to the rows of K and M as they were read.
+    /// Returns the maps for shapes and loads from the rows of the files to the rows of K and M as read.
     pub fn given_rows(&self) -> &GivenRows {
         &self.given_rows
     }
 
-    /// Numbers of rows that shapes and loads may have: that of K, and others that files have.
+    /// Returns the numbers of rows that shapes and loads may have: that of K, and those of other files.
     pub fn row_counts(&self) -> Vec<usize> {
         std::iter::once(self.matrix_rows()).chain(self.given_rows.counts()).collect()
     }
 
-    /// Which body of several in the same matrices it is; `None` for a model that was not split.
+    /// Returns the number of this body if the matrices held several bodies; `None` for a model that was not
+    /// split.
     pub fn number(&self) -> Option<BodyNumber> {
         self.number
     }
 
-    /// Label of an internal row.
+    /// Returns the label of an internal row.
     pub fn label(&self, row: usize) -> DofLabel {
         self.rows.label(&self.nodes, row)
     }

@@ -1,34 +1,36 @@
-//! Geometric stiffness as a user states it: matrices of the stiffness that the stress under a unit load adds.
+//! Geometric stiffness given by the user: matrices of the stiffness due to the stress under unit loads.
 
 use nalgebra::Matrix3;
 
-/// What kind of load stresses the body.
+/// Kind of load that stresses the body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum LoadKind {
-    /// Inertia forces -M a of a unit acceleration a of the frame's origin along an axis. Gravity g counts as
-    /// an acceleration -g.
+    /// Inertia forces -M a of a unit acceleration a of the origin of the frame along an axis. Gravity g
+    /// counts as an acceleration -g.
     Acceleration,
-    /// Inertia forces -M (alpha x x) of a unit angular acceleration about an axis through the frame's origin.
+    /// Inertia forces -M (alpha x x) of a unit angular acceleration about an axis through the origin of the
+    /// frame.
     AngularAcceleration,
-    /// Centrifugal forces: K(w) = sum_{k <= l} w_k w_l K_kl, from -M (w x (w x x)) about the frame's origin.
+    /// Centrifugal forces: K(w) = sum_{k <= l} w_k w_l K_kl, from -M (w x (w x x)) about the origin of the
+    /// frame.
     Spin,
     /// Unit force along an axis at the named interface.
     Force(String),
     /// Unit moment about an axis at the named interface.
     Moment(String),
-    /// A unit of a load that is known by its name only.
+    /// Unit of a load known by its name only.
     Named(String),
 }
 
 impl LoadKind {
-    /// The kinds as they are called in manifests and files; [`LoadKind::Named`] is `load`.
+    /// Names of the kinds in manifests and files; [`LoadKind::Named`] is `load`.
     pub const NAMES: [&'static str; 6] =
         ["acceleration", "angular_acceleration", "spin", "force", "moment", "load"];
 
     /// Axes of the components of [`LoadKind::Spin`].
     pub const SPIN: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)];
 
-    /// Name of the kind.
+    /// Returns the name of the kind.
     pub fn name(&self) -> &'static str {
         Self::NAMES[match self {
             Self::Acceleration => 0,
@@ -40,8 +42,8 @@ impl LoadKind {
         }]
     }
 
-    /// Names of its components, in their order: three axes, six products of spin rates; a named load has a
-    /// single one without a name.
+    /// Returns the names of the components in their order: three axes, or six products of spin rates. A
+    /// named load has one component without a name.
     pub fn components(&self) -> &'static [&'static str] {
         match self {
             Self::Spin => &["xx", "yy", "zz", "xy", "yz", "xz"],
@@ -50,7 +52,7 @@ impl LoadKind {
         }
     }
 
-    /// The components that a body of this dimension has: in the plane x and y, about z.
+    /// Returns the components that a body of the given dimension has: in the plane along x and y, about z.
     pub fn of_dimension(&self, dimension: usize) -> &'static [usize] {
         match (dimension, self) {
             (_, Self::Named(_)) => &[0],
@@ -61,7 +63,7 @@ impl LoadKind {
         }
     }
 
-    /// The interface that it acts at.
+    /// Returns the interface that the load acts at.
     pub fn interface(&self) -> Option<&str> {
         match self {
             Self::Force(interface) | Self::Moment(interface) => Some(interface),
@@ -70,22 +72,23 @@ impl LoadKind {
     }
 }
 
-/// A unit load.
+/// Unit load.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct UnitLoad {
-    /// Its kind.
+    /// Kind of the load.
     pub kind: LoadKind,
     /// Index into [`LoadKind::components`].
     pub component: usize,
 }
 
 impl UnitLoad {
-    /// Name of the component; empty for a named load.
+    /// Returns the name of the component; empty for a named load.
     pub fn axis(&self) -> &'static str {
         self.kind.components().get(self.component).copied().unwrap_or("")
     }
 
-    /// `spin_xx`, `acceleration_x`, `force_z_tip` (interface `tip`), `load_pretension`: its name in files.
+    /// Returns the name in files, such as `spin_xx`, `acceleration_x`, `force_z_tip` (interface `tip`),
+    /// `load_pretension`.
     pub fn label(&self) -> String {
         let axis = self.axis();
         match &self.kind {
@@ -95,7 +98,7 @@ impl UnitLoad {
         }
     }
 
-    /// The load that is called `label`; the inverse of [`UnitLoad::label`].
+    /// Returns the load with the name `label`; the inverse of [`UnitLoad::label`].
     pub fn from_label(label: &str) -> Option<Self> {
         let split = |kind: &&'static str| Some((*kind, label.strip_prefix(*kind)?.strip_prefix('_')?));
         let (kind, rest) = LoadKind::NAMES.iter().find_map(split)?;
@@ -113,12 +116,12 @@ impl UnitLoad {
         Some(Self { kind, component })
     }
 
-    /// What this load (component a, axes of the model) is in units of the loads of its kind along other axes,
-    /// the columns of `axes`: v_a = sum_i A_ai v_i' for vectors, w_a w_b = sum_ij A_ai A_bj w_i' w_j' for
-    /// spin, a named load itself.
+    /// Returns this load (component a, axes of the model) in units of the loads of its kind along other
+    /// axes, the columns of `axes`: v_a = sum_i A_ai v_i' for vectors, w_a w_b = sum_ij A_ai A_bj w_i' w_j'
+    /// for spin. A named load does not change.
     ///
     /// # Panics
-    /// When the component is not one of the kind's.
+    /// When the component does not belong to the kind.
     pub fn along(&self, axes: &Matrix3<f64>) -> Vec<f64> {
         let component = self.component;
         match self.kind {
@@ -137,7 +140,7 @@ impl UnitLoad {
 }
 
 impl std::fmt::Display for UnitLoad {
-    /// `spin xx`, `force x at interface tip`, `load pretension`.
+    /// Formats the load as `spin xx`, `force x at interface tip`, `load pretension`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let kind = self.kind.name().replace('_', " ");
         match &self.kind {
@@ -148,11 +151,12 @@ impl std::fmt::Display for UnitLoad {
     }
 }
 
-/// The stiffness that the stress of a unit load adds. `K` stands for the matrix: its place in a file, what
-/// was read, the matrix itself, or what it is reduced to.
+/// Stiffness due to the stress of a unit load. `K` is the type of the matrix: a path, a matrix as read, the
+/// checked matrix, or its reduced form.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GeometricStiffness<K> {
-    /// The load; its components are along the axes of the model, of what is reduced along those of the body.
+    /// Unit load; its components are along the axes of the model, for a reduced matrix along those of the
+    /// body.
     pub load: UnitLoad,
     /// K_geo, symmetric, with the rows of K and M. Unit: that of K over that of the load.
     pub matrix: K,

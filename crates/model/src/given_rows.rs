@@ -1,5 +1,5 @@
-//! Rows of files beside K and M where the rows of the model are others: turned from the axes of nodes into those
-//! of the model, without rows that follow others, without empty rows.
+//! Maps from the rows of files to the rows of the model if they differ: turned from the axes of nodes to
+//! those of the model, without dependent rows, without empty rows.
 
 use super::DofLabel;
 use faer::Mat;
@@ -9,31 +9,31 @@ use std::collections::{BTreeMap, HashMap};
 /// Unit vectors along the rows of a node, in the axes of the model.
 pub type NodeAxes = [[f64; 3]; 3];
 
-/// Entries of rows that the model does not have may be this part of the largest entry of their matrix.
+/// Largest allowed entry in rows that the model does not have, relative to the largest entry of the matrix.
 const ROUNDING: f64 = 1e-12;
 
-/// Maps everything that is given by rows, or along the axes of nodes, to the rows of the model.
+/// Maps from data given by rows, or along the axes of nodes, to the rows of the model.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct GivenRows {
     maps: Vec<RowMap>,
     axes: HashMap<i64, NodeAxes>,
 }
 
-/// Maps the rows of a file to those of the model: x_file = T x.
+/// Map from the rows of a file to those of the model: x_file = T x.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RowMap {
-    /// T' (all rows, empty ones included, by rows of the file).
+    /// T' (all rows, including empty ones, by rows of the file).
     follows: CscMatrix,
-    /// P of the same shape, P T = I: the motion of the model in that of the file.
+    /// P, of the shape of `follows`, with P T = I: selects the motion of the model from that of the file.
     picks: CscMatrix,
-    /// Rows that the model keeps, ascending.
+    /// Rows in the model, ascending.
     kept: Vec<u32>,
 }
 
 impl RowMap {
-    /// Maps rows of a file: column i of `follows` is the combination of rows that row i of the file moves with,
-    /// column i of `picks` says which rows take the motion of row i of the file, and `kept` are the rows that
-    /// the model has, ascending.
+    /// Creates a map of rows of a file. Column i of `follows` is the combination of rows that row i of the
+    /// file moves with, column i of `picks` defines the rows that take the motion of row i of the file, and
+    /// `kept` are the rows in the model, ascending.
     ///
     /// # Panics
     /// If the shapes of `follows` and `picks` differ.
@@ -43,7 +43,7 @@ impl RowMap {
         Self { follows, picks, kept }
     }
 
-    /// Number of rows of the file.
+    /// Returns the number of rows of the file.
     pub fn n_given(&self) -> usize {
         self.follows.n_cols()
     }
@@ -92,12 +92,13 @@ impl RowMap {
         rows.iter().copied().zip(values.iter().copied())
     }
 
-    /// Row of the model of a row, where the model keeps it.
+    /// Returns the row of the model for a row, if the model has it.
     fn place(&self, row: u32) -> Option<u32> {
         self.kept.binary_search(&row).ok().map(|place| place as u32)
     }
 
-    /// Multiplies `by` with columns: the rows that the model keeps, and the largest absolute value of the others.
+    /// Multiplies `by` with columns; returns the rows in the model, and the largest absolute value of the
+    /// others.
     fn columns(&self, by: &CscMatrix, columns: &Mat<f64>) -> (Mat<f64>, f64) {
         let mut all: Mat<f64> = Mat::zeros(by.n_rows(), columns.ncols());
         for given in 0..by.n_cols() {
@@ -115,18 +116,19 @@ impl RowMap {
     }
 }
 
-/// A matrix or a load has entries in rows that the model does not have.
+/// Error: a matrix or a load has entries in rows that the model does not have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LostRow;
 
 impl GivenRows {
-    /// Maps for files of different numbers of rows, and the unit vectors along the rows of nodes whose results
-    /// stand along axes of their own. Of two maps for the same number of rows the first counts.
+    /// Creates the maps for files with different numbers of rows, and the unit vectors along the rows of
+    /// nodes whose results are along axes of their own. If two maps have one number of rows, the first
+    /// counts.
     pub fn new(maps: Vec<RowMap>, axes: HashMap<i64, NodeAxes>) -> Self {
         Self { maps, axes }
     }
 
-    /// Numbers of rows, besides that of the model, that files may have.
+    /// Returns the numbers of rows, besides that of the model, that files may have.
     pub fn counts(&self) -> impl Iterator<Item = usize> + '_ {
         self.maps.iter().map(RowMap::n_given)
     }
@@ -135,7 +137,7 @@ impl GivenRows {
         self.maps.iter().find(|map| map.n_given() == n_given)
     }
 
-    /// Maps a symmetric matrix A to T' A T. A matrix of another number of rows stays as it is.
+    /// Maps a symmetric matrix A to T' A T. A matrix with another number of rows does not change.
     ///
     /// # Errors
     /// [`LostRow`] if entries belong to rows that the model does not have.
@@ -146,7 +148,7 @@ impl GivenRows {
         }
     }
 
-    /// Maps displacements, one column each. Columns of another number of rows stay as they are.
+    /// Maps displacements, one column each. Columns with another number of rows do not change.
     pub fn motions(&self, columns: Mat<f64>) -> Mat<f64> {
         match self.map(columns.nrows()) {
             Some(map) => map.columns(&map.picks, &columns).0,
@@ -154,7 +156,7 @@ impl GivenRows {
         }
     }
 
-    /// Maps forces f to T' f, one column each. Columns of another number of rows stay as they are.
+    /// Maps forces f to T' f, one column each. Columns with another number of rows do not change.
     ///
     /// # Errors
     /// [`LostRow`] if forces act on rows that the model does not have.
@@ -164,11 +166,11 @@ impl GivenRows {
         if lost > ROUNDING * columns.norm_max() { Err(LostRow) } else { Ok(forces) }
     }
 
-    /// Turns displacements that are given along the axes of the nodes into the axes of the model: rows by `labels`,
-    /// one column for each.
+    /// Turns displacements given along the axes of the nodes to the axes of the model: rows by `labels`,
+    /// one column each.
     ///
     /// # Errors
-    /// A node that has some of its displacements, or of its rotations, but not all three.
+    /// The number of a node with some but not all three of its displacements, or of its rotations.
     pub fn turn(&self, labels: &[DofLabel], columns: &mut Mat<f64>) -> Result<(), i64> {
         let mut vectors: BTreeMap<(i64, bool), [Option<usize>; 3]> = BTreeMap::new();
         for (row, label) in labels.iter().enumerate().filter(|(_, own)| self.axes.contains_key(&own.node)) {
@@ -188,7 +190,7 @@ impl GivenRows {
         Ok(())
     }
 
-    /// Keeps the axes of nodes alone, for a part of the model: no file has the rows of a part.
+    /// Returns only the axes of nodes, for a part of the model: no file has the rows of a part.
     pub(super) fn of_part(&self) -> Self {
         Self { maps: Vec::new(), axes: self.axes.clone() }
     }

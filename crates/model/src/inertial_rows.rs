@@ -1,4 +1,4 @@
-//! The rows that the inertia of a model acts on, whatever its mass is.
+//! Rows that the inertia of a model acts on, for any mass matrix.
 
 use super::node_moments::{NodeMoments, RigidAcceleration};
 use super::rigid::centre_and_length;
@@ -9,31 +9,32 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::borrow::Cow;
 
-/// The rows that the inertia of a model acts on: those of the model or, where rotations of its nodes carry mass,
-/// points and directors (theory section 6). Inertia forces of a moving body are found on these rows and brought
+/// Rows that the inertia of a model acts on: those of the model or, if nodal rotations carry mass, points
+/// and directors (theory section 6). Inertia forces of a moving body are computed on these rows and mapped
 /// back by [`InertialRows::restrict`].
 ///
-/// The second case leaves the velocity of the origin out, V = 0, and has the acceleration
-/// a = V' + omega x V - g in its place: of a mass of points and directors both are the same, and what does not
-/// turn with the nodes must not feel a flight. Its rigid motions are about the centre of mass.
+/// With directors, the velocity of the origin is omitted, V = 0, and the acceleration a = V' + omega x V -
+/// g replaces V'. For a mass of points and directors both are equal, and the part of the mass that does not
+/// turn with the nodes must not depend on a constant velocity. The rigid motions are then about the centre
+/// of mass.
 #[derive(Debug, Clone)]
 pub struct InertialRows<'m> {
     model: &'m FeModel,
     directors: Option<Directors<'m>>,
-    /// Point that rigid motions are about, axes of the model.
+    /// Reference point of the rigid motions, axes of the model.
     centre: Vector3<f64>,
 }
 
 #[derive(Debug, Clone)]
 struct Directors<'m> {
     mass: &'m DirectorMass,
-    /// Of every node of `mass`, about the centre and along the axes of the model.
+    /// Moments of every node of `mass`, about the centre and along the axes of the model.
     moments: Vec<NodeMoments>,
 }
 
 impl<'m> InertialRows<'m> {
-    /// The rows of `model`; rigid motions are about `origin` (axes of the model) or, where there are directors,
-    /// about the centre of mass.
+    /// Creates the rows of `model`; rigid motions are about `origin` (axes of the model) or, with
+    /// directors, about the centre of mass.
     pub fn new(model: &'m FeModel, origin: Vector3<f64>) -> Self {
         let Some(mass) = model.director_mass() else {
             return Self { model, directors: None, centre: origin };
@@ -44,17 +45,17 @@ impl<'m> InertialRows<'m> {
         Self { model, directors: Some(Directors { mass, moments }), centre }
     }
 
-    /// True if rotations of nodes carry mass, so that V is left out.
+    /// Returns true if rotations of nodes carry mass, so that V is omitted.
     pub fn have_directors(&self) -> bool {
         self.directors.is_some()
     }
 
-    /// The point that rigid motions are about, axes of the model.
+    /// Returns the reference point of the rigid motions, axes of the model.
     pub fn centre(&self) -> Vector3<f64> {
         self.centre
     }
 
-    /// Columns of the model (N rows) on these rows.
+    /// Returns columns of the model (N rows) on these rows.
     pub fn extend<'x>(&self, x: &'x Mat<f64>) -> Cow<'x, Mat<f64>> {
         match &self.directors {
             Some(directors) => Cow::Owned(directors.mass.extend(x.as_ref())),
@@ -62,8 +63,8 @@ impl<'m> InertialRows<'m> {
         }
     }
 
-    /// Displacements, velocities and accelerations of the model on these rows, to second order where directors
-    /// turn ([`DirectorMass::extend_turned`]).
+    /// Returns displacements, velocities and accelerations of the model on these rows, to second order if
+    /// directors turn ([`DirectorMass::extend_turned`]).
     pub fn extend_turned(&self, motion: [&Mat<f64>; 3]) -> [Mat<f64>; 3] {
         match &self.directors {
             Some(directors) => directors.mass.extend_turned(motion.map(Mat::as_ref)),
@@ -71,7 +72,7 @@ impl<'m> InertialRows<'m> {
         }
     }
 
-    /// Unit translations along the axes of the model and unit rotations about the centre.
+    /// Returns unit translations along the axes of the model and unit rotations about the centre.
     pub fn rigid(&self) -> Mat<f64> {
         let fields = self.model.rigid_fields(self.centre.into(), 1.0);
         match &self.directors {
@@ -80,7 +81,7 @@ impl<'m> InertialRows<'m> {
         }
     }
 
-    /// The mass times columns of these rows.
+    /// Returns the product of the mass with columns of these rows.
     pub fn weigh(&self, x: MatRef<'_, f64>) -> Mat<f64> {
         match &self.directors {
             Some(directors) => {
@@ -92,7 +93,7 @@ impl<'m> InertialRows<'m> {
         }
     }
 
-    /// Forces on the rows of the model that do the power of `forces` on these rows.
+    /// Returns forces on the rows of the model with the power of `forces` on these rows.
     pub fn restrict(&self, forces: Mat<f64>) -> Mat<f64> {
         match &self.directors {
             Some(directors) => directors.mass.restrict(forces.as_ref()),
@@ -100,7 +101,7 @@ impl<'m> InertialRows<'m> {
         }
     }
 
-    /// Number of rows of vectors that turn with the body, which come first.
+    /// Returns the number of rows of vectors that turn with the body and come first.
     fn turning_rows(&self) -> usize {
         match &self.directors {
             Some(directors) => directors.mass.turning_rows(),
@@ -108,7 +109,8 @@ impl<'m> InertialRows<'m> {
         }
     }
 
-    /// y += omega x x of every vector that turns with the body; column j with the j-th omega, axes of the model.
+    /// Computes y += omega x x for every vector that turns with the body; column j with the j-th omega,
+    /// axes of the model.
     pub fn add_turned(&self, omega: impl Fn(usize) -> Vector3<f64> + Sync, x: &Mat<f64>, y: &mut Mat<f64>) {
         let columns: Vec<_> = y.col_iter_mut().enumerate().collect();
         columns.into_par_iter().for_each(|(j, y)| {
@@ -116,7 +118,7 @@ impl<'m> InertialRows<'m> {
         });
     }
 
-    /// S_a x: the turned vectors of every column, zero in all other rows.
+    /// Returns S_a x: the turned vectors of every column, zero in all other rows.
     pub fn turned(&self, omega: &Vector3<f64>, x: &Mat<f64>) -> Mat<f64> {
         let mut turned = Mat::zeros(x.nrows(), x.ncols());
         self.add_turned(|_| *omega, x, &mut turned);
@@ -128,7 +130,7 @@ impl<'m> InertialRows<'m> {
         add_turned(self.model.dimension(), &x[..end], omega, &mut y[..end]);
     }
 
-    /// sum_i x_i x y_i over the vectors that turn with the body.
+    /// Returns sum_i x_i x y_i over the vectors that turn with the body.
     pub fn moment(&self, x: &[f64], y: &[f64]) -> Vector3<f64> {
         let (d, end) = (self.model.dimension(), self.turning_rows());
         let vector = |a: &[f64]| Vector3::from_fn(|k, _| if k < d { a[k] } else { 0.0 });
@@ -136,18 +138,18 @@ impl<'m> InertialRows<'m> {
         pairs.fold(Vector3::zeros(), |sum, (x, y)| sum + vector(x).cross(&vector(y)))
     }
 
-    /// Adds the moments H theta that the rotations of `u` (N rows of the model) make of the inertia of a rigid
-    /// motion, in second order of T: the stiffness of inertia at the nodes.
+    /// Adds the moments H theta of the inertia of a rigid motion for the rotations theta in `u` (N rows of
+    /// the model), of second order in T: the stiffness of inertia at the nodes.
     ///
-    /// * `motion`: acceleration a of the centre less gravity, angular acceleration and angular velocity, axes of
-    ///   the model.
+    /// * `motion`: acceleration a of the centre minus gravity, angular acceleration and angular velocity,
+    ///   axes of the model.
     pub fn add_second_order(&self, motion: &RigidAcceleration, u: &[f64], forces: &mut [f64]) {
         let Some(Directors { mass, moments }) = &self.directors else { return };
         mass.add_second_order(|place| moments[place].of(motion), u, forces);
     }
 }
 
-/// y += omega x x for vectors of d components.
+/// Computes y += omega x x for vectors of d components.
 fn add_turned(d: usize, x: &[f64], omega: &Vector3<f64>, y: &mut [f64]) {
     let w = omega;
     if d == 2 {
@@ -165,7 +167,8 @@ fn add_turned(d: usize, x: &[f64], omega: &Vector3<f64>, y: &mut [f64]) {
 }
 
 impl FeModel {
-    /// Centre of mass, axes of the model, from R'MR = \[m I, -c~; c~, I0\] of rigid motions about the middle.
+    /// Returns the centre of mass, axes of the model, from R'MR = \[m I, -c~; c~, I0\] of rigid motions
+    /// about the middle.
     pub fn centre_of_mass(&self) -> Vector3<f64> {
         let (middle, _) = centre_and_length(&self.nodes().positions);
         let rigid = self.rigid_fields(middle, 1.0);

@@ -1,31 +1,30 @@
-//! Interfaces: named node sets, the reference point that a joint sees of them, and the motion that both
-//! share.
+//! Interfaces: named node sets, their reference points for joints, and the common motion of both.
 
 use super::{centre_and_length, rigid_count, rigid_fields};
 use faer::{Mat, MatRef};
 use flexbody_linalg::gram;
 use nalgebra::{Matrix3, Vector3};
 
-/// Width of a node set across the line that fits it best, relative to its length, below which it determines
-/// no rotation about that line.
+/// Width of a node set across its best-fit line, relative to its length, below which it determines no
+/// rotation about that line.
 const COLLINEAR: f64 = 1e-6;
 
-/// How the nodes of an interface and its reference point follow each other.
+/// Coupling between the nodes of an interface and its reference point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coupling {
     /// The nodes move as one rigid body with the reference point (RBE2).
     Rigid,
-    /// The reference point follows the mean rigid motion of the nodes, all with the same weight (RBE3).
+    /// The reference point follows the mean rigid motion of the nodes with equal weights (RBE3).
     Averaging,
-    /// No reference point: every degree of freedom of the nodes is one of the interface.
+    /// No reference point: every degree of freedom of the nodes belongs to the interface.
     Free,
 }
 
 impl Coupling {
-    /// All of them.
+    /// All couplings.
     pub const ALL: [Self; 3] = [Self::Rigid, Self::Averaging, Self::Free];
 
-    /// Name in manifests, files and on the command line.
+    /// Returns the name in manifests, files and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Rigid => "rigid",
@@ -34,56 +33,58 @@ impl Coupling {
         }
     }
 
-    /// Returns the coupling of this name.
+    /// Returns the coupling with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
-/// Where the reference point of an interface lies.
+/// Position of the reference point of an interface.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Reference {
-    /// At the centre of its faces (weighted by area), else of its edges (by length), else at the mean of its nodes.
+    /// Centre of its faces (weighted by area) or, without faces, of its edges (by length) or, without
+    /// edges, mean of its nodes.
     #[default]
     Centre,
-    /// On an axis, at the middle of the extent of its nodes along it.
+    /// Point of an axis, at the middle of the extent of the nodes along it.
     Axis {
         /// A point of the axis, in model axes.
         point: [f64; 3],
-        /// Its direction, of any length.
+        /// Direction of the axis, of any length.
         direction: [f64; 3],
     },
-    /// In a checked model: where the default, [`Reference::Centre`] or [`Reference::Axis`], lies, in model axes.
+    /// Position of the default, [`Reference::Centre`] or [`Reference::Axis`], in a checked model, in model
+    /// axes.
     Default([f64; 3]),
-    /// Here, in model axes.
+    /// Given point in model axes.
     Point([f64; 3]),
-    /// At a node of the node table, with degrees of freedom or without.
+    /// Node of the node table, with or without degrees of freedom.
     Node(i64),
 }
 
-/// A named set of nodes: an interface of the manifest.
+/// Named set of nodes: an interface of the manifest.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodeSet {
     /// Name, unique within the model.
     pub name: String,
     /// Node numbers.
     pub nodes: Vec<i64>,
-    /// How it is coupled to its reference point, where that was said.
+    /// Coupling to the reference point, if stated.
     pub coupling: Option<Coupling>,
-    /// Its reference point; in a checked model a point, but of a free interface.
+    /// Reference point; in a checked model a position, except for a free interface.
     pub reference: Reference,
-    /// Node numbers whose faces and edges have the default reference point, where these are more than `nodes`: a set of an
-    /// FE program may have nodes without rows. Empty: `nodes`.
+    /// Node numbers whose faces and edges define the default reference point, if they are more than
+    /// `nodes`: a set of an FE program may have nodes without rows. Empty: `nodes`.
     pub outline: Vec<i64>,
 }
 
 impl Reference {
-    /// True if a user stated the point: a place or a node.
+    /// Returns true if a user stated the point, as a position or a node.
     pub fn is_stated(&self) -> bool {
         matches!(self, Self::Point(_) | Self::Node(_))
     }
 
-    /// The place in model axes, where it is known.
+    /// Returns the position in model axes, if it is known.
     pub fn point(&self) -> Option<[f64; 3]> {
         match *self {
             Self::Default(point) | Self::Point(point) => Some(point),
@@ -93,7 +94,7 @@ impl Reference {
 }
 
 impl NodeSet {
-    /// A set without a stated coupling and reference point.
+    /// Creates a set without a stated coupling and reference point.
     pub fn new(name: impl Into<String>, nodes: Vec<i64>) -> Self {
         Self {
             name: name.into(),
@@ -104,21 +105,24 @@ impl NodeSet {
         }
     }
 
-    /// The coupling where one is needed: averaging unless another was stated.
+    /// Returns the stated coupling, or averaging.
     pub fn coupling(&self) -> Coupling {
         self.coupling.unwrap_or(Coupling::Averaging)
     }
 }
 
-/// The mean rotation of nodes by their displacements alone.
+/// Mean rotation of nodes from their displacements alone.
 struct MeanTurning {
     dimension: usize,
     centre: Vector3<f64>,
-    /// From the centre to the nodes, of unit size: squares of coordinates in any unit stay in range.
+    /// Vectors from the centre to the nodes, scaled to unit size so that squares of coordinates in any unit
+    /// stay in the range of numbers.
     arms: Vec<Vector3<f64>>,
-    /// Takes the sum of r x u to the rotation; zero about axes that the nodes follow no rotation about.
+    /// Matrix from the sum of r x u to the rotation; zero about axes about which the nodes determine no
+    /// rotation.
     inverse: Matrix3<f64>,
-    /// Smallest moment of the arms about an axis that the nodes may turn about, and what it has to exceed.
+    /// Smallest moment of the arms about an axis that the nodes may turn about, and the threshold above
+    /// which the rotation is determined.
     moment: f64,
     threshold: f64,
 }
@@ -134,20 +138,20 @@ impl MeanTurning {
         let threshold = COLLINEAR * COLLINEAR * inertia.trace();
         let (mut inverse, mut moment) = (Matrix3::zeros(), 0.0);
         if threshold.is_finite() {
-            // Nodes on one line follow no rotation about it, a single node none at all.
+            // Nodes on one line determine no rotation about it, a single node none at all.
             inverse = inertia.pseudo_inverse(threshold).unwrap_or_else(|_| Matrix3::zeros()) / length;
             moment = if dimension == 2 { inertia[(2, 2)] } else { inertia.symmetric_eigenvalues().min() };
         }
         Self { dimension, centre, arms, inverse, moment, threshold }
     }
 
-    /// Whether the displacements tell every rotation.
+    /// Returns true if the displacements determine every rotation.
     fn is_determined(&self) -> bool {
         self.moment > self.threshold
     }
 
-    /// The weights of the rows in the motion of a point at `offset` from the centre; the rotation is the mean
-    /// of those of the nodes where it is told `by_rotations`.
+    /// Returns the weights of the rows in the motion of a point at `offset` from the centre. With
+    /// `by_rotations` the rotation is the mean of the nodal rotations.
     fn weights(&self, all_rows: usize, offset: &Vector3<f64>, by_rotations: bool) -> Mat<f64> {
         let (d, count) = (self.dimension, self.arms.len() as f64);
         let axes = if d == 2 { 2..3 } else { 0..3 };
@@ -178,9 +182,9 @@ impl MeanTurning {
     }
 }
 
-/// The rigid motion that k nodes and a reference point share: r = 6 unit motions, translations and rotations
-/// along the axes, in the plane (d = 2) r = 3. Rows: the displacements of the nodes (d each), then their
-/// rotations, where they have them (three each, in the plane one).
+/// Rigid motion of k nodes and a reference point: r = 6 unit motions, translations and rotations along the
+/// axes, in the plane (d = 2) r = 3. Rows: the displacements of the nodes (d each), then their rotations,
+/// if any (three each, in the plane one).
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceMotion {
     reference: [f64; 3],
@@ -190,9 +194,9 @@ pub struct InterfaceMotion {
 }
 
 impl InterfaceMotion {
-    /// For nodes at `positions` (at least one), all with or all without `rotations`, and a reference point,
-    /// the mean of the positions where none is given. The displacements tell the rotation of the reference
-    /// point; where the nodes lie on one line, the mean of their rotations does.
+    /// Creates the motion for nodes at `positions` (at least one), all with or all without `rotations`, and
+    /// a reference point, by default the mean of the positions. The displacements determine the rotation of
+    /// the reference point; if the nodes lie on one line, the mean of their rotations does.
     pub fn new(
         positions: &[[f64; 3]],
         rotations: bool,
@@ -209,36 +213,38 @@ impl InterfaceMotion {
             f64::from(row >= count_rows && column == d + (row - count_rows) % turns)
         });
         let by_rotations = rotations && turning.moment <= turning.threshold;
-        // About the centre; the translation of the reference point adds the rotation times its distance.
+        // Weights about the centre: the translation of the reference point adds the rotation times its
+        // distance.
         let offset = Vector3::from(reference) - turning.centre;
         let average = turning.weights(all_rows, &offset, by_rotations);
         Self { reference, rigid, average, determined: by_rotations || turning.is_determined() }
     }
 
-    /// The reference point.
+    /// Returns the reference point.
     pub fn reference(&self) -> [f64; 3] {
         self.reference
     }
 
-    /// R (rows x r): displacements and rotations of the nodes for unit motions of the reference point.
+    /// Returns R (rows x r): displacements and rotations of the nodes for unit motions of the reference
+    /// point.
     pub fn rigid(&self) -> MatRef<'_, f64> {
         self.rigid.as_ref()
     }
 
-    /// A (rows x r) with A'R = I: the loads at the nodes that a unit force or torque at the reference point
-    /// stands for. A' u is the rigid motion that fits the displacements u best (least squares, all nodes with
-    /// the same weight), A = R (R'R)^-1; nodal rotations count only where these do not tell the rotation.
+    /// Returns A (rows x r) with A'R = I: the nodal loads of a unit force or torque at the reference point.
+    /// A' u is the least-squares rigid motion for the displacements u, all nodes with equal weight, A = R
+    /// (R'R)^-1. Nodal rotations are used only if the displacements do not determine the rotation.
     pub fn average(&self) -> MatRef<'_, f64> {
         self.average.as_ref()
     }
 
-    /// Whether the nodes determine the rotation: they do not lie on one line (in the plane not on one point),
-    /// or have rotations.
+    /// Returns true if the nodes determine the rotation: they do not lie on one line (in the plane at one
+    /// point), or have rotations.
     pub fn is_determined(&self) -> bool {
         self.determined
     }
 
-    /// The motion A' u (r x m) that fits the rows u (rows x m) of the nodes best.
+    /// Returns the rigid motion A' u (r x m) that best fits the rows u (rows x m) of the nodes.
     pub fn fit(&self, u: MatRef<'_, f64>) -> Mat<f64> {
         gram(self.average.as_ref(), u)
     }
@@ -262,7 +268,7 @@ mod tests {
             assert!(motion.is_determined());
             let scale = motion.reference().iter().fold(1.0f64, |m, x| m.max(x.abs()));
             assert!(off_identity(&motion.fit(motion.rigid())) < 1e-15 * scale * scale, "{reference:?}");
-            // Least squares: what is left has no part along any rigid motion.
+            // Least squares: the residual is orthogonal to all rigid motions.
             let u = Mat::from_fn(15, 2, |i, j| ((7 * i + 3 * j) as f64).sin());
             let left = &u - motion.rigid() * motion.fit(u.as_ref());
             assert!(gram(motion.rigid(), left.as_ref()).norm_max() < 1e-12 * scale, "{reference:?}");
@@ -281,7 +287,7 @@ mod tests {
         let flat = [[0.0; 3], [1.0, 2.0, 0.0]];
         assert!(InterfaceMotion::new(&flat, false, 2, None).is_determined());
         assert!(!InterfaceMotion::new(&flat[..1], false, 2, None).is_determined());
-        // Nodal rotations do, about any point; nodes in space are determined without them.
+        // Nodal rotations determine it about any point; nodes in space determine it without them.
         for nodes in [&line[..], &line[..1], &NODES[..]] {
             let motion = InterfaceMotion::new(nodes, true, 3, Some([3.0, -1.0, 2.0]));
             assert!(motion.is_determined());
@@ -289,7 +295,7 @@ mod tests {
             assert!(off_identity(&motion.fit(motion.rigid())) < 1e-13);
         }
         assert!(InterfaceMotion::new(&flat[..1], true, 2, None).is_determined());
-        // A single node still passes on forces.
+        // A single node still transmits forces.
         let one = InterfaceMotion::new(&line[..1], false, 3, None);
         assert_eq!((one.average()[(1, 1)], one.average()[(1, 4)]), (1.0, 0.0));
     }

@@ -1,38 +1,39 @@
-//! The point that an interface has by itself: on its axis, or the centre of what lies between its nodes.
+//! Default reference point of an interface: on its axis, or the centre of the faces or edges between its
+//! nodes.
 
 use super::{Reference, SurfaceMesh};
 use nalgebra::Vector3;
 
-/// Part of the nodes of an interface beyond which its faces (or edges) must reach, so that the centre of these is that of
-/// the interface.
+/// Part of the nodes of an interface above which its faces (or edges) must reach for their centre to be
+/// used.
 const REACHED: f64 = 0.5;
 
-/// The nodes of an interface, by indices of `positions`, at least one.
+/// Nodes of an interface, by indices of `positions`, at least one.
 pub(super) struct InterfaceNodes<'n> {
     /// Nodes with rows.
     pub nodes: &'n [u32],
-    /// Nodes that its faces and edges have.
+    /// Nodes that define its faces and edges.
     pub outline: &'n [u32],
-    /// Places of all nodes of the model.
+    /// Positions of all nodes of the model.
     pub positions: &'n [[f64; 3]],
 }
 
-/// A point that follows from the nodes of an interface.
+/// Point that follows from the nodes of an interface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct InterfaceCentre {
-    /// Model axes.
+    /// Point in model axes.
     pub point: [f64; 3],
     /// Mean of the nodes, model axes.
     pub mean: [f64; 3],
-    /// Names the point in a message.
+    /// Description of the point for messages.
     pub origin: &'static str,
 }
 
 impl InterfaceCentre {
-    /// Returns the point of an interface without a stated point. On an axis it is the middle of the extent of the nodes
-    /// along it. Else it is the centre of the triangles of the surface `mesh` whose nodes all belong to the outline of
-    /// the interface, weighted by area; else that of the edges, weighted by length; each where they reach more than
-    /// half of the outline. Else it is the mean of the nodes.
+    /// Returns the point of an interface without a stated point. On an axis it is the middle of the extent
+    /// of the nodes along it. Otherwise it is the centre of the triangles of the surface `mesh` whose nodes
+    /// all belong to the outline of the interface, weighted by area, or that of the edges, weighted by
+    /// length; either must reach more than half of the outline. Otherwise it is the mean of the nodes.
     pub(crate) fn new(own: &InterfaceNodes<'_>, mesh: Option<&SurfaceMesh>, reference: &Reference) -> Self {
         let members = Members::new(own.nodes, own.positions);
         let outline = Members::new(own.outline, own.positions);
@@ -63,7 +64,8 @@ impl InterfaceCentre {
     }
 }
 
-/// The nodes of an interface, measured from the first of them: sums keep their digits far from the origin.
+/// Nodes of an interface, measured from the first of them, so that sums keep their digits far from the
+/// origin.
 struct Members<'m> {
     nodes: &'m [u32],
     positions: &'m [[f64; 3]],
@@ -101,8 +103,9 @@ impl<'m> Members<'m> {
         point + axis * (start + (low + high) / 2.0)
     }
 
-    /// Returns the centre of those `parts` (edges or triangles) whose nodes all are members, weighted by length or
-    /// area. Returns `None` if the parts reach at most half of the members, or have no length or area.
+    /// Returns the centre of the `parts` (edges or triangles) whose nodes all are members, weighted by
+    /// length or area. Returns `None` if the parts reach at most half of the members, or have no length or
+    /// area.
     fn centre<const N: usize>(&self, parts: impl Iterator<Item = [u32; N]>) -> Option<Vector3<f64>> {
         let mut is_reached = vec![false; self.positions.len()];
         let (mut moment, mut total) = (Vector3::zeros(), 0.0);
@@ -150,13 +153,13 @@ mod tests {
         let square = [0, 1, 2, 3, 4];
         let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|k| (a[k] - b[k]).abs() < 1e-14);
         assert!(near(of(&square, Some(&faces)), [1.0, 1.0, 5.0]));
-        // The rim of the square, of which one edge has a node within.
+        // Rim of the square; one edge has a node within.
         let rim = mesh(&[], &[[0, 4], [4, 1], [1, 2], [2, 3], [3, 0]]);
         assert!(near(of(&square, Some(&rim)), [1.0, 1.0, 5.0]));
         // Edges of triangles are edges as well.
         assert!(near(of(&[4, 0], Some(&faces)), [0.05, 0.0, 5.0]));
         assert!(near(of(&square, None), [0.82, 0.8, 5.0]));
-        // A triangle that reaches too few of the nodes says nothing about the others.
+        // A triangle that reaches too few of the nodes is not used.
         let small = mesh(&[[0, 4, 3]], &[]);
         assert_eq!(of(&[0, 1, 2, 3, 4, 5], Some(&small)), of(&[0, 1, 2, 3, 4, 5], None));
     }

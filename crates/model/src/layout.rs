@@ -1,5 +1,5 @@
-//! From labelled matrix rows to the internal order of [`Rows`]: every used node has as many displacements as
-//! the model has dimensions.
+//! Conversion from labelled matrix rows to the internal order of [`Rows`]: every used node has as many
+//! displacements as the model has dimensions.
 
 use super::rows::{Recovered, Rows};
 use super::wording::name_some;
@@ -9,23 +9,23 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
-/// Where each matrix row goes.
+/// Target of each matrix row.
 pub(super) struct Layout {
-    /// Internal row of each matrix row; `u32::MAX` of those that are left out.
+    /// Internal row of each matrix row; `u32::MAX` for rows that are left out.
     pub row_to_internal: Vec<u32>,
     /// Indices into the node table of the used nodes, ascending.
     pub used: Vec<usize>,
-    /// What the internal rows are; how those without a place move is not known yet.
+    /// Meaning of the internal rows; the motion of rows without a position is not known yet.
     pub rows: Rows,
 }
 
 impl Layout {
-    /// Whether the rows are in internal order already.
+    /// Returns true if the rows are in internal order already.
     pub(crate) fn is_identity(&self) -> bool {
         self.row_to_internal.iter().enumerate().all(|(row, &to)| row == to as usize)
     }
 
-    /// The used nodes of the node table.
+    /// Returns the used nodes of the node table.
     pub(crate) fn used_nodes(&self, table: &Nodes) -> Nodes {
         Nodes {
             ids: self.used.iter().map(|&i| table.ids[i]).collect(),
@@ -34,10 +34,10 @@ impl Layout {
     }
 }
 
-/// No row.
+/// Marks a missing row.
 const NONE: u32 = u32::MAX;
 
-/// Assigns the rows to nodes and directions; all that is wrong is collected into `found`.
+/// Assigns the rows to nodes and directions; all errors are collected in `found`.
 pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layout> {
     let labels = labels(raw, found)?;
     let before = found.len();
@@ -58,8 +58,8 @@ pub(super) fn layout(raw: &RawModel, found: &mut Vec<Diagnostic>) -> Option<Layo
     Some(in_order(raw, &rows.placed, occupied.used, placeless))
 }
 
-/// The label of each row, implied where none are given; `None` with a diagnostic when there are not as many
-/// as rows.
+/// Returns the label of each row, implied if none are given; `None` with a diagnostic if the number of
+/// labels is not that of rows.
 fn labels<'r>(raw: &'r RawModel, found: &mut Vec<Diagnostic>) -> Option<Cow<'r, [DofLabel]>> {
     let n = raw.stiffness.matrix.n_cols();
     let Some(labels) = &raw.dofs else { return implied_labels(raw, n, found).map(Cow::Owned) };
@@ -72,7 +72,7 @@ fn labels<'r>(raw: &'r RawModel, found: &mut Vec<Diagnostic>) -> Option<Cow<'r, 
     Some(Cow::Borrowed(labels))
 }
 
-/// The displacements of each node in turn.
+/// Returns the labels of the displacements of each node in turn.
 fn implied_labels(raw: &RawModel, n: usize, found: &mut Vec<Diagnostic>) -> Option<Vec<DofLabel>> {
     let (nodes, dimension) = (raw.nodes.len(), usize::from(raw.dimension));
     if dimension * nodes == n {
@@ -95,7 +95,7 @@ fn implied_labels(raw: &RawModel, n: usize, found: &mut Vec<Diagnostic>) -> Opti
     None
 }
 
-/// Index of each node in the node table, by its number; a complaint about each that is given twice.
+/// Returns the index of each node in the node table by its number; adds a diagnostic for each duplicate.
 fn index_of_nodes(raw: &RawModel, found: &mut Vec<Diagnostic>) -> HashMap<i64, usize> {
     let mut index = HashMap::with_capacity(raw.nodes.len());
     for (i, &id) in raw.nodes.ids.iter().enumerate() {
@@ -107,7 +107,7 @@ fn index_of_nodes(raw: &RawModel, found: &mut Vec<Diagnostic>) -> HashMap<i64, u
     index
 }
 
-/// Complains about the directions of a plane model that lead out of its plane.
+/// Adds a diagnostic about directions of a plane model that leave its plane.
 fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>) {
     let leads_out = |label: &&DofLabel| raw.dimension == 2 && (3..=5).contains(&label.direction);
     let outside: Vec<DofLabel> = labels.iter().filter(leads_out).copied().collect();
@@ -121,23 +121,23 @@ fn check_plane(raw: &RawModel, labels: &[DofLabel], found: &mut Vec<Diagnostic>)
     }
 }
 
-/// The matrix row of each direction of each node; [`NONE`] where it has none.
+/// Matrix row of each direction of each node; [`NONE`] for missing directions.
 struct RowsOfNodes {
-    /// Of the nodes of the node table, in its order.
+    /// Rows of the nodes of the node table, in its order.
     placed: Vec<[u32; 6]>,
-    /// Of nodes that the table does not have, by number, in the order in which the labels first name them.
+    /// Rows of nodes that are not in the table, by number, in the order of their first labels.
     without_place: Vec<(i64, [u32; 6])>,
 }
 
 impl RowsOfNodes {
-    /// From the labels; a complaint about directions that are given twice.
+    /// Creates the rows from the labels; adds a diagnostic about duplicate directions.
     fn new(
         raw: &RawModel,
         labels: &[DofLabel],
         index: &HashMap<i64, usize>,
         found: &mut Vec<Diagnostic>,
     ) -> Self {
-        // Looked up once and in parallel: the labels are several times as many as the nodes.
+        // Look up in parallel: there are several labels per node.
         let places: Vec<Option<usize>> =
             labels.par_iter().map(|label| index.get(&label.node).copied()).collect();
         let mut all = Self { placed: vec![[NONE; 6]; raw.nodes.len()], without_place: Vec::new() };
@@ -171,8 +171,9 @@ impl RowsOfNodes {
 }
 
 impl RowsOfNodes {
-    /// Leaves out rows that no matrix holds: all of a node that belongs to no element, and rotations. A displacement
-    /// without stiffness and mass stays where the node has others: it is a mistake.
+    /// Leaves out rows that are empty in all matrices: all rows of a node without elements, and rotations.
+    /// A displacement without stiffness and mass is kept if the node has other displacements: it is an
+    /// error.
     fn leave_out_empty(&mut self, raw: &RawModel) -> LeftOut {
         let others = raw.damping.as_ref().and_then(Damping::matrix).into_iter();
         let others = others.chain(raw.geometric_stiffness.iter().map(|one| &one.matrix));
@@ -202,10 +203,10 @@ impl RowsOfNodes {
     }
 }
 
-/// Rows that no matrix holds.
+/// Rows that are empty in all matrices.
 #[derive(Default)]
 struct LeftOut {
-    /// Numbers of the nodes that have no other.
+    /// Numbers of the nodes that have no other rows.
     nodes: Vec<i64>,
     /// Number of rows of these nodes.
     of_nodes: usize,
@@ -214,7 +215,7 @@ struct LeftOut {
 }
 
 impl LeftOut {
-    /// A note about the rows, where there are any.
+    /// Returns a note about the rows, if there are any.
     fn note(&self, raw: &RawModel) -> Option<Diagnostic> {
         let Self { nodes, of_nodes, rotations } = self;
         let of_nodes =
@@ -230,16 +231,16 @@ impl LeftOut {
     }
 }
 
-/// Which nodes of the node table have rows.
+/// Nodes of the node table with and without rows.
 struct Occupied {
     /// Indices of the nodes that have all displacements, ascending.
     used: Vec<usize>,
-    /// Numbers of the nodes that have no row at all.
+    /// Numbers of the nodes without any row.
     unused: Vec<i64>,
 }
 
 impl Occupied {
-    /// Sorts the nodes; a complaint about those that have some displacements only.
+    /// Sorts the nodes; adds a diagnostic about nodes with only some displacements.
     fn new(raw: &RawModel, placed: &[[u32; 6]], found: &mut Vec<Diagnostic>) -> Self {
         let dimension = usize::from(raw.dimension);
         let mut sorted = Self { used: Vec::new(), unused: Vec::new() };
@@ -267,7 +268,7 @@ impl Occupied {
         sorted
     }
 
-    /// A note about nodes that are left out, but for those whose rows are `told` of.
+    /// Adds a note about nodes that are left out, except those whose rows a note already reports (`told`).
     fn note_unused(&self, raw: &RawModel, told: &[i64], found: &mut Vec<Diagnostic>) {
         let told: HashSet<i64> = told.iter().copied().collect();
         let unused: Vec<i64> = self.unused.iter().copied().filter(|node| !told.contains(node)).collect();
@@ -282,7 +283,8 @@ impl Occupied {
     }
 }
 
-/// The internal order: displacements of the used nodes, vectors without a place, rotations, massless rows.
+/// Returns the internal order: displacements of the used nodes, vectors without a position, rotations,
+/// massless rows.
 fn in_order(raw: &RawModel, placed: &[[u32; 6]], used: Vec<usize>, placeless: WithoutPlace) -> Layout {
     let dimension = usize::from(raw.dimension);
     let mut order: Vec<u32> =
@@ -311,17 +313,17 @@ fn in_order(raw: &RawModel, placed: &[[u32; 6]], used: Vec<usize>, placeless: Wi
     Layout { row_to_internal, used, rows }
 }
 
-/// Rows of nodes that the node table does not have.
+/// Rows of nodes that are not in the node table.
 #[derive(Default)]
 struct WithoutPlace {
-    /// Those that carry mass: complete vectors.
+    /// Rows that carry mass: complete vectors.
     vectors: Vec<(i64, [u32; 6])>,
-    /// Those that do not.
+    /// Rows without mass.
     others: Vec<(DofLabel, u32)>,
 }
 
-/// Tells vectors that carry mass from massless rows; `None` with a diagnostic when there are others, or when
-/// there is `no_other` node: then the table is another model's.
+/// Separates vectors that carry mass from massless rows. Returns `None` with a diagnostic if there are
+/// others, or if there is `no_other` node: the table then belongs to another model.
 fn sort_without_place(
     raw: &RawModel,
     nodes: &[(i64, [u32; 6])],

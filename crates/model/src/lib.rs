@@ -1,4 +1,4 @@
-//! The finite element model of one free body: nodes, degrees of freedom, K, M. Knows no file format.
+//! Finite element model of one free body: nodes, degrees of freedom, K, M. Independent of file formats.
 
 #![deny(
     clippy::exit,

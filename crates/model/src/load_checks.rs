@@ -1,13 +1,13 @@
-//! What must hold of the loads that geometric stiffness is given for.
+//! Conditions on the loads of geometric stiffness.
 
 use super::wording::name_some;
 use super::{GeometricStiffness, LoadKind, NodeSet, RawMatrix, UnitLoad};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// Longest name of a load in bytes: it names a group in the file.
+/// Longest name of a load in bytes, since the name becomes a group name in the file.
 const LONGEST: usize = 200;
 
-/// What is wrong with the loads by themselves.
+/// Adds errors about the loads by themselves.
 pub(super) fn check_loads(
     given: &[GeometricStiffness<RawMatrix>],
     interfaces: &[NodeSet],
@@ -48,7 +48,7 @@ pub(super) fn check_loads(
     }
 }
 
-/// A note for each kind of load of which some components are given and others not.
+/// Returns a note about each kind of load with only some components given.
 pub(super) fn missing_components<K>(given: &[GeometricStiffness<K>], dimension: usize) -> Option<Diagnostic> {
     let loads: Vec<&UnitLoad> = given.iter().map(|one| &one.load).collect();
     let mut missing: Vec<UnitLoad> = Vec::new();

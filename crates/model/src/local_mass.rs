@@ -1,10 +1,10 @@
-//! The mass of every node beside the stiffness around it: speeds of sound, and masses that belong to another
-//! node.
+//! Mass of every node compared with the stiffness around it: speeds of sound, and masses exchanged between
+//! nodes.
 //!
 //! e_i = -1/2 sum_j r_ij' K_ij r_ij with r_ij = x_j - x_i is the stiffness along the lines to the nodes
-//! around a node, times the squares of their lengths. Summed over an isotropic solid with Lame's constants l
-//! and m it is (6 l + 9 m) V, whatever the elements are, and E A L of a bar: bending does not count, so that
-//! beams and shells count with what they are stretched by. Divided by d times the mass it is the square of a
+//! around a node, times the squares of their lengths. Summed over an isotropic solid with Lame's constants
+//! l and m it is (6 l + 9 m) V for any elements, and E A L for a bar. Bending does not contribute, so that
+//! beams and shells count with their membrane stiffness. Divided by d times the mass it is the square of a
 //! speed of sound: (2 l + 3 m) / density in solids, E / (3 density) in bars.
 
 use super::assembled::Assembled;
@@ -17,45 +17,47 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
-/// Speeds of sound of matter in m/s, with room: the softest foams have about 30, beryllium and diamond 15,000
-/// to 20,000.
+/// Range of plausible speeds of sound in m/s with a margin: the softest foams have about 30, beryllium and
+/// diamond 15,000 to 20,000.
 const SPEEDS: (f64, f64) = (20.0, 25_000.0);
 
-/// No matter heavier than this (kg/m^3) is slower than this (m/s): lead has 3500, aluminium 8000, filled
-/// rubbers are lighter.
+/// Density (kg/m^3) above which no material has a speed of sound below [`SLOWEST_OF_HEAVY`]: filled rubbers
+/// are lighter.
 const HEAVY: f64 = 2500.0;
+/// Lower bound of that speed of sound (m/s): lead has 3500, aluminium 8000.
 const SLOWEST_OF_HEAVY: f64 = 1000.0;
 
-/// Part of the diagonal entry of a node below which its row sum is too small to divide by.
+/// Row sum of a node, relative to its diagonal entry, below which it is too small to divide by.
 const MASSLESS: f64 = 0.01;
 
-/// The mass of a node may differ by so much of what its stiffness lets expect, relative to the largest such
-/// mass of its group, and must differ by so much to be told: nodes of the same elements keep 0.12 on all
+/// Largest difference of the mass of a node from the mass expected from its stiffness, relative to the
+/// largest expected mass of its group, for a mass that fits. Nodes of equal elements stay within 0.12 on all
 /// models in docs/plausibility.md.
 const FITS: f64 = 0.15;
+/// Smallest such difference that is reported.
 const MISFITS: f64 = 0.3;
 
-/// What belongs to each node.
+/// Stiffness and mass of every node.
 pub(super) struct LocalMass {
     /// e_i.
     pub dilation: Vec<f64>,
-    /// Row sum of the mass over the nodes, the mean of the directions.
+    /// Row sum of the mass over the nodes, mean of the directions.
     pub mass: Vec<f64>,
-    /// Diagonal entry of the same.
+    /// Diagonal entry of the mass, mean of the directions.
     pub diagonal: Vec<f64>,
 }
 
 /// Speeds of sound of a body in the units of the model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoundSpeed {
-    /// From the sums over the body.
+    /// Speed from the sums over the body.
     pub whole: f64,
-    /// The median over the nodes, which point masses and stiff connections leave alone.
+    /// Median over the nodes, which is insensitive to point masses and stiff connections.
     pub median: f64,
 }
 
 impl LocalMass {
-    /// From K and the mean over the directions of the mass between nodes.
+    /// Computes the sums from K and the mean over the directions of the mass between nodes.
     pub(crate) fn new(body: &Assembled, scalar_mass: &SymmetricMatrix) -> Self {
         let Assembled { nodes, rows, stiffness, .. } = body;
         let (n, d) = (nodes.len(), rows.dimension);
@@ -89,7 +91,7 @@ impl LocalMass {
         Self { dilation, mass, diagonal }
     }
 
-    /// The speeds of sound of a body in so many dimensions; `None` where nothing is stretched.
+    /// Returns the speeds of sound of a body of the given dimension; `None` if nothing is stretched.
     pub(crate) fn sound_speed(&self, dimension: usize) -> Option<SoundSpeed> {
         let d = dimension as f64;
         let mut ratios: Vec<f64> = (0..self.mass.len())
@@ -104,9 +106,8 @@ impl LocalMass {
         (speeds.whole > 0.0 && speeds.median > 0.0).then_some(speeds)
     }
 
-    /// Pairs of nodes whose masses would fit the stiffness if they were exchanged, and do not as they are.
-    /// Only nodes of the same elements are compared, those that K couples with the same others: whatever
-    /// these are made of, it is the same for them.
+    /// Returns the pairs of nodes whose masses fit the stiffness only if exchanged. Only nodes of the same
+    /// elements are compared, those that K couples with the same others, since these share a material.
     pub(crate) fn exchanged(&self, body: &Assembled) -> Vec<[usize; 2]> {
         let mut pairs = Vec::new();
         for group in self.groups(body) {
@@ -130,7 +131,7 @@ impl LocalMass {
         pairs
     }
 
-    /// Nodes that K couples with the same others (and each other), two or more.
+    /// Returns groups of two or more nodes that K couples with each other and with the same others.
     fn groups(&self, body: &Assembled) -> Vec<Vec<usize>> {
         let Assembled { nodes, rows, stiffness, .. } = body;
         let around = |i: usize| {
@@ -154,7 +155,7 @@ impl LocalMass {
     }
 }
 
-/// A warning for masses that belong to another node; how many pairs there are.
+/// Adds a warning for masses that belong to another node; returns the number of pairs.
 pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut Vec<Diagnostic>) -> usize {
     let pairs = local.exchanged(body);
     if pairs.is_empty() {
@@ -170,8 +171,9 @@ pub(super) fn check_exchanged(body: &Assembled, local: &LocalMass, found: &mut V
     pairs.len()
 }
 
-/// A warning when the speed of sound is that of no matter; `density` (SI) where it is known. An error where nothing states
-/// the units and the speed is that of matter in common ones: beams and shells have no density that K and M tell.
+/// Adds a warning if the speed of sound is implausible; `density` is in SI units, if known. Adds an error
+/// if units are not stated and the speed is plausible in other common units: K and M of beams and shells
+/// determine no density.
 pub(super) fn check_speed(
     body: &Assembled,
     local: &LocalMass,

@@ -1,4 +1,4 @@
-//! Whether the numbers of a model can be multiplied with each other in double precision.
+//! Check that the numbers of a model can be multiplied with each other in double precision.
 
 use super::rigid::extents;
 use super::{Nodes, RawModel};
@@ -6,13 +6,12 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::SymmetricMatrix;
 use rayon::prelude::*;
 
-/// Largest size, and reciprocal of the smallest, that a quantity may have: squares of all of them then stay
-/// twenty-eight decades within the range of double precision, which is the room that modes and rounding
-/// errors have.
+/// Largest size, and reciprocal of the smallest, of a quantity: squares of all quantities then stay
+/// twenty-eight decades within the range of double precision, a margin for modes and rounding errors.
 const LARGEST: f64 = 1e140;
 
-/// A refusal when K, M, the size of the body, or what units make of them, is so large or small that products
-/// overflow, or vanish without a trace.
+/// Returns an error if K, M, the size of the body, or quantities derived from them are so large or small
+/// that products overflow or vanish.
 pub(super) fn check_magnitudes(
     stiffness: &SymmetricMatrix,
     mass: &SymmetricMatrix,
@@ -25,7 +24,7 @@ pub(super) fn check_magnitudes(
     let far = nodes.positions.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let size = extents(&nodes.positions).into_iter().fold(0.0, f64::max);
     if [k, m, size].contains(&0.0) {
-        return None; // said by name elsewhere
+        return None; // other checks report zeros
     }
     let (stiffness_file, mass_file, nodes_file) = (&raw.stiffness.path, &raw.mass.path, &raw.nodes_path);
     let quantities = [

@@ -1,4 +1,4 @@
-//! The test M = Ms kron I_d of the displacements, block by block (d: the dimension), and Ms itself.
+//! Test of M = Ms kron I_d for the displacements, block by block (d: the dimension), and computation of Ms.
 
 use super::columns::Columns;
 use super::rows::Rows;
@@ -7,21 +7,21 @@ use flexbody_linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Nodes per parallel task: sums have fixed partitions.
+/// Number of nodes per parallel task: sums have fixed partitions.
 const NODES: usize = 2048;
 
-/// What the mass matrix turned out to be.
+/// Form of the mass matrix.
 pub(super) struct MassForm {
-    /// Ms (nodes, then vectors without a place): the entry of all directions of their displacements where these
-    /// are equal, else the mean of them.
+    /// Ms (nodes, then vectors without a position): the common entry of all directions of the displacements
+    /// or, if they differ, their mean.
     pub scalar: SymmetricMatrix,
-    /// True if every block is a multiple of the identity to the last bit, so that Ms is M as stored.
+    /// True if every block is exactly a multiple of the identity, so that Ms is M as stored.
     pub exact: bool,
-    /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj), and
-    /// where it is.
+    /// Largest deviation of a block from a multiple of the identity, relative to sqrt(alpha_ii alpha_jj),
+    /// and its rows.
     pub deviation: f64,
     pub worst: (usize, usize),
-    /// M = Ms kron I_d to rounding, and no other row carries mass.
+    /// True if M = Ms kron I_d to rounding, and no other row carries mass.
     pub commutes: bool,
 }
 
@@ -29,7 +29,8 @@ pub(super) struct MassForm {
 /// rounding.
 ///
 /// # Errors
-/// [`MassNotPositive`](Code::MassNotPositive), [`MassDirectional`](Code::MassDirectional).
+/// [`MassNotPositive`](Code::MassNotPositive) and [`MassDirectional`](Code::MassDirectional) for a mass
+/// that belongs to no physical body.
 pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Result<MassForm, Diagnostic> {
     let dimension = rows.dimension;
     let displacements = rows.displacements();
@@ -73,8 +74,8 @@ pub(super) fn mass_form(m: &SymmetricMatrix, rows: &Rows, tolerance: f64) -> Res
     Ok(form)
 }
 
-/// The form with Ms (n x n) from its columns part by part and the largest deviation of a block with its place;
-/// `commutes` is still to be found.
+/// Joins Ms (n x n) from its column parts and finds the largest deviation of a block with its position;
+/// `commutes` is still to be set.
 fn joined(n: usize, parts: Vec<Part>) -> MassForm {
     let (mut deviation, mut worst, mut exact) = (0.0f64, (0, 0), true);
     let mut columns = Vec::with_capacity(parts.len());
@@ -90,8 +91,8 @@ fn joined(n: usize, parts: Vec<Part>) -> MassForm {
     MassForm { scalar, exact, deviation, worst, commutes: false }
 }
 
-/// Sum of M along each direction over the rows of some nodes and the columns up to `end`, and the mean of the
-/// sums of the absolute values.
+/// Returns the sum of M along each direction over the rows of some nodes and the columns up to `end`, and
+/// the mean of the sums of the absolute values.
 fn directional_mass(
     m: &SymmetricMatrix,
     dimension: usize,
@@ -113,18 +114,18 @@ fn directional_mass(
     (totals, magnitude)
 }
 
-/// Some columns of Ms, and the largest deviation of their blocks with its place in M.
+/// Some columns of Ms, and the largest deviation of their blocks with its position in M.
 #[derive(Default)]
 struct Part {
     columns: Columns,
     worst: f64,
     worst_at: (usize, usize),
-    /// True if a block is no multiple of the identity to the last bit.
+    /// True if a block is not exactly a multiple of the identity.
     differs: bool,
 }
 
-/// Reduces the rows of some nodes, the columns up to `end`; deviations are relative to `scale` of the two
-/// nodes.
+/// Reduces the rows of some nodes and the columns up to `end`; deviations are relative to `scale` of the
+/// two nodes.
 fn reduce(
     m: &SymmetricMatrix,
     dimension: usize,
@@ -173,7 +174,7 @@ fn reduce(
     part
 }
 
-/// Returns the mean of the values; equal values are their mean, which a sum would round.
+/// Returns the mean of the values; equal values are returned as they are, since a sum would round.
 fn mean(values: &[f64]) -> f64 {
     if values.iter().all(|value| *value == values[0]) {
         return values[0];

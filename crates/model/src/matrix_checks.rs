@@ -1,4 +1,4 @@
-//! What must hold of each matrix by itself: finite, symmetric to rounding, no negative diagonal entry.
+//! Conditions on each matrix by itself: finite, symmetric to rounding, no negative diagonal entry.
 
 use super::layout::Layout;
 use super::tolerance::rounding;
@@ -9,7 +9,7 @@ use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Complains about a matrix that is not square, empty, or not finite.
+/// Adds an error for a matrix that is not square, empty, or not finite.
 pub(super) fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnostic>) {
     let matrix = &raw.matrix;
     if matrix.n_rows() != matrix.n_cols() {
@@ -32,8 +32,8 @@ pub(super) fn check_matrix(raw: &RawMatrix, name: &str, found: &mut Vec<Diagnost
     }
 }
 
-/// The matrix in internal order, symmetric, taken out of `raw`; `None` with a diagnostic when it is not
-/// symmetric to rounding.
+/// Takes a matrix out of `raw` and returns it symmetric and in internal order; `None` with a diagnostic if
+/// it is not symmetric to rounding.
 pub(super) fn symmetric(
     raw: &mut RawMatrix,
     layout: &Layout,
@@ -68,20 +68,20 @@ pub(super) fn symmetric(
     Some(SymmetricMatrix::symmetrised(ordered))
 }
 
-/// How far a matrix is from its transpose.
+/// Difference between a matrix and its transpose.
 #[derive(Clone, Copy, Default)]
 struct Asymmetry {
-    /// The largest difference over the size of the entries or of the diagonal entries beside them, and the
-    /// first entry that has it.
+    /// Largest difference relative to the size of the entries or of their diagonal entries, and the first
+    /// entry with this difference.
     worst: f64,
     at: (usize, usize),
-    /// Entries without one at the mirrored place.
+    /// Number of entries without a mirrored entry.
     one_sided: usize,
 }
 
 impl Asymmetry {
     fn of(matrix: &CscMatrix) -> Self {
-        /// Columns that are not worth a task of their own.
+        /// Number of columns per parallel task.
         const COLUMNS: usize = 256;
         let n = matrix.n_cols();
         let size: Vec<f64> = (0..n).map(|i| matrix.get(i, i).abs().sqrt()).collect();
@@ -92,7 +92,8 @@ impl Asymmetry {
                 let i = i as usize;
                 let other = matrix.get(j, i);
                 own.one_sided += usize::from(other == 0.0);
-                // Beyond the diagonal, as only indefinite matrices go, an entry is compared with itself.
+                // An entry larger than the root of its diagonal entries, which occurs in indefinite
+                // matrices only, is compared with itself.
                 let scale = (size[i] * size[j]).max(v.abs()).max(other.abs());
                 let difference = (v - other).abs() / scale;
                 if difference > own.worst {
@@ -105,7 +106,7 @@ impl Asymmetry {
         columns.map(of_column).reduce(Self::default, Self::and)
     }
 
-    /// That of some columns and of those that follow.
+    /// Combines the results of some columns and of the columns after them.
     fn and(self, next: Self) -> Self {
         let first = if next.worst > self.worst { next } else { self };
         Self { one_sided: self.one_sided + next.one_sided, ..first }

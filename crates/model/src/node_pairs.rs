@@ -1,4 +1,4 @@
-//! Which pairs of nodes each matrix couples: an element that gives two nodes common mass ties them by its
+//! Pairs of nodes coupled by each matrix. An element that gives two nodes common mass couples them by its
 //! stiffness too.
 
 use super::assembled::Assembled;
@@ -9,24 +9,24 @@ use flexbody_linalg::SymmetricMatrix;
 use rayon::prelude::*;
 use std::collections::HashMap;
 
-/// Mass between two rows relative to the root of their diagonal entries below which it is what rounding left
-/// of zero.
+/// Mass between two rows, relative to the root of their diagonal entries, below which it is the rounding of
+/// zero.
 const NOTHING: f64 = 1e-10;
 
-/// Vertices per parallel task.
+/// Number of vertices per parallel task.
 const VERTICES: usize = 2048;
 
-/// The pairs of vertices ([`Rows::vertex`]) that the mass couples.
+/// Pairs of vertices ([`Rows::vertex`]) coupled by the mass.
 #[derive(Default)]
 pub(super) struct MassPairs {
-    /// How many there are.
+    /// Number of pairs.
     pub count: usize,
-    /// Those that the stiffness does not couple, ascending, the lower vertex first.
+    /// Pairs that the stiffness does not couple, ascending, the lower vertex first.
     pub foreign: Vec<[u32; 2]>,
 }
 
 impl MassPairs {
-    /// All of them, of matrices in the internal order.
+    /// Finds all pairs in matrices in the internal order.
     pub(crate) fn new(stiffness: &SymmetricMatrix, mass: &SymmetricMatrix, rows: &Rows) -> Self {
         let diagonal = mass.diagonal();
         let own = |first: usize| {
@@ -54,8 +54,8 @@ impl MassPairs {
     }
 }
 
-/// The other vertices to which `matrix` has an entry that `counts` (row, column, value) from the rows of
-/// `vertex`, ascending.
+/// Returns the other vertices to which `matrix` has an entry from the rows of `vertex`, ascending. `counts`
+/// gets row, column and value of an entry and returns true if it counts.
 pub(super) fn neighbours(
     matrix: &SymmetricMatrix,
     rows: &Rows,
@@ -85,9 +85,10 @@ fn by_mass(mass: &SymmetricMatrix, diagonal: &[f64], rows: &Rows, vertex: usize)
     neighbours(mass, rows, vertex, counts)
 }
 
-/// An error when the mass couples nodes that the stiffness does not, which no order of the same elements
-/// does. A warning only where the pairs are those of mass elements, or where the user wants it so. Returns
-/// how many pairs the mass couples, and how many of them the stiffness does not.
+/// Adds an error if the mass couples nodes that the stiffness does not couple, which cannot happen if both
+/// have one order of rows. The finding is a warning if the pairs belong to mass elements, or if the user
+/// allows it. Returns the number of pairs coupled by the mass, and the number of these that the stiffness
+/// does not couple.
 pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) -> [usize; 2] {
     let Assembled { raw, nodes, rows, stiffness, mass, .. } = body;
     let MassPairs { count, foreign } = MassPairs::new(stiffness, mass, rows);
@@ -119,12 +120,12 @@ pub(super) fn check_mass_pairs(body: &Assembled, found: &mut Vec<Diagnostic>) ->
     [count, foreign.len()]
 }
 
-/// Whether the pairs fall into groups within which the mass couples every node with every other, as when a
-/// mass is spread over them. One node coupled with several others is no such group, nor are several single
-/// pairs: that is what two exchanged nodes leave.
+/// Returns true if the pairs form groups within which the mass couples every node with every other, as if a
+/// mass is distributed over them. One node coupled with several others is no such group, nor are several
+/// single pairs, the sign of two exchanged nodes.
 fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign: &[[u32; 2]]) -> bool {
     if foreign.len() * 4 > count {
-        // Every other mass would belong to such elements. A single pair in a tiny model may be one.
+        // A quarter of the pairs is too many for such elements. A single pair in a tiny model may be one.
         return foreign.len() == 1;
     }
     let mut pairs_of: HashMap<u32, Vec<u32>> = HashMap::new();
@@ -165,11 +166,11 @@ fn are_mass_elements(mass: &SymmetricMatrix, rows: &Rows, count: usize, foreign:
     true
 }
 
-/// An order that the rows of M may stand in: whether the model can have it, the row that each row of the file
-/// would stand for, and what to do about it.
+/// Possible order of the rows of M: true if the model can have it, the row that each row of the file would
+/// represent, and the advice for the user.
 type Order<'o> = (bool, &'o dyn Fn(usize) -> usize, &'static str);
 
-/// What to do when the mass fits the stiffness in another order of its rows.
+/// Returns advice if the mass fits the stiffness in another order of its rows.
 fn other_order(body: &Assembled) -> Option<&'static str> {
     let Assembled { nodes, rows, row_to_internal, .. } = body;
     let n = rows.len();
@@ -187,7 +188,7 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
     let per_node = n / rows.nodes.max(1);
     let blocked = |row: usize| per_node * (row % rows.nodes) + row / rows.nodes;
     let transposed = |row: usize| rows.nodes * (row % per_node) + row / per_node;
-    // The internal row that each row of the mass file would stand for.
+    // Internal row that each row of the mass file would represent.
     let orders: [Order<'_>; 5] = [
         (
             true,
@@ -218,8 +219,8 @@ fn other_order(body: &Assembled) -> Option<&'static str> {
     orders.iter().find(|(possible, to, _)| *possible && fits(body, &row_of, to)).map(|(.., help)| *help)
 }
 
-/// Whether the mass couples only what the stiffness couples when each row of its file stands for the internal
-/// row `to`; `row_of` is the row of the file that each internal row stood for.
+/// Returns true if the mass couples only nodes that the stiffness couples when each row of its file
+/// represents the internal row `to`; `row_of` is the row of the file that each internal row came from.
 fn fits(body: &Assembled, row_of: &[usize], to: &dyn Fn(usize) -> usize) -> bool {
     let Assembled { rows, stiffness, mass, .. } = body;
     let place: Vec<usize> = row_of.iter().map(|&row| rows.vertex(to(row))).collect();

@@ -3,25 +3,25 @@
 /// Node numbers and undeformed positions, in the order of the node table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Nodes {
-    /// Node numbers as the FE program gave them; gaps and any order are fine, duplicates are not.
+    /// Node numbers of the FE program; gaps and any order are allowed, duplicates are not.
     pub ids: Vec<i64>,
     /// Positions in model axes, model length units (2D tables: z = 0).
     pub positions: Vec<[f64; 3]>,
 }
 
 impl Nodes {
-    /// Number of nodes.
+    /// Returns the number of nodes.
     pub fn len(&self) -> usize {
         self.ids.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no nodes.
     pub fn is_empty(&self) -> bool {
         self.ids.is_empty()
     }
 }
 
-/// What a matrix row stands for: a direction of a node.
+/// Label of a matrix row: a direction of a node.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct DofLabel {
     /// Node number.
@@ -31,7 +31,7 @@ pub struct DofLabel {
 }
 
 impl std::fmt::Display for DofLabel {
-    /// `node 17 uy`, `node 17 rz`.
+    /// Formats the label as `node 17 uy` or `node 17 rz`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let name = match self.direction {
             1 => "ux",

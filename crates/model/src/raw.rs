@@ -1,4 +1,4 @@
-//! A model as the readers deliver it: parsed, but not yet checked as a mechanical body.
+//! A model as delivered by the readers: parsed, but not yet checked as a mechanical body.
 
 use super::{Damping, DofLabel, GeometricStiffness, GivenRows, NodeSet, Nodes, SurfaceMesh};
 use faer::Mat;
@@ -8,58 +8,58 @@ use flexbody_base::units::UnitSystem;
 use flexbody_linalg::CscMatrix;
 use std::path::PathBuf;
 
-/// A matrix with what its file says about it.
+/// Matrix with the properties of its file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawMatrix {
-    /// The matrix, both triangles (a reader expands a stored triangle), zeros dropped, duplicates summed.
+    /// Matrix with both triangles (a reader expands a stored triangle), zeros dropped, duplicates summed.
     pub matrix: CscMatrix,
-    /// Significant decimal digits that its values really carry, 1 to 17, however many were written; 17 for
-    /// short exact numbers. Thresholds of the model checks follow it.
+    /// Significant decimal digits of the values, 1 to 17, independent of the number of digits written; 17
+    /// for short exact numbers. Thresholds of the model checks depend on it.
     pub digits: u8,
-    /// Where it came from; empty for matrices handed over in memory.
+    /// Path of the file; empty for matrices in memory.
     pub path: PathBuf,
 }
 
-/// Shapes or loads as a reader delivers them: one column each.
+/// Shapes or loads as delivered by a reader: one column each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawShapes {
-    /// N x k, by matrix rows.
+    /// Columns by matrix rows (N x k).
     pub matrix: Mat<f64>,
-    /// Significant decimal digits that the values carry at the most: 7 for single precision.
+    /// Upper limit of the significant decimal digits of the values: 7 for single precision.
     pub digits: u8,
-    /// Where they came from; empty when handed over in memory.
+    /// Path of the file; empty for data in memory.
     pub path: PathBuf,
-    /// The same with its fingerprint; none when handed over in memory.
+    /// Name and fingerprint of the file; `None` for data in memory.
     pub source: Option<SourceFile>,
 }
 
-/// Modes as an FE program has written them: by nodes, with the eigenvalues that it found.
+/// Modes as written by an FE program: by nodes, with their eigenvalues.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawModes {
     /// Node and direction of every row of `matrix`, each once.
     pub labels: Vec<DofLabel>,
-    /// One column for every mode.
+    /// Mode shapes, one column per mode.
     pub matrix: Mat<f64>,
-    /// True if the values stand along the axes of the rows of their nodes, false if along those of the model.
+    /// True if the values are along the axes of the rows of their nodes, false if along those of the model.
     pub along_nodes: bool,
-    /// Eigenvalue of every mode in radians^2/time^2; `None` where the file states none.
+    /// Eigenvalue of every mode in radians^2/time^2; `None` if the file states none.
     pub eigenvalues: Vec<Option<f64>>,
     /// Significant decimal digits of the eigenvalues.
     pub eigenvalue_digits: u8,
-    /// Significant decimal digits that the values of the shapes carry at the most.
+    /// Upper limit of the significant decimal digits of the shapes.
     pub digits: u8,
-    /// Where they came from.
+    /// Path of the file.
     pub path: PathBuf,
-    /// The same with its fingerprint.
+    /// Name and fingerprint of the file.
     pub source: SourceFile,
 }
 
-/// Everything that describes one model, before the checks.
+/// Complete description of one model before the checks.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawModel {
     /// Name of the model.
     pub name: String,
-    /// 3 or 2.
+    /// Dimension, 3 or 2.
     pub dimension: u8,
     /// Units of the numbers.
     pub units: UnitSystem,
@@ -69,42 +69,43 @@ pub struct RawModel {
     pub mass: RawMatrix,
     /// Node table.
     pub nodes: Nodes,
-    /// Where the node table came from; empty when handed over in memory.
+    /// Path of the file of the node table; empty for data in memory.
     pub nodes_path: PathBuf,
-    /// The surface, by indices of `nodes`, where elements are known.
+    /// Surface, by indices of `nodes`, if elements are known.
     pub mesh: Option<SurfaceMesh>,
     /// Label of each matrix row; `None`: node-major x, y, z in the order of the node table.
     pub dofs: Option<Vec<DofLabel>>,
-    /// Where the labels came from; empty when handed over in memory.
+    /// Path of the file of the labels; empty for data in memory.
     pub dofs_path: PathBuf,
     /// Maps for shapes and loads from the rows of the files to the rows of K and M here.
     pub given_rows: GivenRows,
     /// Named node sets.
     pub interfaces: Vec<NodeSet>,
-    /// Damping, where it is given; a matrix has the rows of K and M.
+    /// Damping, if given; a matrix has the rows of K and M.
     pub damping: Option<Damping<RawMatrix>>,
     /// Geometric stiffness of unit loads, with the rows of K and M.
     pub geometric_stiffness: Vec<GeometricStiffness<RawMatrix>>,
-    /// Whether findings that a person has looked at are warnings: densities that no matter has, mass between
-    /// nodes that no stiffness joins.
+    /// True if findings that the user has accepted are warnings instead of errors: implausible densities,
+    /// and mass coupling without stiffness.
     pub allow_implausible: bool,
     /// Role (`stiffness`, `mass`, `nodes`, `dofs`, `damping`, `geometric_stiffness`, `mesh`, `manifest`), file name
     /// and SHA-256 (hex) of every file read.
     pub sources: Sources,
-    /// Warnings and notes of the readers; never an error.
+    /// Warnings and notes of the readers; no errors.
     pub diagnostics: Vec<Diagnostic>,
 }
 
 impl RawModel {
-    /// True if the numbers can be held to matter: units are stated, or the model comes from files, whose numbers are
-    /// taken for m, kg, s where nothing states their units. Matrices in memory without units may have no dimension.
+    /// Returns true if the numbers can be compared with real materials: units are stated, or the model
+    /// comes from files, whose numbers default to m, kg, s. Matrices in memory without units may be
+    /// dimensionless.
     pub fn has_units(&self) -> bool {
         self.units.stated || !self.stiffness.path.as_os_str().is_empty()
     }
 
-    /// A model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all digits valid,
-    /// units m, kg, s not stated. Whatever else is known about it is set in the fields.
-    /// `examples/from_memory.rs` goes on from here to a written file.
+    /// Creates a model from matrices in memory: rows node by node, x, y, z in the order of `nodes`, all
+    /// digits valid, units m, kg, s not stated. Set the fields for further data. `examples/from_memory.rs`
+    /// continues from here to a written file.
     pub fn in_memory(name: impl Into<String>, stiffness: CscMatrix, mass: CscMatrix, nodes: Nodes) -> Self {
         let matrix = |matrix| RawMatrix { matrix, digits: 17, path: PathBuf::new() };
         Self {

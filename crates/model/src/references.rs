@@ -1,4 +1,4 @@
-//! Reference points of interfaces: where they lie, and whether they can lie there.
+//! Reference points of interfaces: their positions, and checks of these.
 
 use super::interface_centre::{InterfaceCentre, InterfaceNodes};
 use super::{Coupling, Nodes, RawModel, Reference, centre_and_length, span};
@@ -7,22 +7,23 @@ use flexbody_base::numbers::significant;
 use nalgebra::Vector3;
 use std::collections::HashMap;
 
-/// Distance of a reference point from the middle of the nodes, relative to their largest, beyond which it is
-/// a mistake, of units as a rule. Rotations about a point so far away lose four digits.
+/// Distance of a reference point from the middle of the nodes, relative to the largest distance of a node,
+/// above which it is an error, usually of units. Rotations about a point this far away lose four digits.
 const FARTHEST: f64 = 100.0;
 
-/// Distance from the middle of its nodes, relative to how far these reach, beyond which a reference point is
-/// asked about; nodes closer together than this part of the body count as if they reached so far.
+/// Distance of a reference point from the middle of its nodes, relative to the extent of the nodes, above
+/// which a warning is given.
 const REACH: f64 = 3.0;
+/// Smallest extent of the nodes of an interface, relative to the body, that [`REACH`] is applied to.
 const SMALLEST: f64 = 0.05;
 
-/// Distance of the default point of an interface from the mean of its nodes, relative to the largest distance of two of
-/// them, above which the interface is warned about; distances below this part of the body are rounding.
+/// Distance of the default point of an interface from the mean of its nodes, relative to the largest
+/// distance between two of them, above which a warning is given.
 const ASIDE: f64 = 0.01;
+/// Length, relative to the body, below which a distance or a coordinate counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Puts the places of reference points in place of what says where they are, and complains about those that
-/// cannot be.
+/// Replaces the definitions of reference points by positions, and adds errors for invalid ones.
 pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut Vec<Diagnostic>) {
     let (centre, size) = centre_and_length(&used.positions);
     let body = Extent { centre, size };
@@ -63,13 +64,13 @@ pub(super) fn resolve_references(raw: &mut RawModel, used: &Nodes, found: &mut V
     }
 }
 
-/// The nodes of a body: their mean, and the largest distance from it.
+/// Extent of the nodes of a body: their mean, and the largest distance from it.
 struct Extent {
     centre: [f64; 3],
     size: f64,
 }
 
-/// Returns an error for a reference point that cannot be one.
+/// Returns an error for a reference point that is invalid.
 fn impossible(name: &str, reference: [f64; 3], dimension: u8, body: &Extent) -> Option<Diagnostic> {
     if reference.iter().any(|x| !x.is_finite()) {
         let message = format!("reference point of interface `{name}` is not finite");
@@ -90,7 +91,8 @@ fn impossible(name: &str, reference: [f64; 3], dimension: u8, body: &Extent) -> 
     })
 }
 
-/// Returns a warning for a default reference point that is not the mean of the nodes, which was the default before.
+/// Returns a warning for a default reference point that differs from the mean of the nodes, the default of
+/// earlier versions.
 fn beside_the_mean(
     name: &str,
     centre: &InterfaceCentre,
@@ -111,13 +113,13 @@ fn beside_the_mean(
     })
 }
 
-/// `120, 0, -3.25`: six digits, rounding beside `size` is zero.
+/// Formats a point as `120, 0, -3.25`, with six digits; rounding relative to `size` becomes zero.
 fn in_words(point: [f64; 3], size: f64) -> String {
     point.map(|x| significant(if x.abs() <= ROUNDING * size { 0.0 } else { x }, 6)).join(", ")
 }
 
-/// A warning for a reference point that lies far from the nodes beside their own size, in a body of this
-/// size.
+/// Returns a warning for a reference point that is far from its nodes compared with their extent, in a body
+/// of the given size.
 fn far_reference(name: &str, reference: [f64; 3], nodes: &[[f64; 3]], size: f64) -> Option<Diagnostic> {
     let (centre, radius) = match nodes {
         [] => return None,

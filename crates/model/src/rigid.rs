@@ -1,17 +1,17 @@
-//! Rigid displacement fields of the nodes, and how far K is from annihilating them.
+//! Rigid displacement fields of the nodes, and the residual of K for them.
 
 use faer::Mat;
 use flexbody_linalg::{SymmetricMatrix, largest};
 use rayon::prelude::*;
 
-/// Number of rigid motions of a body with so many dimensions: six in space, three in the plane.
+/// Returns the number of rigid motions of a body of the given dimension: six in space, three in the plane.
 pub fn rigid_count(dimension: usize) -> usize {
     if dimension == 2 { 3 } else { 6 }
 }
 
-/// The rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x - centre) /
-/// `length`; in the plane (`dimension` 2) those that stay in it (2n x 3): two translations, the rotation
-/// about z.
+/// Returns the rigid fields (3n x 6) about `centre`: three unit translations, three rotations e_k x (x -
+/// centre) / `length`; in the plane (`dimension` 2) those that stay in it (2n x 3): two translations, and
+/// the rotation about z.
 pub fn rigid_fields(positions: &[[f64; 3]], dimension: usize, centre: [f64; 3], length: f64) -> Mat<f64> {
     if dimension == 2 {
         let mut fields = Mat::zeros(2 * positions.len(), 3);
@@ -36,10 +36,10 @@ pub fn rigid_fields(positions: &[[f64; 3]], dimension: usize, centre: [f64; 3], 
     fields
 }
 
-/// Mean of the positions and the largest distance from it (1 when all coincide).
+/// Returns the mean of the positions and the largest distance from it (1 if all coincide).
 pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
     let n = positions.len().max(1) as f64;
-    // Differences to the first node: sums keep their digits far from the origin.
+    // Sum differences to the first node, so that sums keep their digits far from the origin.
     let first = positions.first().copied().unwrap_or_default();
     let mut centre = [0.0; 3];
     for x in positions {
@@ -57,7 +57,7 @@ pub fn centre_and_length(positions: &[[f64; 3]]) -> ([f64; 3], f64) {
     (centre, if length > 0.0 { length } else { 1.0 })
 }
 
-/// Size of the box around the positions along each axis; zero without positions.
+/// Returns the size of the bounding box of the positions along each axis; zero without positions.
 pub fn extents(positions: &[[f64; 3]]) -> [f64; 3] {
     [0, 1, 2].map(|k| {
         let (low, high) = positions
@@ -67,9 +67,9 @@ pub fn extents(positions: &[[f64; 3]]) -> [f64; 3] {
     })
 }
 
-/// Distance of two positions that are far from each other: from the middle to the position farthest from it, and on
-/// to the one farthest from that, until the distance grows no more. The same in all axes, and for most bodies the
-/// largest distance that there is; zero without positions.
+/// Returns the distance of two positions that are far from each other: the search goes from the middle to
+/// the farthest position, and on to the one farthest from that, until the distance does not grow. The
+/// result is equal in all axes, and for most bodies it is the largest distance; zero without positions.
 pub fn span(positions: &[[f64; 3]]) -> f64 {
     let distance = |a: &[f64; 3], b: &[f64; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt();
     let farthest =
@@ -87,11 +87,11 @@ pub fn span(positions: &[[f64; 3]]) -> f64 {
     span
 }
 
-/// For each row i: max over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows, with r_j the
-/// size that a field has at row j in general: values near one mean a support and values near roundoff a free
-/// body.
+/// Returns for each row i the maximum over the fields of |(K R)_i| / sum_j |K_ij| r_j, zero for empty rows,
+/// with r_j the typical size of a field at row j. Values near one mean a support, values near roundoff a
+/// free body.
 pub(super) fn rigid_residuals(k: &SymmetricMatrix, fields: &Mat<f64>, sizes: &[f64]) -> Vec<f64> {
-    // Row by row: what a matrix entry needs lies in one or two cache lines.
+    // Store the fields row by row, so that the data for a matrix entry lie in one or two cache lines.
     let rows: Vec<[f64; 7]> = (0..k.n())
         .into_par_iter()
         .with_min_len(1024)

@@ -1,5 +1,5 @@
-//! Whether K leaves rigid motion free and M gives it the inertia of a body, and what is labelled wrongly
-//! where it does not.
+//! Checks that K leaves rigid motion free and that M gives it the inertia of a body, and diagnosis of wrong
+//! labels if not.
 
 use super::assembled::Assembled;
 use super::rigid::{centre_and_length, rigid_fields, rigid_residuals};
@@ -8,9 +8,9 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{Pencil, gram, largest};
 
-/// max |K R|_i / sum_j |K_ij| over the rows; an error when rigid motion strains the body, above the second
-/// limit: node tables written with few digits leave up to 1e-6, supports 0.01 to 1. Above the first, what is
-/// known of the positions is told: the invariants have no more digits than that.
+/// Returns max |K R|_i / sum_j |K_ij| over the rows. Adds an error if rigid motion strains the body, above
+/// the second limit: node tables with few digits leave up to 1e-6, supports 0.01 to 1. Above the first
+/// limit a note reports the accuracy of the positions, since the invariants have no more digits.
 pub(super) fn check_rigid_motion(
     body: &Assembled,
     (rounded, limit): (f64, f64),
@@ -56,11 +56,11 @@ pub(super) fn check_rigid_motion(
     worst
 }
 
-/// True if K leaves translations free, and rotations (angle theta about each axis) make forces theta x F at the
-/// strained rows: K of a body under a load F that is in equilibrium with stress in it. `fields` are the rigid
-/// motions, with rotations divided by a length.
+/// Returns true if K leaves translations free, and rotations (angle theta about each axis) cause forces
+/// theta x F at the strained rows: K belongs to a body under a load F that is in equilibrium with its
+/// stress. `fields` are the rigid motions, with rotations divided by a length.
 fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f64) -> bool {
-    /// Part of the forces that may not be theta x F.
+    /// Part of the forces that may deviate from theta x F.
     const OTHER: f64 = 1e-3;
     let d = body.rows.dimension;
     let force = |row: usize, field: usize| {
@@ -82,16 +82,16 @@ fn is_stressed(body: &Assembled, fields: &Mat<f64>, strained: &[usize], limit: f
         })
 }
 
-/// What to do when K leaves the rigid motions free that its rows have by another reading of the labels.
+/// Returns advice if K leaves the rigid motions free that belong to another interpretation of the labels.
 fn mislabelled(body: &Assembled, limit: f64) -> Option<&'static str> {
     let readings = Readings::new(body, limit);
     readings.of_three_rows().or_else(|| readings.swapped())
 }
 
-/// Other readings of the labels of a body in space.
+/// Other interpretations of the labels of a body in space.
 struct Readings<'a> {
     body: &'a Assembled,
-    /// Residual that rounding leaves of rigid motion.
+    /// Residual of rigid motion due to rounding.
     limit: f64,
     length: f64,
     /// Rigid fields of the nodes in space.
@@ -104,14 +104,15 @@ impl<'a> Readings<'a> {
         Self { body, limit, length, fields: rigid_fields(&body.nodes.positions, 3, centre, length) }
     }
 
-    /// Whether K leaves these motions free; `rotation` says which rows are taken for rotations.
+    /// Returns true if K leaves these motions free; `rotation` returns true for rows that count as
+    /// rotations.
     fn are_free(&self, fields: &Mat<f64>, rotation: impl Fn(usize) -> bool) -> bool {
         let size = |row: usize| if rotation(row) { 1.0 / self.length } else { 1.0 };
         let sizes: Vec<f64> = (0..fields.nrows()).map(size).collect();
         rigid_residuals(&self.body.stiffness, fields, &sizes).iter().all(|&r| r <= self.limit)
     }
 
-    /// What a rigid field does to a direction of a node: translations, then rotations.
+    /// Returns the value of a rigid field in a direction of a node: translations, then rotations.
     fn motion(&self, node: usize, direction: usize, field: usize) -> f64 {
         match (direction < 3, field >= 3) {
             (true, _) => self.fields[(3 * node + direction, field)],
@@ -120,12 +121,13 @@ impl<'a> Readings<'a> {
         }
     }
 
-    /// The three rows of each node are others than its displacements, or stand in another order.
+    /// Tests if the three rows of each node are other directions than its displacements, or in another
+    /// order.
     fn of_three_rows(&self) -> Option<&'static str> {
         if self.body.rows.dimension != 3 || !self.body.rows.are_plain() {
             return None;
         }
-        // Motions that such rows cannot show vanish.
+        // Motions that such rows cannot represent vanish.
         let readings = [
             (
                 [0, 1, 5],
@@ -152,7 +154,7 @@ impl<'a> Readings<'a> {
             .then_some("rows are those of x for all nodes, then y, then z: give a dofs table that says so")
     }
 
-    /// Every node has three displacements and three rotations, which are labelled as each other.
+    /// Tests if displacements and rotations of every node are labelled as each other.
     fn swapped(&self) -> Option<&'static str> {
         let (rows, n) = (&self.body.rows, self.body.nodes.len());
         if rows.dimension != 3 || rows.rotations().len() != 3 * n {
@@ -169,8 +171,8 @@ impl<'a> Readings<'a> {
     }
 }
 
-/// A mass that does not commute with rotations must still give rigid motion the inertia of a rigid body: R'MR
-/// = \[m I, -c~; c~, I0\].
+/// Checks that a mass that does not commute with rotations gives rigid motion the inertia of a rigid body:
+/// R'MR = \[m I, -c~; c~, I0\].
 pub(super) fn check_inertia(body: &Assembled, tolerance: f64, found: &mut Vec<Diagnostic>) {
     let Assembled { raw, nodes, rows, mass, stiffness, .. } = body;
     let (centre, length) = centre_and_length(&nodes.positions);

@@ -1,8 +1,8 @@
-//! What the rows of a model stand for, in the internal order, and how they move with the rigid body.
+//! Meaning of the rows of a model in the internal order, and their rigid motion.
 //!
-//! First the displacements of the nodes, node-major; then those of vectors without a place, of which only K
-//! knows how they move with the body (bubbles, hierarchical shape functions); then nodal rotations; last
-//! massless rows without a place.
+//! First the displacements of the nodes, node-major; then those of vectors without a position, whose rigid
+//! motion only K determines (bubbles, hierarchical shape functions); then nodal rotations; last massless
+//! rows without a position.
 
 use super::rigid::{rigid_count, rigid_fields};
 use super::{DofLabel, Nodes};
@@ -10,84 +10,83 @@ use faer::Mat;
 use flexbody_linalg::{SymmetricMatrix, connected_components};
 use std::ops::Range;
 
-/// Largest rigid motion of a row that does not move, relative to a unit translation: rounding of the
-/// stiffness.
+/// Largest rigid motion of a row at rest, relative to a unit translation: rounding of the stiffness.
 const STILL: f64 = 1e-9;
 
-/// The rows of a model beyond its plain displacements, and the order of all of them.
+/// Rows of a model beyond its plain displacements, and the order of all rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
     pub(super) dimension: usize,
     pub(super) nodes: usize,
-    /// Numbers that the labels of vectors without a place have.
+    /// Numbers in the labels of vectors without a position.
     pub(super) vectors: Vec<i64>,
     /// Index of the node and axis (0, 1, 2) of every rotation, ascending.
     pub(super) rotations: Vec<(u32, u8)>,
-    /// Labels of the massless rows without a place.
+    /// Labels of the massless rows without a position.
     pub(super) others: Vec<DofLabel>,
     pub(super) recovered: Recovered,
 }
 
-/// The rigid motion of the rows without a place, as K has it: vectors first, then the massless rows.
+/// Rigid motion of the rows without a position, determined by K: vectors first, then the massless rows.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Recovered {
-    /// One column per rigid motion, rotations about `centre`, divided by `length`.
+    /// One column per rigid motion; rotations about `centre`, divided by `length`.
     pub fields: Mat<f64>,
     pub centre: [f64; 3],
     pub length: f64,
 }
 
 impl Recovered {
-    /// Of no row.
+    /// Returns the recovered motion of no rows.
     pub(crate) fn none() -> Self {
         Self { fields: Mat::new(), centre: [0.0; 3], length: 1.0 }
     }
 }
 
 impl Rows {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.displacements() + self.rotations.len() + self.others.len()
     }
 
-    /// Whether there is none.
+    /// Returns true if there are no rows.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether every row is the displacement of a node.
+    /// Returns true if every row is the displacement of a node.
     pub fn are_plain(&self) -> bool {
         self.len() == self.dimension * self.nodes
     }
 
-    /// Rows of displacements: d per node, then d per vector without a place.
+    /// Returns the number of rows of displacements: d per node, then d per vector without a position.
     pub fn displacements(&self) -> usize {
         self.dimension * (self.nodes + self.vectors.len())
     }
 
-    /// Number of vectors without a place.
+    /// Returns the number of vectors without a position.
     pub fn vectors(&self) -> usize {
         self.vectors.len()
     }
 
-    /// Index of the node and axis (0, 1, 2) of every rotation; the first has the row
+    /// Returns node index and axis (0, 1, 2) of every rotation; the first has the row
     /// [`displacements`](Self::displacements).
     pub fn rotations(&self) -> &[(u32, u8)] {
         &self.rotations
     }
 
-    /// Rows of the vectors without a place, and of the massless rows without a place.
+    /// Returns the rows of the vectors without a position, and of the massless rows without a position.
     pub fn without_place(&self) -> [Range<usize>; 2] {
         let last = self.displacements() + self.rotations.len();
         [self.dimension * self.nodes..self.displacements(), last..self.len()]
     }
 
-    /// Whether a vertex ([`Rows::vertex`]) is a node.
+    /// Returns true if a vertex ([`Rows::vertex`]) is a node.
     pub(super) fn is_node(&self, vertex: usize) -> bool {
         vertex < self.nodes
     }
 
-    /// Where a row belongs: the nodes, then the vectors, then each of the other rows by itself.
+    /// Returns the vertex of a row: nodes first, then vectors, then each of the other rows by itself.
     pub(super) fn vertex(&self, row: usize) -> usize {
         let after = self.displacements();
         match row {
@@ -97,7 +96,7 @@ impl Rows {
         }
     }
 
-    /// The rows of a [`vertex`](Self::vertex), ascending.
+    /// Returns the rows of a [`vertex`](Self::vertex), ascending.
     pub(super) fn of_vertex(&self, vertex: usize) -> impl Iterator<Item = usize> {
         let (after, d) = (self.displacements(), self.dimension);
         let up_to = |node: usize| after + self.rotations.partition_point(|&(own, _)| (own as usize) < node);
@@ -111,7 +110,7 @@ impl Rows {
         first.chain(second)
     }
 
-    /// Label of a row.
+    /// Returns the label of a row.
     pub(super) fn label(&self, nodes: &Nodes, row: usize) -> DofLabel {
         let (after, d) = (self.displacements(), self.dimension);
         if row < after {
@@ -123,7 +122,7 @@ impl Rows {
         }
     }
 
-    /// Size that a rigid field with the given `length` has at each row: one for a displacement.
+    /// Returns the size of a rigid field with the given `length` at each row: one for a displacement.
     pub(super) fn field_sizes(&self, length: f64) -> Vec<f64> {
         let mut sizes = vec![1.0; self.displacements()];
         sizes.resize(sizes.len() + self.rotations.len(), 1.0 / length);
@@ -136,19 +135,20 @@ impl Rows {
         sizes
     }
 
-    /// Whether rigid motion leaves the vectors without a place where they are, as bubbles.
+    /// Returns true if rigid motion does not move the vectors without a position (bubbles).
     pub(super) fn are_still(&self) -> bool {
         let known = &self.recovered.fields;
         let rows = self.dimension * self.vectors.len();
         (0..known.ncols()).all(|c| (0..rows).all(|row| known[(row, c)].abs() < STILL))
     }
 
-    /// Connected component of every vertex, numbered from 0 in the order of their first vertices. Any entry
-    /// of any of the matrices connects, and the rows of a node belong together.
+    /// Returns the connected component of every vertex, numbered from 0 in the order of their first
+    /// vertices. Any entry of any of the matrices connects, and the rows of a node are connected.
     pub(super) fn components(&self, matrices: &[&SymmetricMatrix]) -> Vec<usize> {
         if self.rotations.is_empty() && self.others.is_empty() {
             return connected_components(matrices, self.dimension);
         }
+        // Components of single rows first, then union of those that share a vertex.
         let by_row = connected_components(matrices, 1);
         let mut root: Vec<usize> = (0..by_row.iter().max().map_or(0, |last| last + 1)).collect();
         let find = |root: &[usize], mut c: usize| {
@@ -168,6 +168,7 @@ impl Rows {
                 }
             }
         }
+        // Number the components in the order of their first vertices.
         let mut number = vec![usize::MAX; root.len()];
         let mut count = 0;
         let numbered = |&c: &usize| {
@@ -181,8 +182,8 @@ impl Rows {
         first.iter().map(numbered).collect()
     }
 
-    /// Takes the rows apart by the component of their vertices: of each component the rows, ascending, and
-    /// what they are.
+    /// Splits the rows by the component of their vertices; returns the rows of each component, ascending,
+    /// and their meaning.
     pub(super) fn separated(&self, component: &[usize]) -> Vec<(Vec<usize>, Self)> {
         let empty = Self {
             dimension: self.dimension,
@@ -210,12 +211,12 @@ impl Rows {
         parts
     }
 
-    /// Nodes, vectors without a place, and the other rows.
+    /// Returns the number of nodes, vectors without a position, and other rows.
     pub(super) fn vertices(&self) -> usize {
         self.nodes + self.vectors.len() + self.others.len()
     }
 
-    /// Number that the label of a vertex has.
+    /// Returns the number in the label of a vertex.
     pub(super) fn number(&self, nodes: &Nodes, vertex: usize) -> i64 {
         let after = vertex.saturating_sub(self.nodes);
         match nodes.ids.get(vertex).or_else(|| self.vectors.get(after)) {
@@ -224,8 +225,8 @@ impl Rows {
         }
     }
 
-    /// The rigid fields (one row per row of the model): unit translations, then rotations e_k x (x -
-    /// `centre`) / `length` with e_k / `length` at the rotations; in the plane those that stay in it.
+    /// Returns the rigid fields (one row per row of the model): unit translations, then rotations
+    /// e_k x (x - `centre`) / `length` with e_k / `length` at the rotations; in the plane those that stay in it.
     pub fn rigid_fields(&self, positions: &[[f64; 3]], centre: [f64; 3], length: f64) -> Mat<f64> {
         let (d, count) = (self.dimension, rigid_count(self.dimension));
         let mut fields = rigid_fields(positions, d, centre, length);
@@ -234,7 +235,7 @@ impl Rows {
         }
         fields.resize_with(self.len(), count, |_, _| 0.0);
         for (row, &(_, axis)) in (self.displacements()..).zip(&self.rotations) {
-            // In the plane the only rotation is that about z.
+            // In the plane the only rotation is about z.
             fields[(row, if d == 2 { 2 } else { 3 + usize::from(axis) })] = 1.0 / length;
         }
         let known = &self.recovered;
@@ -245,7 +246,7 @@ impl Rows {
                 fields[(row, k)] = old(k);
             }
             for turn in d..count {
-                // e_k x (x - c) = e_k x (x - c0) + e_k x (c0 - c), the second a translation.
+                // e_k x (x - c) = e_k x (x - c0) + e_k x (c0 - c); the second term is a translation.
                 let axis = if d == 2 { 2 } else { turn - 3 };
                 let (l, m) = ((axis + 1) % 3, (axis + 2) % 3);
                 let along = |k: usize| if k < d { old(k) } else { 0.0 };

@@ -15,23 +15,23 @@ use std::collections::{BTreeMap, HashMap};
 use std::convert::Infallible;
 
 impl FeModel {
-    /// The same as [`from_raw`](FeModel::from_raw) for matrices that hold several bodies: each becomes a
-    /// model of its own.
+    /// Checks matrices that hold several bodies, as [`from_raw`](FeModel::from_raw) does for one: each body
+    /// becomes a model of its own.
     ///
     /// # Errors
-    /// See [`check_bodies`].
+    /// The errors of [`check_bodies`].
     pub fn bodies_from_raw(raw: RawModel) -> Result<Vec<CheckedModel>> {
         check_bodies(raw)
     }
 }
 
-/// Checks `raw`, takes the bodies in it apart and checks each. Two nodes belong to one body when K or M
-/// couples them, directly or through others. The nodes of a body keep their order, and its model is named
+/// Checks `raw`, separates its bodies and checks each. Two nodes belong to one body if K or M couples them,
+/// directly or through others. The nodes of a body keep their order, and its model is named
 /// `<name>-<number>`.
 ///
 /// # Errors
-/// As [`check`](super::check), the bodies named in the messages, the body with the highest exit code first;
-/// [`ModelTooSmall`](Code::ModelTooSmall) for bodies with no more rows than rigid motions;
+/// The errors of [`check`](super::check), with the bodies named in the messages, the body with the highest
+/// exit code first; [`ModelTooSmall`](Code::ModelTooSmall) for bodies with no more rows than rigid motions;
 /// [`InterfaceAcross`](Code::InterfaceAcross) for an interface with nodes of several bodies;
 /// [`BodiesCoupled`](Code::BodiesCoupled) for a damping or geometric stiffness matrix that couples bodies.
 pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
@@ -60,7 +60,7 @@ pub fn check_bodies(raw: RawModel) -> Result<Vec<CheckedModel>> {
     Err(Error::new(shared.into_iter().chain(failed.into_iter().flat_map(Error::into_diagnostics)).collect()))
 }
 
-/// The bodies, in the order of their first nodes.
+/// Returns the bodies, in the order of their first nodes.
 fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnostic>> {
     let component = whole.rows.components(&[&whole.stiffness, &whole.mass]);
     let members = whole.rows.separated(&component);
@@ -81,7 +81,7 @@ fn separate(whole: Assembled) -> std::result::Result<Vec<Assembled>, Vec<Diagnos
     Ok(bodies)
 }
 
-/// A complaint about bodies with no more rows than rigid motions.
+/// Returns an error about bodies with no more rows than rigid motions.
 fn too_small(whole: &Assembled, component: &[usize], members: &[(Vec<usize>, Rows)]) -> Option<Diagnostic> {
     let bodies = groups(component, &whole.rows, &whole.nodes);
     let rigid = rigid_count(whole.rows.dimension);
@@ -100,7 +100,7 @@ fn too_small(whole: &Assembled, component: &[usize], members: &[(Vec<usize>, Row
     })
 }
 
-/// Complains about damping and geometric stiffness that couple bodies.
+/// Adds errors about damping and geometric stiffness that couple bodies.
 fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagnostic>) {
     let damping = whole.damping.as_ref().and_then(Damping::matrix).map(|d| (d, "damping".to_owned()));
     let geometric =
@@ -110,7 +110,7 @@ fn check_couplings(whole: &Assembled, component: &[usize], found: &mut Vec<Diagn
     }
 }
 
-/// Complains about geometric stiffness of a load at an interface that stiffens another body than the one of
+/// Adds errors about geometric stiffness of a load at an interface that stiffens another body than that of
 /// the interface.
 fn check_loads_of_others(
     whole: &Assembled,
@@ -134,7 +134,7 @@ fn check_loads_of_others(
     }
 }
 
-/// The nodes of each body, in the order of the node table.
+/// Returns the nodes of each body, in the order of the node table.
 fn nodes_of_bodies(nodes: &Nodes, component: &[usize], bodies: usize) -> Vec<Nodes> {
     let mut own = vec![Nodes::default(); bodies];
     for (node, &body) in component.iter().enumerate().take(nodes.len()) {
@@ -144,7 +144,7 @@ fn nodes_of_bodies(nodes: &Nodes, component: &[usize], bodies: usize) -> Vec<Nod
     own
 }
 
-/// The body with this number, made of the rows `kept`.
+/// Returns the body with this number, made of the rows `kept`.
 fn part(
     whole: &Assembled,
     number: usize,
@@ -158,7 +158,7 @@ fn part(
         let Ok(own) = damping.borrowed().try_map(principal);
         own
     });
-    // What a load does to the other bodies is nothing: no rows of it are theirs.
+    // Drop loads that have no entries in rows of this body.
     let geometric_stiffness = whole
         .geometric_stiffness
         .iter()
@@ -179,7 +179,7 @@ fn part(
     }
 }
 
-/// The interfaces of every body; a complaint about each that belongs to several.
+/// Returns the interfaces of every body; adds an error for each interface that belongs to several.
 fn distribute(
     interfaces: &[NodeSet],
     component: &[usize],
@@ -210,7 +210,7 @@ fn distribute(
     own
 }
 
-/// A complaint when an entry of the matrix called `name` couples two bodies.
+/// Returns an error if an entry of the matrix called `name` couples two bodies.
 fn coupling(
     matrix: &SymmetricMatrix,
     name: &str,

@@ -1,4 +1,4 @@
-//! The surface of a part, to draw it by.
+//! Surface of a part, for drawing.
 
 mod decimate;
 mod features;
@@ -10,8 +10,8 @@ pub use skin::{Skin, skin};
 
 use std::collections::HashMap;
 
-/// Triangles of the surface of a part, and lines: its feature edges, the rims of shells, beams. Both are
-/// given by indices of nodes. Nothing is computed from it but pictures.
+/// Triangles of the surface of a part, and lines: its feature edges, the rims of shells, and beams, all by
+/// indices of nodes. The mesh is used for drawing only.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SurfaceMesh {
     triangles: Vec<[u32; 3]>,
@@ -19,11 +19,11 @@ pub struct SurfaceMesh {
 }
 
 impl SurfaceMesh {
-    /// A mesh on so many `nodes`. The corners of a triangle run counterclockwise seen from outside, where
-    /// there is an outside.
+    /// Creates a mesh on `nodes` nodes. The corners of a triangle run counterclockwise seen from outside,
+    /// if there is an outside.
     ///
     /// # Errors
-    /// What is wrong, in words: an index that is no node's, a triangle or an edge that has a node twice, or
+    /// A text with the reason: an index beyond the nodes, a triangle or an edge with a node twice, or
     /// neither triangles nor edges.
     pub fn new(triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>, nodes: usize) -> Result<Self, String> {
         let mesh = Self { triangles, edges };
@@ -42,17 +42,17 @@ impl SurfaceMesh {
         Ok(mesh)
     }
 
-    /// The same of parts that are known to be in order; `None` where nothing is left to draw.
+    /// Creates a mesh from valid parts; `None` if there is nothing to draw.
     fn of_parts(triangles: Vec<[u32; 3]>, edges: Vec<[u32; 2]>) -> Option<Self> {
         (!triangles.is_empty() || !edges.is_empty()).then_some(Self { triangles, edges })
     }
 
-    /// Triangles.
+    /// Returns the triangles.
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
     }
 
-    /// Edges.
+    /// Returns the edges.
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.edges
     }
@@ -61,12 +61,12 @@ impl SurfaceMesh {
         self.triangles.as_flattened().iter().chain(self.edges.as_flattened()).copied()
     }
 
-    /// One more than the highest index.
+    /// Returns one more than the highest index.
     pub fn least_nodes(&self) -> usize {
         self.indices().max().map_or(0, |highest| highest as usize + 1)
     }
 
-    /// Indices of the nodes that it draws, ascending.
+    /// Returns the indices of the drawn nodes, ascending.
     pub fn drawn_nodes(&self) -> Vec<u32> {
         let mut nodes: Vec<u32> = self.indices().collect();
         nodes.sort_unstable();
@@ -74,8 +74,8 @@ impl SurfaceMesh {
         nodes
     }
 
-    /// The part of the mesh whose nodes, `from` by number, are among the nodes `to`, by the indices there;
-    /// `None` where nothing of it is.
+    /// Returns the part of the mesh whose nodes are among the nodes `to`, with the indices of that list;
+    /// `from` holds the numbers of the present nodes. Returns `None` if no part is left.
     pub fn among(&self, from: &[i64], to: &[i64]) -> Option<Self> {
         if from == to {
             return Some(self.clone());

@@ -1,5 +1,5 @@
-//! Rows without a place and rows without mass: how the first move with the body, and whether the second
-//! follow the others.
+//! Rows without a position and massless rows: rigid motion of the former, and the check that the latter are
+//! held by stiffness.
 
 use super::rigid::{centre_and_length, rigid_count};
 use super::rows::{Recovered, Rows};
@@ -9,19 +9,20 @@ use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Pencil, Solve, SymmetricMatrix};
 
-/// Eigenvalue of a stiffness with unit diagonal below which it does not hold its rows: rounding of sums
-/// leaves 1e-14.
+/// Eigenvalue of a stiffness with unit diagonal below which the stiffness does not resist a motion:
+/// rounding of sums leaves 1e-14.
 const LOOSE: f64 = 1e-12;
 
-/// How close to a unit translation a vector moves that is a node whose coordinates are missing.
+/// Largest deviation of the motion of a vector from a unit translation for a node whose coordinates are
+/// missing.
 const NODE: f64 = 1e-6;
 
-/// Finds the rigid motion R_p of the rows without a place, K_pp R_p = -K_pn R_n: the null space of K given
-/// its values R_n at all others. Exact wherever K R = 0 holds, which is checked for these rows with all
+/// Finds the rigid motion R_p of the rows without a position, K_pp R_p = -K_pn R_n: the null space of K
+/// from its values R_n at all other rows. Exact if K R = 0 holds, which is checked for these rows with all
 /// others.
 ///
 /// # Errors
-/// [`RowsUnheld`](Code::RowsUnheld) when K leaves some of the rows free.
+/// [`RowsUnheld`](Code::RowsUnheld) if K leaves some of the rows free.
 pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Nodes) -> Result<(), Diagnostic> {
     let placeless: Vec<usize> = rows.without_place().into_iter().flatten().collect();
     if placeless.is_empty() {
@@ -35,7 +36,7 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
     for (to, &row) in placeless.iter().enumerate() {
         let (columns, values) = stiffness.row(row);
         for (&j, &v) in columns.iter().zip(values) {
-            // Fields of rows without a place are still zero.
+            // Fields of rows without a position are still zero.
             for c in 0..count {
                 fields[(to, c)] -= v * known[(j as usize, c)];
             }
@@ -50,8 +51,8 @@ pub(super) fn recover(stiffness: &SymmetricMatrix, rows: &mut Rows, nodes: &Node
     Ok(())
 }
 
-/// Nodes whose coordinates are missing: K moves them like any node, and they carry mass. What is wrong, with
-/// the place that K gives each of them.
+/// Returns an error for nodes whose coordinates are missing: K moves them like any node, and they carry
+/// mass. The error states the position that K gives to the first of them.
 pub(super) fn misplaced(rows: &Rows) -> Option<Diagnostic> {
     let d = rows.dimension;
     let known = &rows.recovered;
@@ -73,7 +74,7 @@ pub(super) fn misplaced(rows: &Rows) -> Option<Diagnostic> {
     let mut missing: Vec<i64> = found.iter().map(|&at| rows.vectors[at]).collect();
     missing.sort_unstable();
     let message = format!("{} nodes have no coordinates: {}", missing.len(), name_some(&missing));
-    // To nine digits of the body: what is left of a zero is rounding.
+    // Round to nine digits of the size of the body, since zeros have rounding errors.
     let unit = 1e-9 * known.length;
     let place = place(first).map(|x| format!("{:.6e}", (x / unit).round() * unit + 0.0));
     Some(Diagnostic::new(Code::NodesMissing, message).with_help(format!(
@@ -83,7 +84,8 @@ pub(super) fn misplaced(rows: &Rows) -> Option<Diagnostic> {
     )))
 }
 
-/// Refuses massless rows that the stiffness does not hold: K and M have a null vector in common then.
+/// Returns an error for massless rows that the stiffness does not hold: K and M then have a common null
+/// vector.
 pub(super) fn check_massless(
     stiffness: &SymmetricMatrix,
     mass: &SymmetricMatrix,
@@ -105,11 +107,11 @@ pub(super) fn check_massless(
     })
 }
 
-/// The stiffness of some rows with all others held, scaled to a unit diagonal.
+/// Stiffness of some rows with all others held, scaled to a unit diagonal.
 struct Restricted {
     matrix: SymmetricMatrix,
     one: SymmetricMatrix,
-    /// 1 / sqrt(K_ii), zero where K_ii is.
+    /// 1 / sqrt(K_ii), or zero if K_ii is zero.
     scale: Vec<f64>,
 }
 
@@ -126,7 +128,7 @@ impl Restricted {
     }
 
     /// # Errors
-    /// The rows that move most in a motion without energy, most first.
+    /// The rows that move most in a motion without energy, in descending order.
     fn held(&self) -> Result<(), Vec<usize>> {
         let n = self.scale.len();
         let loose: Vec<usize> = (0..n).filter(|&i| self.scale[i] == 0.0).collect();
@@ -134,10 +136,10 @@ impl Restricted {
             return Err(loose);
         }
         let pencil = Pencil::new(&self.matrix, &self.one, 1);
-        // Too large to be ordered, or indefinite: the search for modes says so.
+        // If the matrix is too large for an ordering, or indefinite, the search for modes reports it.
         let Some(analysis) = Analysis::new(&pencil) else { return Ok(()) };
         let Some(factor) = Cholesky::<f64>::new(&analysis, &pencil, 1e3 * LOOSE) else { return Ok(()) };
-        // Two inverse iterations: what is loose grows by 1e9 over what is held.
+        // Inverse iterations: in each of them loose motions grow by 1e9 relative to held ones.
         let mut x = Mat::from_fn(n, 1, |i, _| 1.0 + 0.5 * (i as f64 * 0.7).sin());
         for _ in 0..3 {
             factor.solve_in_place(x.as_mut());
@@ -153,10 +155,10 @@ impl Restricted {
         Err(free)
     }
 
-    /// X <- K^-1 X.
+    /// Computes X <- K^-1 X.
     ///
     /// # Errors
-    /// As [`held`](Self::held).
+    /// The errors of [`held`](Self::held).
     fn solve(&self, x: &mut Mat<f64>) -> Result<(), Vec<usize>> {
         self.held()?;
         let pencil = Pencil::new(&self.matrix, &self.one, 1);
@@ -171,7 +173,7 @@ impl Restricted {
         scaled(x);
         let load = x.clone();
         factor.solve_in_place(x.as_mut());
-        // Once more with what is left: the motion is as exact as K.
+        // Correct once with the residual: the motion becomes as accurate as K.
         let mut rest = &load - pencil.apply_stiffness(x.as_ref());
         factor.solve_in_place(rest.as_mut());
         *x += &rest;

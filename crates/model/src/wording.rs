@@ -1,9 +1,9 @@
-//! Lists in messages: as many items as a reader takes in, and how many more there are.
+//! Lists in messages, limited to a few items.
 
-/// At most this many items are named in a message.
+/// Largest number of items named in a message.
 const NAMED: usize = 5;
 
-/// `a, b, c and 7 more`.
+/// Joins items as `a, b, c and 7 more`.
 pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
     let named: Vec<String> = items.iter().take(NAMED).map(T::to_string).collect();
     match items.len().saturating_sub(NAMED) {
@@ -12,7 +12,7 @@ pub(super) fn name_some<T: std::fmt::Display>(items: &[T]) -> String {
     }
 }
 
-/// `8 nodes (1, 2, 3, 4, 5 and 3 more), 1 node (9)`.
+/// Formats groups as `8 nodes (1, 2, 3, 4, 5 and 3 more), 1 node (9)`.
 pub(super) fn in_words(groups: &[Vec<i64>]) -> String {
     let group = |nodes: &Vec<i64>| {
         let plural = if nodes.len() == 1 { "" } else { "s" };

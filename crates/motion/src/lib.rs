@@ -1,5 +1,5 @@
-//! How bodies move: equations of motion, reduced and of all nodes, and the scene, which says what a body is
-//! to do. No decisions about terms and modes.
+//! Motion of bodies: equations of motion, reduced and of all nodes, and the scene, which defines loads,
+//! prescribed motion and requirements. No decisions about terms and modes.
 
 #![deny(
     clippy::exit,

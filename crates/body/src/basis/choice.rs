@@ -1,17 +1,17 @@
-//! The bases there are.
+//! Choice among the bases.
 
 use super::{Basis, CraigBampton, CraigChang, FreeSurface, ImportedShapes, Loads, SolvedModes};
 use faer::Mat;
 use flexbody_base::provenance::SourceFile;
 
-/// Which basis a body gets: every implementation of [`Basis`] has a variant here.
+/// Choice of the basis of a body: every implementation of [`Basis`] has a variant here.
 #[derive(Debug, Clone, PartialEq)]
 pub enum BasisChoice {
-    /// Free-surface modes, with residual vectors where they are wanted.
+    /// Free-surface modes, with residual vectors if requested.
     Free(FreeSurface),
-    /// Shapes that were computed elsewhere.
+    /// Shapes computed elsewhere.
     Imported(ImportedShapes),
-    /// Free-surface modes that another eigen-solver found.
+    /// Free-surface modes found by another eigen-solver.
     Solved(SolvedModes),
     /// Modes with the interfaces held, and constraint modes.
     CraigBampton(CraigBampton),
@@ -20,14 +20,14 @@ pub enum BasisChoice {
 }
 
 impl Default for BasisChoice {
-    /// Free-surface modes alone.
+    /// Returns free-surface modes without residual vectors.
     fn default() -> Self {
         Self::Free(FreeSurface::default())
     }
 }
 
 impl BasisChoice {
-    /// Files that were read for it.
+    /// Returns the files that were read for the basis.
     pub fn sources(&self) -> Vec<&SourceFile> {
         match self {
             Self::Imported(shapes) => shapes.source().into_iter().collect(),
@@ -36,7 +36,7 @@ impl BasisChoice {
         }
     }
 
-    /// The one that is chosen.
+    /// Returns the chosen basis.
     pub fn basis(&self) -> &dyn Basis {
         match self {
             Self::Free(free) => free,
@@ -47,8 +47,8 @@ impl BasisChoice {
         }
     }
 
-    /// The same basis with the static responses to what a motion leaves unbalanced at the nodes (N x m)
-    /// beside its modes; `None` for a basis that takes none.
+    /// Returns this basis with residual vectors for the forces that a motion leaves unbalanced at the nodes
+    /// (N x m); `None` for a basis without residual vectors.
     pub fn with_motion(&self, loads: &Mat<f64>) -> Option<Self> {
         let mut own = self.clone();
         let residual_vectors = match &mut own {
@@ -62,7 +62,7 @@ impl BasisChoice {
         Some(own)
     }
 
-    /// The eigen-solver that found the modes, where it is not the one of this program.
+    /// Returns the eigen-solver that found the modes, if it was not this program.
     pub fn engine(&self) -> Option<&str> {
         match self {
             Self::Solved(modes) => Some(&modes.engine),
@@ -70,7 +70,7 @@ impl BasisChoice {
         }
     }
 
-    /// Loads, named by the user, whose static responses join the modes.
+    /// Returns the loads requested by the user whose responses are added to the modes.
     pub fn residual_vectors(&self) -> &[Loads] {
         match self {
             Self::Free(FreeSurface { residual_vectors })

@@ -1,11 +1,11 @@
-//! Shapes or loads from outside: checked, and brought into the rows of the model.
+//! Shapes or loads from outside: checks, and transformation to the rows of the model.
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::{FeModel, LostRow, RawShapes};
 
-/// Kind of columns that are given by rows.
+/// Kind of columns given by rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Given {
     /// Displacements.
@@ -26,8 +26,9 @@ impl Given {
 /// Returns the columns of `raw` in the model's order of degrees of freedom.
 ///
 /// # Errors
-/// [`ShapesSize`](Code::ShapesSize) when the rows are not those of the matrices, or a load acts on a row that has neither
-/// stiffness nor mass, /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
+/// [`ShapesSize`](Code::ShapesSize) if the rows are not those of the matrices, or a load acts on a row that
+/// has neither stiffness nor mass; [`MatrixNotFinite`](Code::MatrixNotFinite) and
+/// [`ShapesZero`](Code::ShapesZero), one diagnostic per finding.
 pub(super) fn columns(model: &FeModel, raw: RawShapes, given: Given) -> Result<Mat<f64>> {
     let (n, k, what) = (raw.matrix.nrows(), raw.matrix.ncols(), given.name());
     let path = raw.path.clone();

@@ -1,4 +1,4 @@
-//! A model under the couplings that every mode of a body keeps: interfaces that move as rigid bodies (theory
+//! Model with the couplings that all modes of a body preserve: interfaces that move as rigid bodies (theory
 //! section 5).
 
 use super::echelon::Echelon;
@@ -14,18 +14,18 @@ use std::borrow::Cow;
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// Largest deformation of a rigid interface, relative to the largest motion of any node, that is the rounding of modes in
-/// single precision.
+/// Largest deformation of a rigid interface, relative to the largest motion of any node, that rounding of
+/// single-precision modes explains.
 const RIGID: f64 = 1e-6;
 
-/// A model whose rigid interfaces move as rigid bodies: displacements u = T y, with the pencil (T'KT, T'MT). Forces and
-/// displacements are those of all rows of the model; without such interfaces T = 1.
+/// Model whose rigid interfaces move as rigid bodies: u = T y, with the pencil (T'KT, T'MT). Forces and
+/// displacements refer to all rows of the model. Without rigid interfaces T = 1.
 pub struct CoupledModel<'m> {
     model: &'m FeModel,
     coupling: Option<RigidInterfaces>,
 }
 
-/// Interfaces of several rows that have six degrees of freedom each, in the plane three.
+/// Rigid interfaces with several rows, which have six degrees of freedom each, in the plane three.
 struct RigidInterfaces {
     joints: Vec<CoupledInterface>,
     elimination: Elimination,
@@ -33,12 +33,13 @@ struct RigidInterfaces {
 }
 
 impl<'m> CoupledModel<'m> {
-    /// The model as it is, with interfaces that deform.
+    /// Creates a model without couplings: all interfaces deform.
     pub fn uncoupled(model: &'m FeModel) -> Self {
         Self { model, coupling: None }
     }
 
-    /// The model in which those of the rigid interfaces among `sets` are rigid that no mode deforms.
+    /// Creates a model in which an interface of `sets` moves as a rigid body if it is declared rigid and no
+    /// mode deforms it.
     ///
     /// * `vectors`: modes Psi of a body (N x nf), in the rows of the model.
     pub fn of_modes(model: &'m FeModel, sets: &[NodeSet], vectors: MatRef<'_, f64>) -> Self {
@@ -63,22 +64,22 @@ impl<'m> CoupledModel<'m> {
         Self { model, coupling: Some(RigidInterfaces { joints, elimination, reduced }) }
     }
 
-    /// The model without the couplings.
+    /// Returns the model without the couplings.
     pub fn model(&self) -> &'m FeModel {
         self.model
     }
 
-    /// Names of the interfaces that are rigid here.
+    /// Returns the names of the interfaces that move as rigid bodies.
     pub fn rigid_interfaces(&self) -> Vec<String> {
         self.coupling.iter().flat_map(|own| &own.joints).map(|joint| joint.name.clone()).collect()
     }
 
-    /// (T'KT, T'MT).
+    /// Returns the pencil (T'KT, T'MT).
     pub fn pencil(&self) -> Pencil<'_> {
         self.coupling.as_ref().map_or_else(|| self.model.pencil(), |own| own.reduced.pencil())
     }
 
-    /// T'f (m x k): what nodal forces f (N x k) do to the degrees of freedom that are left.
+    /// Returns T'f (m x k), the loads on the remaining degrees of freedom due to nodal forces f (N x k).
     pub fn restrict(&self, forces: Mat<f64>) -> Mat<f64> {
         match &self.coupling {
             Some(own) => own.elimination.restrict(forces.as_ref()),
@@ -86,7 +87,7 @@ impl<'m> CoupledModel<'m> {
         }
     }
 
-    /// T y (N x k).
+    /// Returns T y (N x k).
     pub fn expand<'y>(&self, y: &'y Mat<f64>) -> Cow<'y, Mat<f64>> {
         match &self.coupling {
             Some(own) => Cow::Owned(own.elimination.expand(y.as_ref())),
@@ -94,10 +95,11 @@ impl<'m> CoupledModel<'m> {
         }
     }
 
-    /// The rigid modes in the degrees of freedom that are left (m x 6, in the plane m x 3), orthonormal in T'MT.
+    /// Returns the rigid modes in the remaining degrees of freedom (m x 6, in the plane m x 3), orthonormal
+    /// in T'MT.
     ///
     /// # Errors
-    /// Every error of [`rigid_modes`].
+    /// The errors of [`rigid_modes`].
     pub fn rigid_modes(&self) -> Result<Mat<f64>> {
         let rigid = rigid_modes(self.model, &self.model.pencil())?;
         Ok(match &self.coupling {
@@ -106,8 +108,9 @@ impl<'m> CoupledModel<'m> {
         })
     }
 
-    /// Replaces the forces f at the nodes of each rigid interface by those of their resultant, A R'f with the rigid
-    /// motions R of the interface and their averages A: what the interface carries in itself moves nothing.
+    /// Replaces the forces f at the nodes of each rigid interface by forces with equal resultants, A R'f
+    /// with the rigid motions R of the interface and their averages A. Self-equilibrated forces on a rigid
+    /// interface cause no motion.
     pub fn without_inner_forces(&self, forces: &mut Mat<f64>) {
         for joint in self.coupling.iter().flat_map(|own| &own.joints) {
             let resultant = gram(joint.motion(), joint.gather(forces.as_ref()).as_ref());
@@ -118,7 +121,7 @@ impl<'m> CoupledModel<'m> {
         }
     }
 
-    /// The eigenproblem for responses; nothing is searched in it, so no estimate of an eigenvalue is needed.
+    /// Returns the eigenproblem for response computations; there is no search and no first estimate.
     pub(super) fn problem<'a>(&'a self, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
         let whole = problem_of_span(self.model, rigid);
         match &self.coupling {
@@ -128,8 +131,8 @@ impl<'m> CoupledModel<'m> {
     }
 }
 
-/// Difference of an interface's motion in the modes from the rigid motion that fits it best, displacements and
-/// rotations each relative to the largest of any node in any mode.
+/// Returns the difference of the motion of an interface in the modes from the best-fitting rigid motion.
+/// Displacements and rotations are each relative to the largest of any node in any mode.
 fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f64>) -> f64 {
     let own = joint.gather(vectors);
     let left = &own - combine(joint.motion(), gram(joint.measure(), own.as_ref()).as_ref());
@@ -146,11 +149,12 @@ fn deformation(model: &FeModel, joint: &CoupledInterface, vectors: MatRef<'_, f6
     larger(part(0..displaced, 0..all), part(displaced..own.nrows(), rotations))
 }
 
-/// u = R q of a rigid interface solved for its other rows: as many rows as it has rigid motions determine them, chosen
-/// by complete pivoting (three nodes that lie far apart, one of them held in all directions).
+/// Solves u = R q of a rigid interface for its dependent rows. As many rows as there are rigid motions
+/// determine the others; complete pivoting chooses them (three nodes far apart, one of them held in all
+/// directions).
 fn rigid_rows(joint: &CoupledInterface) -> Dependents {
     let Echelon { pivots, others, weights } = Echelon::new(joint.balanced().transpose().to_owned());
-    // From displacements and turns of one size to those in the units of the model.
+    // Convert from scaled displacements and rotations to the units of the model.
     let size = |row: usize| if row < joint.displaced_rows() { 1.0 } else { joint.length() };
     let weight = |i: usize, j: usize| weights[(j, i)] * size(pivots[j]) / size(others[i]);
     Dependents {

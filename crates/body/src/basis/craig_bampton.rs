@@ -1,11 +1,11 @@
 //! Craig-Bampton basis: modes with the interfaces held, and static shapes for unit motions of the interfaces
 //! (Craig and Bampton, AIAA J. 6 (1968) 1313; theory section 5), turned into pseudo-free-surface modes.
 //!
-//! All couplings are one transformation, u = D q + T y: D q moves the nodes of the interfaces as a rigid body
-//! with the interface coordinates q, and T y leaves q zero. A node of a rigid or free interface has no y; of
-//! an averaging one all but as many degrees of freedom as it has coordinates are free, and the mean
-//! determines these. The fixed-interface problem is then the pencil (T'KT, T'MT): the search, its proof of
-//! completeness and its residuals are those of any other.
+//! All couplings become one transformation, u = D q + T y: D q moves the nodes of the interfaces as rigid
+//! bodies with the interface coordinates q, and T y leaves q zero. A node of a rigid or free interface has
+//! no y. At an averaging interface all degrees of freedom are free except as many as it has coordinates,
+//! which the mean determines. The fixed-interface problem is the pencil (T'KT, T'MT), solved with the
+//! search, proof of completeness and residuals of any other eigenproblem.
 
 use super::failure::explain;
 use super::free_estimate::{FreeEstimate, MissingResponses, free_estimate};
@@ -31,13 +31,14 @@ use flexbody_linalg::{
 };
 use flexbody_model::{Coupling, FeModel, rigid_count};
 
-/// Part of the M-norm of a shape that must be left beside those before it.
+/// Smallest relative M-norm that a shape must keep after projection against the shapes before it. Shapes
+/// below this limit are removed as dependent.
 const LEFT: f64 = 1e-8;
 
-/// Copies of the shapes that are held at the same time while they are made independent (measured: 18).
+/// Number of copies of the shapes held at once while they are made independent (measured: 18).
 const COPIES: u64 = 20;
 
-/// Modes with all interfaces held, constraint modes of all interfaces.
+/// Craig-Bampton basis: modes with all interfaces held, and constraint modes of all interfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CraigBampton;
 
@@ -51,11 +52,13 @@ impl Basis for CraigBampton {
         check_possible(model, settings, context)?;
         let joints = coupled_interfaces(model, "interface coordinates")?;
         check_prescribable(model, &joints)?;
+        // Fixed-interface modes and constraint modes.
         let parts = Parts::new(model, &joints, settings, context)?;
         let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref());
         context.phase("pseudo-free-surface modes");
         let failed = |failure| explain(model, failure);
+        // Remove rigid motion and dependent shapes.
         let shapes = side_by_side(&[parts.fixed_shapes().as_ref(), parts.constraint.as_ref()]);
         let found = independent(&problem.pencil, rigid.as_ref(), shapes, LEFT)
             .ok_or_else(|| failed(EigenFailure::MassIndefinite))?;
@@ -64,6 +67,7 @@ impl Basis for CraigBampton {
         if found.kept.is_empty() {
             return Err(nothing_deforms().into());
         }
+        // Solve the small eigenproblem in the span.
         let all = ModeSettings { wanted: Wanted::Lowest(usize::MAX), accuracy: Accuracy::Fast, ..*settings };
         let whole = parts.lacks_rigid_motion_only(&found, rigid_count(model.dimension()));
         let span = found.vectors;
@@ -73,6 +77,7 @@ impl Basis for CraigBampton {
         let coordinates = parts.coordinates(&problem, solution.vectors.as_ref(), model.dimension());
         let fixed_interface = parts.fixed_interface(rigid.as_ref(), &solution, whole);
         solution.completeness = parts.completeness(model, &solution);
+        // Memory of the dense shapes counts if it exceeds that of the search.
         let bytes = shape_bytes(problem.pencil.n(), found.kept.len());
         solution.plan = parts.fixed.plan.map(|plan| plan.with_bytes(|search| search.max(bytes)));
         let mut basis = ModalBasis::new(model, &problem, settings, solution, "")?;
@@ -84,8 +89,8 @@ impl Basis for CraigBampton {
     }
 }
 
-/// Refuses what the basis cannot promise, and what does not fit the memory, before anything of that size is
-/// made.
+/// Returns an error if the basis cannot fulfil the settings or does not fit the memory, before large arrays
+/// are made.
 fn check_possible(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<()> {
     if settings.accuracy == Accuracy::Certified {
         let message = "modes of a Craig-Bampton basis are no eigenvectors and cannot be certified";
@@ -116,10 +121,10 @@ struct Parts<'a> {
     reduced: ReducedPencil,
     /// Fixed-interface modes y = Phi, (T'MT)-orthonormal.
     fixed: EigenSolution,
-    /// D + T Y (N x c): the body for unit interface coordinates, nothing loaded but the interfaces, (T'KT) Y
-    /// = -T'K D.
+    /// Constraint modes D + T Y (N x c): response to unit interface coordinates with no loads except at the
+    /// interfaces, (T'KT) Y = -T'K D.
     constraint: Mat<f64>,
-    /// What the basis lacks of the responses to the inertia of the constraint modes.
+    /// Part of the responses to the inertia of the constraint modes outside the basis.
     lacking: MissingResponses,
 }
 
@@ -146,8 +151,8 @@ impl<'a> Parts<'a> {
         let moved = unit_motions(pencil.n(), joints);
         let reduced = elimination.reduced(&pencil);
         let held = reduced.pencil();
-        // No rigid motion is left, so the shift of the search may be far from the first eigenvalue: that of
-        // the free body will do.
+        // No rigid motion is left, so the search shift may be far from the first eigenvalue: use the
+        // estimate of the free body.
         let rigid = rigid_modes(model, &pencil)?;
         let first_estimate = polynomial_estimate(model, &pencil, rigid.as_ref());
         let none = Mat::zeros(held.n(), 0);
@@ -187,7 +192,7 @@ impl<'a> Parts<'a> {
         self.elimination.expand(self.fixed.vectors.as_ref())
     }
 
-    /// Kind and name of a shape: fixed-interface modes come first.
+    /// Returns kind and name of a shape; fixed-interface modes come first.
     fn name(&self, shape: usize) -> (&'static str, String) {
         match shape.checked_sub(self.fixed.eigenvalues.len()) {
             None => ("fixed-interface mode", format!("number {}", shape + 1)),
@@ -195,7 +200,7 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// Shapes that add nothing, ascending.
+    /// Returns the indices of removed shapes, ascending.
     fn removed_shapes(found: &Independent) -> Vec<usize> {
         let removed = found.rigid.iter().chain(found.dependent.iter().map(|(j, _)| j));
         let mut removed: Vec<usize> = removed.chain(&found.massless).copied().collect();
@@ -203,15 +208,15 @@ impl<'a> Parts<'a> {
         removed
     }
 
-    /// Whether the shapes that add nothing are constraint modes, as many as there are rigid motions, which
-    /// the constraint modes hold.
+    /// Returns true if the removed shapes are constraint modes and as many as the rigid motions, which the
+    /// constraint modes contain.
     fn lacks_rigid_motion_only(&self, found: &Independent, rigid: usize) -> bool {
         let removed = Self::removed_shapes(found);
         removed.len() == rigid && removed[0] >= self.fixed.eigenvalues.len()
     }
 
-    /// The shape with the largest share in each mode; `parted` are the products of the shapes `kept` with the
-    /// modes.
+    /// Returns the shape with the largest share in each mode. `parted` holds the products of the shapes
+    /// `kept` with the modes.
     fn provenance(&self, kept: &[usize], parted: MatRef<'_, f64>) -> Vec<String> {
         let told = |(j, share): (usize, f64)| {
             let (kind, name) = self.name(kept[j]);
@@ -220,7 +225,7 @@ impl<'a> Parts<'a> {
         largest_shares(parted).into_iter().map(told).collect()
     }
 
-    /// What became of shapes that add nothing.
+    /// Returns the diagnostics about removed shapes.
     fn removed(&self, found: &Independent, rigid: usize) -> Vec<Diagnostic> {
         let removed = Self::removed_shapes(found);
         let all = found.kept.len() + removed.len();
@@ -244,8 +249,8 @@ impl<'a> Parts<'a> {
         vec![note]
     }
 
-    /// What the basis is made of; `whole`: it spans all motions of the interfaces, without which there are no
-    /// lower bounds. `None` where the estimates leave the range of numbers.
+    /// Returns the composition of the basis. `whole`: the basis spans all motions of the interfaces, a
+    /// condition for lower bounds. Returns `None` if the estimates leave the range of numbers.
     fn fixed_interface(
         &self,
         rigid: MatRef<'_, f64>,
@@ -255,7 +260,7 @@ impl<'a> Parts<'a> {
         let Completeness { proof, shift, negative_pivots, .. } = self.fixed.completeness;
         let modes = self.fixed.eigenvalues.len();
         let counted = negative_pivots.filter(|_| proof == Proof::InertiaCount);
-        // A mode that is left out although it is below the shift is known by its eigenvalue.
+        // A mode below the shift that is left out is known by its eigenvalue.
         let next = self.fixed.next_eigenvalue.filter(|_| counted.is_some_and(|counted| counted > modes));
         let cut = counted.and(next.map(|next| next * (1.0 - KNOWN)).or(Some(shift)));
         let (of_rigid, of_modes) =
@@ -279,7 +284,7 @@ impl<'a> Parts<'a> {
         })
     }
 
-    /// What the user should know of the fixed-interface modes.
+    /// Returns the diagnostics about the fixed-interface modes.
     fn notes(&self, model: &FeModel, settings: &ModeSettings) -> Vec<Diagnostic> {
         let given = self.fixed.eigenvalues.len();
         let mut notes: Vec<Diagnostic> = single_precision_note(&self.fixed, settings).into_iter().collect();
@@ -314,8 +319,8 @@ impl<'a> Parts<'a> {
         notes
     }
 
-    /// The modes of the span are no eigenvectors of the free body; what is proved is proved of the
-    /// fixed-interface modes.
+    /// Returns the completeness of the modes of the span, which are no eigenvectors of the free body: the
+    /// proof covers the fixed-interface modes.
     fn completeness(&self, model: &FeModel, solution: &EigenSolution) -> Completeness {
         let (fixed, held) = (self.fixed.eigenvalues.len(), &self.fixed.completeness);
         let hertz = model.units().frequency_of(held.shift);
@@ -343,8 +348,8 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// K and M in the coordinates of the interfaces and of the fixed-interface modes, and what the modes are
-    /// in them.
+    /// Returns K and M in the coordinates of the interfaces and of the fixed-interface modes, and the modes
+    /// in these coordinates.
     fn coordinates(
         &self,
         problem: &EigenProblem<'_>,
@@ -353,7 +358,8 @@ impl<'a> Parts<'a> {
     ) -> CoordinatesInModelAxes {
         let (pencil, rigid) = (&problem.pencil, problem.rigid);
         let (c, lambda) = (self.constraint.ncols(), &self.fixed.eigenvalues);
-        // K annihilates rigid motion: without it the energies keep their digits, and R'K R = 0 to the last.
+        // K annihilates rigid motion: subtracting it keeps the digits of the energies and makes R'K R = 0
+        // exactly.
         let mut deformed = self.constraint.clone();
         for _ in 0..2 {
             let along = gram(rigid, pencil.apply_mass(deformed.as_ref()).as_ref());
@@ -388,12 +394,12 @@ impl<'a> Parts<'a> {
         CoordinatesInModelAxes { coordinates, vectors: self.vectors(dimension) }
     }
 
-    /// First coordinates of the vectors among them, each of `d` components: displacements, and rotations in
-    /// space.
+    /// Returns the first coordinate of every vector among the coordinates: displacements, and rotations in
+    /// space, each with `d` components.
     fn vectors(&self, d: usize) -> Vec<usize> {
         let starts_of_vectors = |(joint, first): (&CoupledInterface, usize)| {
             let (moving, all) = (joint.displacements, joint.coordinates.len());
-            // In the plane a rotation is a number.
+            // In the plane a rotation is a scalar.
             let turning = if d == 3 { (all - moving) / 3 } else { 0 };
             (0..moving / d + turning).map(move |i| first + d * i)
         };
@@ -401,11 +407,12 @@ impl<'a> Parts<'a> {
     }
 }
 
-/// Relative error of a fixed-interface eigenvalue that was computed, far above what the residuals leave.
+/// Bound of the relative error of a computed fixed-interface eigenvalue, far above the effect of its
+/// residual.
 const KNOWN: f64 = 1e-8;
 
-/// The fixed-interface modes that are wanted. Where none are (static condensation) the first is computed
-/// nevertheless: it says how far the basis goes.
+/// Computes the wanted fixed-interface modes. If none are wanted (static condensation), the first is
+/// computed nevertheless, since its eigenvalue limits the frequency range of the basis.
 fn fixed_modes(
     problem: &EigenProblem<'_>,
     settings: &ModeSettings,
@@ -426,8 +433,8 @@ fn fixed_modes(
     })
 }
 
-/// G and H of the responses y to the inertia of the constraint modes, without their part along the
-/// fixed-interface modes.
+/// Returns G and H of the responses y to the inertia of the constraint modes, after removal of the part
+/// along the fixed-interface modes.
 fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolution) -> MissingResponses {
     let pencil = &problem.pencil;
     let whole = column_products(response.as_ref(), pencil.apply_stiffness(response.as_ref()).as_ref());
@@ -446,9 +453,9 @@ fn lacking(problem: &EigenProblem<'_>, mut response: Mat<f64>, fixed: &EigenSolu
     }
 }
 
-/// Makes the rigid motions R (N x r) in the constraint modes Psi exactly those of the nodes, Psi <- Psi +
-/// (R - Psi Q) Q^+ with their coordinates Q = C'R: K annihilates them only as well as its digits allow, and
-/// a slender body magnifies that. The coordinates of the shapes stay what they are.
+/// Makes the rigid motions R (N x r) in the constraint modes Psi exact: Psi <- Psi + (R - Psi Q) Q^+ with
+/// their coordinates Q = C'R. K annihilates rigid motions only to its digits, and a slender body magnifies
+/// that error. The coordinates of the shapes do not change.
 fn restore_rigid_motion(
     joints: &[CoupledInterface],
     rigid: MatRef<'_, f64>,
@@ -456,7 +463,7 @@ fn restore_rigid_motion(
 ) -> Option<()> {
     let q = coordinates_of(joints, rigid);
     let scale: Vec<f64> = (0..q.nrows()).map(|i| q.row(i).norm_l2()).collect();
-    // Coordinates of one size: rotations are in other units than displacements.
+    // Scale the coordinates to one size: rotations and displacements have different units.
     let weighted =
         Mat::from_fn(
             q.nrows(),
@@ -477,7 +484,7 @@ fn restore_rigid_motion(
     Some(())
 }
 
-/// C'u: the interface coordinates of displacements (N x k).
+/// Returns C'u, the interface coordinates of displacements (N x k).
 fn coordinates_of(joints: &[CoupledInterface], u: MatRef<'_, f64>) -> Mat<f64> {
     let blocks = joints.iter().map(|joint| gram(joint.measure(), joint.gather(u).as_ref()));
     let blocks: Vec<Mat<f64>> = blocks.collect();
@@ -485,7 +492,7 @@ fn coordinates_of(joints: &[CoupledInterface], u: MatRef<'_, f64>) -> Mat<f64> {
     Mat::from_fn(rows.len(), u.ncols(), |i, j| rows[i][j])
 }
 
-/// The joints, each with its first coordinate.
+/// Returns the joints, each with the index of its first coordinate.
 fn starts(joints: &[CoupledInterface]) -> impl Iterator<Item = (&CoupledInterface, usize)> {
     joints.iter().scan(0, |next, joint| {
         let first = *next;
@@ -494,7 +501,7 @@ fn starts(joints: &[CoupledInterface]) -> impl Iterator<Item = (&CoupledInterfac
     })
 }
 
-/// A failure of the fixed-interface problem with its vectors in the rows of the model.
+/// Returns a failure of the fixed-interface problem with its vectors expanded to the rows of the model.
 fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
     match failure {
         EigenFailure::NegativeEigenvalue { eigenvalue, vector } => {
@@ -511,7 +518,7 @@ fn expanded(failure: EigenFailure, elimination: &Elimination) -> EigenFailure {
     }
 }
 
-/// Bytes for so many shapes of n rows.
+/// Returns the bytes needed for `count` shapes of n rows.
 fn shape_bytes(n: usize, count: usize) -> u64 {
     8 * COPIES * (n as u64) * (count as u64)
 }

@@ -6,16 +6,16 @@ use super::modal_basis::{Basis, ModalBasis, Task};
 use super::{BasisKind, Loads};
 use flexbody_base::error::Result;
 
-/// Free-surface modes and inertia-relief attachment modes: the part that the modes lack of the static
+/// Free-surface modes and inertia-relief attachment modes: the part outside the modes of the static
 /// responses of the free body to unit loads at its interfaces.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CraigChang {
-    /// Further loads whose static responses join the modes.
+    /// Further loads whose static responses are added to the modes.
     pub residual_vectors: Vec<Loads>,
 }
 
 impl CraigChang {
-    /// All loads.
+    /// Returns all loads.
     fn loads(&self) -> Vec<Loads> {
         let others = self.residual_vectors.iter().filter(|loads| **loads != Loads::Interfaces);
         std::iter::once(Loads::Interfaces).chain(others.cloned()).collect()

@@ -1,11 +1,11 @@
-//! Linear conditions solved for some of their unknowns.
+//! Solution of linear conditions for some of their unknowns.
 
 use faer::Mat;
 
-/// The reduced echelon form \[1, W\] of a matrix A (r x n) with its columns in another order: of the rank of A, with
-/// pivots that are the largest entries left.
+/// Reduced echelon form \[1, W\] of a matrix A (r x n) with reordered columns. Its number of rows is the
+/// rank of A; the pivots are found by complete pivoting.
 pub(super) struct Echelon {
-    /// Columns of A of the unit matrix, and all others.
+    /// Columns of A that form the unit matrix, and all others.
     pub pivots: Vec<usize>,
     pub others: Vec<usize>,
     /// W (rank x others).
@@ -13,15 +13,16 @@ pub(super) struct Echelon {
 }
 
 impl Echelon {
-    /// Pivots below this part of the first one are rounding.
+    /// Pivots below this part of the first pivot count as rounding.
     const ROUNDING: f64 = 1e-9;
 
-    /// The form of `a`.
+    /// Computes the echelon form of `a`.
     pub(super) fn new(mut a: Mat<f64>) -> Self {
         let (r, columns) = (a.nrows(), a.ncols());
         let mut pivots: Vec<usize> = Vec::new();
         let mut first = 0.0;
         for step in 0..r.min(columns) {
+            // Largest entry among the remaining rows and columns.
             let places = (step..r).flat_map(|i| (0..columns).map(move |j| (i, j)));
             let open = places.filter(|(_, j)| !pivots.contains(j));
             let Some((i, j)) = open.max_by(|&p, &q| a[p].abs().total_cmp(&a[q].abs())) else { break };
@@ -31,6 +32,7 @@ impl Echelon {
             if a[(i, j)].abs() <= Self::ROUNDING * first {
                 break;
             }
+            // Exchange rows, scale the pivot row, and eliminate its column in all other rows.
             for column in 0..columns {
                 let (upper, lower) = (a[(step, column)], a[(i, column)]);
                 (a[(step, column)], a[(i, column)]) = (lower, upper);
@@ -43,6 +45,7 @@ impl Echelon {
             }
             pivots.push(j);
         }
+        // The remaining columns are W.
         let others: Vec<usize> = (0..columns).filter(|j| !pivots.contains(j)).collect();
         let weights = Mat::from_fn(pivots.len(), others.len(), |i, j| a[(i, others[j])]);
         Self { pivots, others, weights }

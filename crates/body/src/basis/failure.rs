@@ -1,4 +1,4 @@
-//! Failures of the eigen-solver as messages that name nodes.
+//! Conversion of failures of the eigen-solver to messages that name nodes.
 
 use super::modal_basis::input_error;
 use faer::Mat;
@@ -8,8 +8,9 @@ use flexbody_eigen::{EigenFailure, Unresisted, unresisted_motions};
 use flexbody_linalg::largest;
 use flexbody_model::{FeModel, rigid_count};
 
-/// A failure that a single-precision factor may have caused by itself: nothing is known about the model then.
-/// Energies are another matter: they come from K in double precision.
+/// Returns a diagnostic for a failure that a single-precision factor may have caused itself, so that it
+/// says nothing about the model. Failures about energies are excluded: energies come from K in double
+/// precision.
 fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
     let (code, why) = match failure {
         EigenFailure::NotConverged { converged, wanted } => {
@@ -30,7 +31,7 @@ fn too_poor(failure: &EigenFailure) -> Option<Diagnostic> {
     )
 }
 
-/// Turns a failure of the eigen-solver into a diagnostic that names nodes.
+/// Converts a failure of the eigen-solver to a diagnostic that names nodes.
 pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
     let diagnostic = match failure {
         EigenFailure::SinglePrecision(failure) => match too_poor(&failure) {
@@ -50,7 +51,7 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
         EigenFailure::MassIndefinite => {
             Diagnostic::new(Code::MassIndefinite, "mass matrix has negative eigenvalues beyond rounding")
         }
-        // Their eigenvalues are rounding: no two machines would print the same.
+        // The eigenvalues are rounding and would differ between machines: do not print them.
         EigenFailure::ZeroEnergy { count, vectors, .. } => mechanism(model, count, &vectors),
         EigenFailure::CountDiffers { found, counted, shift } => Diagnostic::new(
             Code::CompletenessFailed,
@@ -73,7 +74,7 @@ pub(super) fn explain(model: &FeModel, failure: EigenFailure) -> Error {
     diagnostic.into()
 }
 
-/// Why K + tau M cannot be factored: motions without any energy, or an indefinite matrix.
+/// Returns the reason why K + tau M cannot be factored: motions without energy, or an indefinite matrix.
 fn not_positive_definite(model: &FeModel, shift: f64) -> Diagnostic {
     let Some(Unresisted { count, vectors }) = unresisted_motions(&model.pencil(), shift, input_error(model))
     else {
@@ -90,7 +91,7 @@ fn not_positive_definite(model: &FeModel, shift: f64) -> Diagnostic {
     )
 }
 
-/// Numbers of the nodes that the columns of `vectors` move most.
+/// Returns the numbers of the nodes that the columns of `vectors` move most.
 fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
     let d = model.dimension();
     let square = |i: usize| {
@@ -100,7 +101,7 @@ fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
             .sum::<f64>()
     };
     let squares: Vec<f64> = (0..model.nodes().len()).map(square).collect();
-    // Nodes that move alike but for rounding are named in their order.
+    // Nodes with equal motion up to rounding are named in their order.
     let millionth = 1e-6 * largest(squares.iter().copied());
     let mut moved: Vec<(usize, f64)> =
         squares.iter().map(|square| (square / millionth).round()).enumerate().collect();
@@ -109,7 +110,7 @@ fn most_moved(model: &FeModel, vectors: &Mat<f64>) -> String {
     named.join(", ")
 }
 
-/// As many rigid motions as several bodies have, or a part that is free to move.
+/// Returns the error for zero-energy modes: several separate bodies, or a part that is free to move.
 fn mechanism(model: &FeModel, count: usize, vectors: &Mat<f64>) -> Diagnostic {
     let rigid = rigid_count(model.dimension());
     let (all, moved) = (count + rigid, most_moved(model, vectors));

@@ -1,31 +1,32 @@
-//! How near the frequencies of a Craig-Bampton body are to those of the free body (theory section 5).
+//! Distance of the frequencies of a Craig-Bampton body from those of the free body (theory section 5).
 //!
-//! The constraint modes and the fixed-interface modes that were kept span V, those that were left out span W.
-//! K couples neither with the other, M does: b = T'M Psi, without its part along the modes that were kept.
-//! The corrections y = (T'KT)^-1 b lie in W and give the coupling G = y'K y = b'y and the mass H = y'M y.
-//! With the cut mu, a lower bound of every eigenvalue of W, the eigenvalues below mu obey by Sylvester's law
+//! The constraint modes and the kept fixed-interface modes span V, the truncated fixed-interface modes span
+//! W. K does not couple V and W, M does: b = T'M Psi, without its part along the kept modes. The
+//! corrections y = (T'KT)^-1 b lie in W and give the coupling G = y'K y = b'y and the mass H = y'M y. With
+//! the cut mu, a lower bound of every eigenvalue of W, the eigenvalues below mu obey by Sylvester's law
 //!
 //! eigenvalues of (K_V, M_V + c G) <= lambda_j <= eigenvalues of (\[K_V, 0; 0, G\], \[M_V, G; G, H\]), c =
 //! theta_j mu / (mu - theta_j),
 //!
-//! where theta_j >= lambda_j are those of the reduced body. The right side adds the corrections to V and is
-//! the estimate: on the bracket of the fixtures it finds 99.7 % of theta_j - lambda_j or more where theta_j <
-//! mu / 4, and 94 % below mu.
+//! where theta_j >= lambda_j are the eigenvalues of the reduced body. The right side adds the corrections
+//! to V and is the estimate: on the bracket of the fixtures it finds 99.7 % of theta_j - lambda_j or more
+//! for theta_j < mu / 4, and 94 % below mu.
 
 use faer::{Mat, MatRef};
 use flexbody_linalg::{combine, gram, symmetric_eigen};
 use nalgebra::DMatrix;
 
-/// Part of the energy of the whole responses below which what the basis lacks of them is rounding.
+/// Relative energy below which a response outside the basis is rounding.
 const COUPLED: f64 = 1e-14;
 
-/// Dense eigenproblems that are solved for the lower bounds at the most: modes share them beyond.
+/// Largest number of dense eigenproblems solved for the lower bounds; with more modes, several modes share
+/// one problem.
 const PROBLEMS: usize = 64;
 
-/// What the basis lacks of the static responses to the inertia of the interface motions (c of them).
+/// Static responses to the inertia of the interface motions (c of them), without their part in the basis.
 #[derive(Debug, Clone)]
 pub(super) struct MissingResponses {
-    /// Energies y'K y of the whole responses, before what the basis has of them was taken out (c).
+    /// Energies y'K y of the whole responses, before their part in the basis was removed (c).
     pub whole: Vec<f64>,
     /// G = y'K y (c x c).
     pub stiffness: Mat<f64>,
@@ -33,21 +34,21 @@ pub(super) struct MissingResponses {
     pub mass: Mat<f64>,
 }
 
-/// Eigenvalues of the free body as far as a Craig-Bampton basis tells them.
+/// Estimates and bounds of the eigenvalues of the free body from a Craig-Bampton basis.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct FreeEstimate {
-    /// Estimates, which are upper bounds (nf).
+    /// Estimates, each an upper bound (nf).
     pub estimate: Vec<f64>,
-    /// Lower bounds (nf), to rounding; 0 where there is none: above the cut, or without a proof of what is
-    /// left out.
+    /// Lower bounds (nf), up to rounding; 0 above the cut, or if the truncated modes have no proved lower
+    /// bound.
     pub lower: Vec<f64>,
 }
 
-/// Estimates and bounds for the eigenvalues `theta` (nf, ascending) of a reduced body, whose modes have the
-/// interface coordinates `q` (c x nf), and the M-orthonormal rigid motions `rigid` (c x r). `cut` is a lower
-/// bound of the eigenvalues of the fixed-interface modes that were left out.
+/// Computes estimates and bounds for the eigenvalues `theta` (nf, ascending) of a reduced body whose modes
+/// have the interface coordinates `q` (c x nf), and the M-orthonormal rigid motions the coordinates `rigid`
+/// (c x r). `cut` is a lower bound of the eigenvalues of the truncated fixed-interface modes.
 ///
-/// `None` when a number is not finite.
+/// Returns `None` if a number is not finite.
 pub(super) fn free_estimate(
     theta: &[f64],
     rigid: MatRef<'_, f64>,
@@ -61,14 +62,14 @@ pub(super) fn free_estimate(
     let blocks = [coupling(rigid, rigid), coupling(rigid, q), coupling(q, q)];
     let mut lower = vec![0.0; theta.len()];
     if let Some(cut) = cut {
-        // Ten parts in a million of distance: nearer to the cut nothing is known.
+        // Relative distance 1e-5 from the cut: closer to the cut the bound has no meaning.
         let below = theta.partition_point(|t| *t < cut * (1.0 - 1e-5));
         for chunk in (0..below).collect::<Vec<_>>().chunks(below.div_ceil(PROBLEMS).max(1)) {
             let highest = theta[chunk[chunk.len() - 1]];
             let bounds = weighed_down(theta, &blocks, highest * cut / (cut - highest))?;
             for &j in chunk {
                 lower[j] = bounds[j].min(theta[j]);
-                // Where the basis lacks next to nothing they differ by rounding.
+                // If the basis is nearly complete, both differ by rounding.
                 estimate[j] = estimate[j].max(lower[j]);
             }
         }
@@ -76,7 +77,8 @@ pub(super) fn free_estimate(
     Some(FreeEstimate { estimate, lower })
 }
 
-/// Rayleigh-Ritz with the corrections: the right side above, without the rigid motions, which stay at zero.
+/// Returns the Rayleigh-Ritz values with the corrections: the right side of the module documentation
+/// without the rigid motions, whose eigenvalues stay zero.
 fn corrected(
     theta: &[f64],
     rigid: MatRef<'_, f64>,
@@ -84,7 +86,7 @@ fn corrected(
     lacking: &MissingResponses,
 ) -> Option<Vec<f64>> {
     let (nf, c) = (theta.len(), lacking.stiffness.nrows());
-    // Responses of one size, then corrections K-orthonormal.
+    // Scale the responses to one size, then make the corrections K-orthonormal.
     let size: Vec<f64> = lacking.whole.iter().map(|energy| energy.max(0.0).sqrt()).collect();
     let unit = |i: usize| if size[i] > 0.0 { 1.0 / size[i] } else { 0.0 };
     let scaled = Mat::from_fn(c, c, |i, j| unit(i) * lacking.stiffness[(i, j)] * unit(j));
@@ -111,8 +113,8 @@ fn corrected(
     Some((0..nf).map(|j| (1.0 / flexibility.values[nf + k - 1 - j]).min(theta[j])).collect())
 }
 
-/// Eigenvalues of (diag(0, theta), I + c G) but the zero ones, for the blocks rigid-rigid, rigid-modes,
-/// modes-modes of G.
+/// Returns the nonzero eigenvalues of (diag(0, theta), I + c G), with G given by its blocks rigid-rigid,
+/// rigid-modes and modes-modes.
 fn weighed_down(theta: &[f64], blocks: &[Mat<f64>; 3], c: f64) -> Option<Vec<f64>> {
     let [rigid, mixed, modes] = blocks;
     let (r, nf) = (rigid.nrows(), theta.len());
@@ -132,12 +134,12 @@ fn weighed_down(theta: &[f64], blocks: &[Mat<f64>; 3], c: f64) -> Option<Vec<f64
 mod tests {
     use super::*;
 
-    /// Masses m, n, m joined by springs k, held at the first: the interface motion is rigid, the
+    /// Masses m, n, m joined by springs k, held at the first: the interface motion is rigid, and the
     /// fixed-interface modes are those of two masses.
     #[test]
     fn the_estimate_of_a_chain_is_exact_where_one_mode_is_left_out_and_the_bound_encloses() {
-        // Free: masses 1, 2, 1, springs 1, 1: lambda = 1, 2. V: rigid motion, first fixed mode; W: the
-        // second.
+        // Free: masses 1, 2, 1, springs 1, 1: lambda = 1, 2. V: rigid motion and first fixed mode; W:
+        // second fixed mode.
         let a = (4.0f64 - 2.0 * 2.0f64.sqrt()) / 4.0;
         let fixed = |lambda: f64| {
             // Masses 2 and 1, springs 1 (to the wall), 1: (2 - 2 lambda) x = y with x = 1.
@@ -155,7 +157,7 @@ mod tests {
         // The interface (first mass) moves by 1/2 in the rigid mode, and by -s/2 / norm in psi.
         let rigid = Mat::from_fn(1, 1, |_, _| 0.5);
         let q = Mat::from_fn(1, 1, |_, _| -0.5 * s / norm);
-        // b of the unit interface motion (1, 1, 1) along the mode that is left out.
+        // b of the unit interface motion (1, 1, 1) along the truncated mode.
         let coupled = 2.0 * left[0] + left[1];
         let lacking = MissingResponses {
             whole: vec![coupled * coupled / b],
@@ -167,7 +169,7 @@ mod tests {
         assert!(theta > 1.0 && found.lower[0] <= 1.0 && found.lower[0] > 0.9, "{found:?}, theta {theta}");
         let unknown = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &lacking, None).expect("finite");
         assert_eq!(unknown.lower, [0.0]);
-        // Rounding of a response that the basis has is no correction.
+        // A response inside the basis leaves rounding, which is no correction.
         let noise = |size: f64| Mat::from_fn(1, 1, |_, _| 1e-30 * size);
         let nothing = MissingResponses { whole: vec![1.0], stiffness: noise(1.0), mass: noise(1.0 / a) };
         let found = free_estimate(&[theta], rigid.as_ref(), q.as_ref(), &nothing, Some(b)).expect("finite");

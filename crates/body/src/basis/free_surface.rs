@@ -16,14 +16,14 @@ use flexbody_linalg::{Pencil, Tall, combine, contiguous_mut, gram, subtract_comb
 use flexbody_model::{FeModel, centre_and_length};
 use rayon::prelude::*;
 
-/// Columns that are multiplied by K or M at a time where only products with others are wanted: as many as the
-/// product itself takes.
+/// Number of columns multiplied by K or M at a time if only products with other columns are needed; equals
+/// the width of one product.
 const PANEL: usize = 8;
 
-/// The lowest free-surface modes.
+/// Basis of the lowest free-surface modes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FreeSurface {
-    /// Loads whose static responses join the modes.
+    /// Loads whose responses are added to the modes as residual vectors.
     pub residual_vectors: Vec<Loads>,
 }
 
@@ -43,7 +43,8 @@ impl Basis for FreeSurface {
     }
 }
 
-/// Free-surface modes and the static responses to `loads`, each called `what` where modes are named after it.
+/// Computes free-surface modes and adds the responses to `loads`; `what` is their name in the origin of
+/// modes.
 pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> Result<ModalBasis> {
     let Task { model, settings, context } = *task;
     let rigid = rigid_modes(model, &model.pencil())?;
@@ -56,7 +57,8 @@ pub(super) fn free_modes_with(loads: &[Loads], what: &str, task: &Task<'_>) -> R
 /// Computes the free-surface modes of `model`.
 ///
 /// # Errors
-/// Mechanisms, indefinite matrices, no convergence, a count that contradicts the modes: exit code 3.
+/// Mechanisms, indefinite matrices, no convergence, or an inertia count that contradicts the modes: exit
+/// code 3.
 pub fn free_surface(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<ModalBasis> {
     let pencil = model.pencil();
     let rigid = rigid_modes(model, &pencil)?;
@@ -75,7 +77,7 @@ pub fn free_surface(model: &FeModel, settings: &ModeSettings, context: &Context<
     Ok(basis)
 }
 
-/// What the user should know about the precision of the factor.
+/// Returns a diagnostic about the precision of the factor, or about the search without a factor.
 pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSettings) -> Option<Diagnostic> {
     let plan = solution.plan.as_ref().filter(|_| settings.factor == FactorChoice::Auto)?;
     let message = match plan.current().way {
@@ -96,7 +98,7 @@ pub(super) fn single_precision_note(solution: &EigenSolution, settings: &ModeSet
     Some(Diagnostic::new(Code::FactorPrecision, message))
 }
 
-/// Notes about how many modes there are and how they end.
+/// Adds diagnostics about the number of modes and the end of the spectrum.
 fn describe(
     solution: &EigenSolution,
     settings: &ModeSettings,
@@ -104,7 +106,7 @@ fn describe(
     notes: &mut Vec<Diagnostic>,
 ) {
     let given = solution.eigenvalues.len();
-    // Known from the rank of M, or because all there are were found.
+    // Known from the rank of M, or because all modes were found.
     let mut finite = solution.finite_modes;
     if let Wanted::Lowest(wanted) = settings.wanted
         && given < wanted
@@ -137,8 +139,8 @@ fn describe(
     }
 }
 
-/// A note about a mass matrix that leaves some motions without mass; `finite` modes have a frequency, where
-/// that is known.
+/// Returns a diagnostic if the mass matrix is singular; `finite` is the number of modes with a finite
+/// frequency, if known.
 fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Option<Diagnostic> {
     let pencil = &problem.pencil;
     let at_most = pencil.n() - problem.rigid.ncols();
@@ -157,27 +159,29 @@ fn singular_mass_note(problem: &EigenProblem<'_>, finite: Option<usize>) -> Opti
     Some(Diagnostic::new(Code::MassMatrixSingular, format!("mass matrix is singular: {singular}")))
 }
 
-/// An upper bound of the first flexible eigenvalue of a model with these rigid modes, near it for a uniform
-/// body: the scale of a shift.
+/// Returns an upper bound of the first flexible eigenvalue of a model with these rigid modes. The bound is
+/// close for a uniform body and serves as the scale of a shift.
 pub fn first_eigenvalue_estimate(model: &FeModel, rigid: MatRef<'_, f64>) -> f64 {
     polynomial_estimate(model, &model.pencil(), rigid)
 }
 
-/// Returns the plan of the search for the free modes of a model: the attempts that can be made within the limits of
-/// `context`, and what they take.
+/// Returns the plan of the search for the free modes of a model: the attempts possible within the limits of
+/// `context`, and their costs.
 ///
 /// # Errors
-/// Those of the analysis of a model that has no factor; FB601 and FB604 where no attempt is within the limits.
+/// The errors of the analysis of a model that cannot be factored; FB601 and FB604 if no attempt is within
+/// the limits.
 pub fn search_plan(model: &FeModel, settings: &ModeSettings, context: &Context<'_>) -> Result<Plan> {
     let rigid = rigid_modes(model, &model.pencil())?;
     let problem = problem_of_span(model, rigid.as_ref());
     plan(&problem, settings, context).map_err(|failure| explain(model, failure))
 }
 
-/// The smallest Rayleigh quotient of polynomial fields, M-orthogonal to the rigid modes: an upper bound of the first
-/// flexible eigenvalue. Fields of the second degree come within a factor of two for a uniform solid; those of the
-/// third degree bend a curved shell nearly without stretching it (a cylinder with u_x = x^3, u_y = -y^3 exactly), and
-/// are taken where nodes have rotations. Rows without a place stay zero.
+/// Returns the smallest Rayleigh quotient of polynomial fields, M-orthogonal to the rigid modes: an upper
+/// bound of the first flexible eigenvalue. Fields of the second degree come within a factor of two for a
+/// uniform solid. Fields of the third degree bend a curved shell nearly without stretching (a cylinder with
+/// u_x = x^3, u_y = -y^3 exactly); they are used if nodes have rotations. Rows without a position stay
+/// zero.
 pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: MatRef<'_, f64>) -> f64 {
     let has_rotations = !model.rows().rotations().is_empty();
     let monomials = if has_rotations { [QUADRATIC, CUBIC].concat() } else { QUADRATIC.to_vec() };
@@ -191,13 +195,13 @@ pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: M
     }
     let mut m = gram_in_panels(fields.as_ref(), mass);
     for i in 0..m.nrows() {
-        // A rigid field, or one that a singular mass matrix does not see: rounding only.
+        // A rigid field, or a field without mass under a singular mass matrix, is rounding.
         if m[(i, i)] < 1e-10 * before[(i, i)] {
             m[(i, i)] = 0.0;
         }
     }
     let k = gram_in_panels(fields.as_ref(), |x| pencil.apply_stiffness(x));
-    // Bending is a small difference of the fields of a shell.
+    // In a shell the bending energy is a small difference of the energies of the fields.
     let bending = has_rotations.then(|| smallest_ratio(&k, &m, 1e-8)).flatten();
     bending
         .and_then(|(_, field)| resolved_ratio(pencil, combine(fields.as_ref(), field.as_ref()).as_ref()))
@@ -206,7 +210,7 @@ pub(super) fn polynomial_estimate(model: &FeModel, pencil: &Pencil<'_>, rigid: M
         .unwrap_or_else(|| trace_ratio(pencil))
 }
 
-/// Monomials of the coordinates by their factors: of the first and second degree, and of the third.
+/// Monomials of the coordinates by their factors: first and second degree, and third degree.
 const QUADRATIC: &[&[usize]] = &[&[0], &[1], &[2], &[0, 0], &[1, 1], &[2, 2], &[0, 1], &[1, 2], &[0, 2]];
 const CUBIC: &[&[usize]] = &[
     &[0, 0, 0],
@@ -221,8 +225,8 @@ const CUBIC: &[&[usize]] = &[
     &[0, 1, 2],
 ];
 
-/// Fields with a monomial as their component along each axis; nodal rotations are half the curl of the field. Made
-/// side by side.
+/// Returns fields with one monomial as displacement along one axis, all columns side by side. Nodal
+/// rotations are half the curl of the field.
 fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Tall {
     let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
@@ -252,7 +256,7 @@ fn polynomial_fields(model: &FeModel, n: usize, monomials: &[&[usize]]) -> Tall 
     fields
 }
 
-/// The derivative of a monomial along an axis.
+/// Returns the derivative of a monomial along an axis.
 fn slope(monomial: &[usize], r: &[f64; 3], along: usize) -> f64 {
     let without = |at: usize| -> f64 {
         monomial.iter().enumerate().filter(|(other, _)| *other != at).map(|(_, &k)| r[k]).product()
@@ -260,17 +264,18 @@ fn slope(monomial: &[usize], r: &[f64; 3], along: usize) -> f64 {
     (0..monomial.len()).filter(|&at| monomial[at] == along).map(without).sum()
 }
 
-/// The Rayleigh quotient of a field, where that is more than rounding of the stiffness makes of it.
+/// Returns the Rayleigh quotient of a field, if its energy exceeds the rounding errors of the stiffness.
 fn resolved_ratio(pencil: &Pencil<'_>, x: MatRef<'_, f64>) -> Option<f64> {
     let energy = gram(x, pencil.apply_stiffness(x).as_ref())[(0, 0)];
     let noise = energy_noise(pencil.stiffness(), x, f64::EPSILON)[0];
     (energy > RESOLVED * noise).then(|| energy / gram(x, pencil.apply_mass(x).as_ref())[(0, 0)])
 }
 
-/// Energy beside its rounding from which on a field tells of the first eigenvalue.
+/// Ratio of energy to its rounding error above which a field gives a valid estimate of the first
+/// eigenvalue.
 const RESOLVED: f64 = 1e3;
 
-/// X' f(X), where f takes a few columns at a time: the products of all need no room at once.
+/// Returns X' f(X), where f takes a few columns at a time, so that f(X) is never stored as a whole.
 fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f64>) -> Mat<f64> {
     let mut whole = Mat::zeros(x.ncols(), x.ncols());
     for start in (0..x.ncols()).step_by(PANEL) {
@@ -281,8 +286,8 @@ fn gram_in_panels(x: MatRef<'_, f64>, product: impl Fn(MatRef<'_, f64>) -> Mat<f
     whole
 }
 
-/// The smallest eigenvalue of the small pencil (K, M) on the part of M above so much of its largest eigenvalue, and its
-/// eigenvector (one column).
+/// Returns the smallest eigenvalue of the small pencil (K, M) and its eigenvector (one column), restricted
+/// to eigenvectors of M above `kept_above` times its largest eigenvalue.
 fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, Mat<f64>)> {
     let scale: Vec<f64> =
         (0..m.nrows()).map(|i| if m[(i, i)] > 0.0 { m[(i, i)].sqrt().recip() } else { 0.0 }).collect();
@@ -303,7 +308,7 @@ fn smallest_ratio(k: &Mat<f64>, m: &Mat<f64>, kept_above: f64) -> Option<(f64, M
     Some((ratio, Mat::from_fn(m.nrows(), 1, |i, _| scale[i] * field[(i, 0)])))
 }
 
-/// Mean stiffness over mean mass: a scale when nothing better is known.
+/// Returns mean stiffness over mean mass, the last resort for a scale.
 fn trace_ratio(pencil: &Pencil<'_>) -> f64 {
     let k: f64 = pencil.stiffness().diagonal().iter().sum();
     let m: f64 = pencil.mass().diagonal().iter().sum::<f64>() * pencil.block() as f64;

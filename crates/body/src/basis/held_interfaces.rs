@@ -1,9 +1,11 @@
-//! Interfaces whose coordinates are prescribed, all at once: which motions leave them zero, and which have them one.
+//! Interfaces with all coordinates prescribed at once: the motions that leave the coordinates zero, and the
+//! unit motions.
 //!
-//! Rigid and free interfaces prescribe the displacements of their nodes. An averaging interface prescribes the mean of
-//! its nodes alone, which may belong to others as well: averaging interfaces that share nodes with each other make one
-//! set of conditions C'u = q, and nodes of rigid and free interfaces enter it with what these prescribe. The conditions
-//! are well posed as long as they are independent on the rows that nothing else prescribes.
+//! Rigid and free interfaces prescribe the displacements of their nodes. An averaging interface prescribes
+//! only the mean of its nodes, which may belong to other interfaces as well. Averaging interfaces that
+//! share nodes form one set of conditions C'u = q; nodes of rigid and free interfaces enter it with their
+//! prescribed displacements. The conditions are well posed if they are independent on the rows that are not
+//! prescribed otherwise.
 
 use super::echelon::Echelon;
 use super::interface_rows::CoupledInterface;
@@ -15,16 +17,17 @@ use flexbody_linalg::{Dependents, Elimination, combine, gram, symmetric_eigen};
 use flexbody_model::{Coupling, FeModel, InterfaceMotion};
 use std::collections::HashMap;
 
-/// Smallest singular value of the conditions of averaging interfaces that share nodes, each interface orthonormal by
-/// itself, above which they count as independent. The static shapes lose as many digits as this is below one.
+/// Smallest singular value of the conditions of averaging interfaces that share nodes, each interface
+/// orthonormal by itself, above which the conditions count as independent. The static shapes lose as many
+/// digits as this value lies below one.
 const INDEPENDENT: f64 = 1e-4;
 
-/// Checks that the coordinates of `joints` can be prescribed all at once, and hold the body when they are
-/// zero.
+/// Checks that the coordinates of all `joints` can be prescribed at once, and that the body is held if they
+/// are zero.
 ///
 /// # Errors
-/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), all that
-/// are found.
+/// [`InterfaceCoupling`](Code::InterfaceCoupling) and [`InterfaceShared`](Code::InterfaceShared), one
+/// diagnostic per conflict.
 pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -> Result<()> {
     let mut found: Vec<Diagnostic> =
         joints.iter().filter(|joint| !joint.determined).map(|joint| undetermined(model, joint)).collect();
@@ -37,7 +40,8 @@ pub(super) fn check_prescribable(model: &FeModel, joints: &[CoupledInterface]) -
     if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
 }
 
-/// Names the place on which nodes that determine every rotation must not all lie, and the number of nodes that suffice.
+/// Returns the set (point or line) that must not contain all nodes, and the number of nodes that determine
+/// all rotations.
 fn determining(dimension: usize) -> (&'static str, &'static str) {
     if dimension == 2 {
         ("one point", "two nodes")
@@ -46,7 +50,7 @@ fn determining(dimension: usize) -> (&'static str, &'static str) {
     }
 }
 
-/// The nodes of a joint do not determine its coordinates.
+/// Returns the error for an interface whose nodes do not determine its coordinates.
 fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
     if joint.coupling == Coupling::Free {
         let message =
@@ -64,9 +68,9 @@ fn undetermined(model: &FeModel, joint: &CoupledInterface) -> Diagnostic {
     Diagnostic::new(Code::InterfaceCoupling, message).with_help(help)
 }
 
-/// Averaging interfaces that share nodes with each other, directly or through others: one set of conditions.
+/// Averaging interfaces that share nodes, directly or through others: one set of conditions.
 struct Conditions {
-    /// The interfaces.
+    /// Indices of the interfaces.
     joints: Vec<usize>,
     /// Rows of their nodes that no rigid or free interface prescribes, ascending.
     rows: Vec<usize>,
@@ -85,7 +89,7 @@ impl Conditions {
                 joints[j].rows.iter().copied().filter(|row| !prescribed.contains_key(row)).collect();
             let alone = own.len() == joints[j].rows.len();
             let mut group = Self { joints: vec![j], rows: own, alone };
-            // Join with every group that has one of the rows.
+            // Merge with every group that shares a row.
             let (touched, others): (Vec<_>, Vec<_>) = groups
                 .into_iter()
                 .partition(|other| other.rows.iter().any(|row| group.rows.binary_search(row).is_ok()));
@@ -104,7 +108,7 @@ impl Conditions {
         groups
     }
 
-    /// Returns C (rows x coordinates): the weights of all coordinates about the means of the nodes.
+    /// Returns C (rows x coordinates): the weights of all coordinates, taken about the means of the nodes.
     fn weights(&self, joints: &[CoupledInterface]) -> Mat<f64> {
         let place: HashMap<usize, usize> = self.rows.iter().copied().zip(0..).collect();
         let count = self.joints.iter().map(|&j| joints[j].coordinates.len()).sum();
@@ -123,7 +127,7 @@ impl Conditions {
         weights
     }
 
-    /// Returns the coordinates about the means of the nodes of displacements `u` (N x k).
+    /// Returns the coordinates of displacements `u` (N x k), taken about the means of the nodes.
     fn coordinates(&self, joints: &[CoupledInterface], u: MatRef<'_, f64>) -> Mat<f64> {
         let own = self.joints.iter().map(|&j| gram(joints[j].centred(), joints[j].gather(u).as_ref()));
         let own: Vec<Mat<f64>> = own.collect();
@@ -131,8 +135,8 @@ impl Conditions {
         Mat::from_fn(rows.len(), u.ncols(), |i, j| rows[i][j])
     }
 
-    /// Returns the coordinates about the means of the nodes (rows) that unit coordinates of all `joints` (`count`
-    /// columns) stand for: those of the rigid motion of each interface.
+    /// Returns, for unit coordinates of all `joints` (`count` columns), the coordinates about the means of
+    /// the nodes (rows): those of the rigid motion of each interface.
     fn unit_coordinates(&self, joints: &[CoupledInterface], count: usize) -> Mat<f64> {
         let size = |j: usize| joints[j].coordinates.len();
         let mut wanted = Mat::zeros(self.joints.iter().map(|&j| size(j)).sum(), count);
@@ -146,14 +150,14 @@ impl Conditions {
         wanted
     }
 
-    /// Changes the rows of `moved` (n x coordinates) that nothing else prescribes by the least that gives the interfaces
+    /// Corrects the free rows of `moved` (n x coordinates) by the smallest change that gives the interfaces
     /// their unit coordinates.
     fn fulfil(&self, joints: &[CoupledInterface], moved: &mut Mat<f64>) {
         let weights = self.weights(joints);
         let root = inverse_root(weights.as_ref()).expect("independent conditions");
         let normal = combine(root.as_ref(), root.transpose());
         let wanted = self.unit_coordinates(joints, moved.ncols());
-        // Twice: the second time what rounding left of the first.
+        // The second pass removes the rounding error of the first.
         for _ in 0..2 {
             let missing = &wanted - self.coordinates(joints, moved.as_ref());
             let correction = combine(weights.as_ref(), combine(normal.as_ref(), missing.as_ref()).as_ref());
@@ -163,7 +167,7 @@ impl Conditions {
         }
     }
 
-    /// True if the conditions are independent on the rows that nothing else prescribes.
+    /// Returns true if the conditions are independent on the free rows.
     fn are_independent(&self, joints: &[CoupledInterface]) -> bool {
         if self.alone {
             return true;
@@ -172,7 +176,7 @@ impl Conditions {
         if weights.nrows() < weights.ncols() {
             return false;
         }
-        // Each interface orthonormal by itself, on all of its rows.
+        // Make each interface orthonormal by itself, on all of its rows.
         let mut scaled = Mat::zeros(weights.nrows(), weights.ncols());
         let mut first = 0;
         for joint in self.joints.iter().map(|&j| &joints[j]) {
@@ -189,7 +193,7 @@ impl Conditions {
 
 /// Returns X (r x r) with X'A'A X = I; `None` if the columns of A are dependent.
 fn inverse_root(a: MatRef<'_, f64>) -> Option<Mat<f64>> {
-    // Columns of one size first: rotations are in other units than displacements.
+    // Scale the columns to one size first: rotations and displacements have different units.
     let size: Vec<f64> = a.col_iter().map(|column| column.norm_l2()).collect();
     let scaled = Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] / size[j]);
     let eigen = symmetric_eigen(gram(scaled.as_ref(), scaled.as_ref()).as_ref())?;
@@ -199,13 +203,13 @@ fn inverse_root(a: MatRef<'_, f64>) -> Option<Mat<f64>> {
     is_positive.then_some(root)
 }
 
-/// Returns each row that a rigid or free interface prescribes, with the interface.
+/// Returns each row that a rigid or free interface prescribes, with the index of that interface.
 fn prescribed_rows(joints: &[CoupledInterface]) -> HashMap<usize, usize> {
     let prescribing = joints.iter().enumerate().filter(|(_, joint)| joint.coupling != Coupling::Averaging);
     prescribing.flat_map(|(j, joint)| joint.rows.iter().map(move |&row| (row, j))).collect()
 }
 
-/// Returns an error for each interface whose coordinates follow from those of others, because of nodes that it shares.
+/// Returns an error for each interface whose coordinates depend on other interfaces through shared nodes.
 fn dependent_on_others(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diagnostic> {
     let mut is_dependent = vec![false; joints.len()];
     for group in Conditions::of(joints).iter().filter(|group| !group.are_independent(joints)) {
@@ -239,7 +243,7 @@ fn dependent_on_others(model: &FeModel, joints: &[CoupledInterface]) -> Vec<Diag
     found
 }
 
-/// All joints together leave the body free to turn.
+/// Returns an error if all interfaces together leave the body free to turn.
 fn body_not_held(model: &FeModel, joints: &[CoupledInterface]) -> Option<Diagnostic> {
     let d = model.dimension();
     let held: Vec<[f64; 3]> =
@@ -253,18 +257,19 @@ fn body_not_held(model: &FeModel, joints: &[CoupledInterface]) -> Option<Diagnos
     Some(Diagnostic::new(Code::InterfaceCoupling, message).with_help(help))
 }
 
-/// T of u = T y, which leaves every coordinate zero: the rows of rigid and free interfaces are zero, those of
-/// averaging ones have no mean.
+/// Returns T of u = T y, which leaves every coordinate zero: rows of rigid and free interfaces are zero,
+/// rows of averaging interfaces have zero mean.
 ///
 /// # Errors
-/// [`EigenFailure::Memory`]: averaging interfaces couple all of their rows with each other, which does not fit.
+/// [`EigenFailure::Memory`] if the dense coupling of all rows of averaging interfaces does not fit.
 pub(super) fn hold(
     n: usize,
     joints: &[CoupledInterface],
     memory: Option<u64>,
 ) -> std::result::Result<Elimination, EigenFailure> {
     let groups = Conditions::of(joints);
-    // In K and in M. Bytes of an entry: in both matrices, one of them twice while it is made symmetric.
+    // Each entry takes 48 bytes: it is stored in K and in M, and one of them twice while it is made
+    // symmetric.
     let entries: u64 = groups.iter().map(|group| (group.rows.len() as u64).pow(2)).sum();
     let bytes = 48 * entries;
     if let Some(available) = memory.filter(|&available| bytes > available) {
@@ -277,8 +282,9 @@ pub(super) fn hold(
     Ok(Elimination::new(n, &zero.collect::<Vec<_>>(), dependents))
 }
 
-/// D (n x coordinates): displacements with unit coordinates, C'D = I, that move the nodes of rigid and free interfaces as
-/// these prescribe. The nodes of an averaging interface that shares none with others move as a rigid body.
+/// Returns D (n x coordinates): displacements with unit coordinates, C'D = I, in which the nodes of rigid
+/// and free interfaces move as prescribed. Nodes of an averaging interface that shares none of them move as
+/// a rigid body.
 ///
 /// # Panics
 /// When the coordinates cannot be prescribed ([`check_prescribable`]).
@@ -300,10 +306,10 @@ pub(super) fn unit_motions(n: usize, joints: &[CoupledInterface]) -> Mat<f64> {
     moved
 }
 
-/// C'u = 0 solved for as many `rows` as it has, chosen by complete pivoting: the weights of the others stay of the size of
-/// one.
+/// Solves C'u = 0 for as many `rows` as there are conditions, chosen by complete pivoting so that the
+/// weights of the other rows stay of order one.
 fn without_mean(rows: &[usize], measure: MatRef<'_, f64>) -> Dependents {
-    // Rows of one size: rotations are in other units than displacements.
+    // Scale the rows to one size: rotations and displacements have different units.
     let conditions =
         Mat::from_fn(measure.ncols(), measure.nrows(), |i, j| measure[(j, i)] / measure.col(i).norm_l2());
     let Echelon { pivots, others, weights } = Echelon::new(conditions);

@@ -1,6 +1,6 @@
-//! Shapes that were computed elsewhere, in a file or from a motion: checked, brought into the order of the
-//! model, freed from rigid motion, M-orthonormalised. Nothing is factored unless eigenvectors are to be
-//! proved complete.
+//! Shapes computed elsewhere, in a file or from a motion: checked, reordered to the rows of the model,
+//! freed from rigid motion, and M-orthonormalised. Nothing is factored unless eigenvectors are to be proved
+//! complete.
 
 use super::BasisKind;
 use super::columns::{Given, columns};
@@ -16,50 +16,51 @@ use flexbody_base::provenance::SourceFile;
 use flexbody_eigen::{Accuracy, EigenFailure, Proof, Wanted, modes_of_span};
 use flexbody_model::{FeModel, RawModes, RawShapes};
 
-/// Shapes in the order of a model's degrees of freedom.
+/// Shapes in the order of the degrees of freedom of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ImportedShapes {
-    /// N x k, by internal rows.
+    /// Shapes by internal rows (N x k).
     shapes: Mat<f64>,
     digits: u8,
     source: Option<SourceFile>,
     origin: Origin,
-    /// What the file says of the modes that the shapes are.
+    /// Data of the modes as stated by the file.
     stated: Option<StatedModes>,
-    /// What was done to the shapes.
+    /// Diagnostics about changes of the shapes.
     notes: Vec<Diagnostic>,
 }
 
-/// Where shapes come from.
+/// Origin of imported shapes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Origin {
-    /// The user, who names a file.
+    /// File given by the user.
     User,
-    /// The motion of a body in a scene.
+    /// Motion of a body in a scene.
     Motion,
 }
 
-/// Digits of numbers that were computed here.
+/// Decimal digits of shapes computed by this program.
 const COMPUTED_DIGITS: u8 = 15;
 
 impl ImportedShapes {
-    /// Shapes for `model`, given by its matrix rows.
+    /// Creates shapes for `model` from values on its matrix rows.
     ///
     /// # Errors
-    /// [`ShapesSize`](Code::ShapesSize) when the rows are not those of the matrices,
-    /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), all that are found.
+    /// [`ShapesSize`](Code::ShapesSize) if the rows are not those of the matrices;
+    /// [`MatrixNotFinite`](Code::MatrixNotFinite) and [`ShapesZero`](Code::ShapesZero), one diagnostic per
+    /// finding.
     pub fn new(model: &FeModel, raw: RawShapes) -> Result<Self> {
         let (digits, source) = (raw.digits, raw.source.clone());
         let shapes = columns(model, raw, Given::Shapes)?;
         Ok(Self { shapes, digits, source, origin: Origin::User, stated: None, notes: Vec::new() })
     }
 
-    /// Modes of `model` that an FE program has written by nodes. Rows that they lack follow from the others
-    /// by the equations of motion, and the eigenvalues of the file are compared with those of K and M.
+    /// Reads modes of `model` that an FE program wrote by nodes. Missing rows follow from the others by the
+    /// equations of motion, and the eigenvalues of the file are compared with K and M.
     ///
     /// # Errors
-    /// [`ShapesSize`](Code::ShapesSize) when the nodes are not those of the model, or too few of them;
-    /// [`ShapesZero`](Code::ShapesZero).
+    /// [`ShapesSize`](Code::ShapesSize) if the nodes are not those of the model, or too few of them;
+    /// [`ShapesZero`](Code::ShapesZero) for a zero shape.
     pub fn of_modes(model: &FeModel, raw: RawModes) -> Result<Self> {
         let raw = along_the_model(model, raw)?;
         let (shapes, notes) = by_rows(model, &raw)?;
@@ -67,13 +68,13 @@ impl ImportedShapes {
         Ok(Self { shapes, digits, source, origin: Origin::User, stated, notes })
     }
 
-    /// Shapes that a motion was found to be made of (N x k, by the rows of the model).
+    /// Creates shapes that were derived from a motion (N x k, by the rows of the model).
     pub fn of_motion(shapes: Mat<f64>) -> Self {
         let digits = COMPUTED_DIGITS;
         Self { shapes, digits, source: None, origin: Origin::Motion, stated: None, notes: Vec::new() }
     }
 
-    /// What one of them is called, and several.
+    /// Returns the singular and plural name of the shapes for messages.
     fn names(&self) -> (&'static str, &'static str) {
         match self.origin {
             Origin::User => ("imported shape", "imported shapes"),
@@ -81,13 +82,13 @@ impl ImportedShapes {
         }
     }
 
-    /// The file that they were read from.
+    /// Returns the file that the shapes were read from, if any.
     pub fn source(&self) -> Option<&SourceFile> {
         self.source.as_ref()
     }
 
-    /// Part of its M-norm that must be left of a shape after those before it: digits that the values do not
-    /// have say nothing.
+    /// Returns the smallest relative M-norm that a shape must keep after projection against the shapes
+    /// before it, given by the digits of its values.
     fn dependent(&self) -> f64 {
         10f64.powi(2 - i32::from(self.digits)).clamp(1e-8, 0.1)
     }
@@ -136,7 +137,8 @@ impl Basis for ImportedShapes {
 }
 
 impl ModalBasis {
-    /// Notes about modes of a subspace: which are no eigenvectors, and whether the others are complete.
+    /// Adds notes about the modes of a subspace: the modes that are no eigenvectors, and the completeness
+    /// of the others.
     fn describe_span(&mut self, accuracy: Accuracy) {
         let solution = &self.solution;
         let (residuals, completeness) = (&solution.residuals, &solution.completeness);

@@ -1,21 +1,23 @@
-//! K and M in interface coordinates, as joints of multibody packages want them.
+//! K and M in interface coordinates, for joints of multibody packages.
 
 use faer::Mat;
 use flexbody_linalg::combine;
 use nalgebra::Matrix3;
 
-/// The stiffness and mass matrices of a body in the motions of its interfaces and the amplitudes of its fixed-interface
-/// modes, and the transformation from its modes. The axes are those of the body, or of the model while a basis is made.
+/// Stiffness and mass matrices of a body in the motions of its interfaces and the amplitudes of its
+/// fixed-interface modes, and the transformation from its modes. The axes are those of the body; during the
+/// computation of a basis those of the model.
 ///
-/// The coordinates of an interface are those of its reference point (three translations, three rotations; in the plane two
-/// and one) or, of a free one, the displacements of its nodes in the order of the nodes of the body.
+/// The coordinates of an interface are the motions of its reference point (three translations, three
+/// rotations; in the plane two and one) or, for a free interface, the displacements of its nodes in the
+/// order of the nodes of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceCoordinates {
-    /// Name of each of the nc coordinates (`left ux`, `left rz`, `fixed-interface mode 1`): those of the interfaces in
+    /// Names of the nc coordinates (`left ux`, `left rz`, `fixed-interface mode 1`): the interfaces in
     /// their order, then the fixed-interface modes.
     pub names: Vec<String>,
-    /// Stiffness matrix (nc x nc): blkdiag(K_cc, diag(lambda of the fixed-interface modes)), with as many zero-energy
-    /// motions as the body has rigid ones.
+    /// Stiffness matrix (nc x nc): blkdiag(K_cc, diag(lambda of the fixed-interface modes)). Its null space
+    /// has the dimension of the rigid motions.
     pub stiffness: Mat<f64>,
     /// Mass matrix (nc x nc): \[M_cc, M_cm; M_mc, I\].
     pub mass: Mat<f64>,
@@ -23,11 +25,11 @@ pub struct InterfaceCoordinates {
     pub of_modes: Mat<f64>,
 }
 
-/// Interface coordinates along the axes of the model, with the places of vectors among them, by which they turn into
-/// other axes.
+/// Interface coordinates along the axes of the model, and the positions of vectors among them for a change
+/// of axes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CoordinatesInModelAxes {
-    /// The coordinates.
+    /// Coordinates along the axes of the model.
     pub coordinates: InterfaceCoordinates,
     /// First of the d coordinates of each vector: these change with the axes, all others do not.
     pub(super) vectors: Vec<usize>,

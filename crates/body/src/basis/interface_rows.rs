@@ -1,5 +1,5 @@
-//! Interfaces as rows of the matrices: the coordinates of a joint, what they do to the nodes, and what they
-//! measure of them.
+//! Interfaces as rows of the matrices: the coordinates of a joint, the nodal motions they cause, and the
+//! weights that measure them.
 
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -7,10 +7,10 @@ use flexbody_base::error::Result;
 use flexbody_model::{Coupling, FeModel, InterfaceMotion, NodeSet, centre_and_length, rigid_count};
 use std::collections::HashMap;
 
-/// Axes in names.
+/// Names of the axes.
 pub(super) const AXES: [&str; 3] = ["x", "y", "z"];
 
-/// An interface with r coordinates: the motion of its reference point, or, without one, all displacements of
+/// Interface with r coordinates: the motion of its reference point or, without one, all displacements of
 /// its nodes.
 pub(super) struct CoupledInterface {
     pub name: String,
@@ -19,30 +19,30 @@ pub(super) struct CoupledInterface {
     pub nodes: Vec<usize>,
     /// Their rows in the matrices.
     pub rows: Vec<usize>,
-    /// What each coordinate is, as in `ux` or `node 7 ux`.
+    /// Name of each coordinate, such as `ux` or `node 7 ux`.
     pub coordinates: Vec<String>,
-    /// The load that works on each coordinate, as in `force x` or `torque z`.
+    /// Name of the load that works on each coordinate, such as `force x` or `torque z`.
     pub loads: Vec<String>,
-    /// Displacements of the rows for unit coordinates that deform nothing at the interface, and weights of
-    /// the rows with measure' motion = I, which are also the loads that work on unit coordinates (both rows x
-    /// r).
+    /// `motion`: displacements of the rows for unit coordinates without deformation of the interface.
+    /// `measure`: weights of the rows with measure' motion = I, which are also the nodal forces of unit
+    /// loads on the coordinates. Both are rows x r.
     motion: Mat<f64>,
     measure: Mat<f64>,
-    /// The weights about the mean of the nodes (rows x r).
+    /// Weights about the mean of the nodes (rows x r).
     centred: Mat<f64>,
-    /// R about the mean of the nodes, rotations by one over their extent, rows of rotations times it: all of the size of
-    /// one.
+    /// R about the mean of the nodes. Columns of rotations are divided by the extent of the nodes and rows
+    /// of rotations multiplied by it, so that all entries are of order one.
     balanced: Mat<f64>,
     /// Extent of the nodes about their mean.
     length: f64,
-    /// Number of rows that are displacements; rotations follow.
+    /// Number of rows that are displacements; rows of rotations follow.
     displaced: usize,
     /// Number of coordinates that are displacements; rotations follow.
     pub displacements: usize,
-    /// Whether the nodes determine every coordinate; of a free interface, whether each has all of its
-    /// rotations or none has one.
+    /// True if the nodes determine every coordinate; for a free interface, true if each node has all
+    /// rotations or none has any.
     pub determined: bool,
-    /// Whether it holds the body by itself, not only together with others.
+    /// True if this interface alone holds the body.
     pub holds: bool,
 }
 
@@ -55,7 +55,7 @@ impl CoupledInterface {
         }
     }
 
-    /// Every row of the nodes is a coordinate.
+    /// Creates a free interface: every row of its nodes is a coordinate.
     fn free(model: &FeModel, set: &NodeSet, members: Members) -> Self {
         let Members { nodes, displaced, turned, all_turn } = members;
         let rows = [displaced.as_slice(), &turned].concat();
@@ -77,7 +77,7 @@ impl CoupledInterface {
             motion: unit.clone(),
             measure: unit.clone(),
             centred: unit,
-            // Axes turn only whole vectors.
+            // Changes of axes need whole rotation vectors.
             determined: turned.is_empty() || all_turn,
             holds: all_turn,
             nodes,
@@ -85,14 +85,15 @@ impl CoupledInterface {
         }
     }
 
-    /// The motion of the reference point is its coordinates.
+    /// Creates an interface whose coordinates are the motion of its reference point.
     fn at_reference(model: &FeModel, set: &NodeSet, members: Members) -> Self {
         let Members { nodes, displaced, turned, all_turn } = members;
         let (coupling, d) = (set.coupling(), model.dimension());
         let positions: Vec<[f64; 3]> = nodes.iter().map(|&i| model.nodes().positions[i]).collect();
         let reference = set.reference.point();
         let by_place = InterfaceMotion::new(&positions, false, d, reference);
-        // The mean motion leaves the rotations of the nodes alone, unless nothing else tells its own.
+        // The mean motion excludes the nodal rotations unless the displacements alone do not determine the
+        // rotation.
         let rows = match coupling {
             Coupling::Averaging if by_place.is_determined() || !all_turn => displaced,
             _ => [displaced.as_slice(), &turned].concat(),
@@ -103,7 +104,7 @@ impl CoupledInterface {
         let padded = |a: MatRef<'_, f64>| {
             Mat::from_fn(rows.len(), a.ncols(), |i, j| if i < a.nrows() { a[(i, j)] } else { 0.0 })
         };
-        // Of all rows, also where some nodes have a part of the rotations only.
+        // Rigid motion of all rows, including nodes with only some rotations.
         let fields = model.rigid_fields(motion.reference(), 1.0);
         let (centre, length) = centre_and_length(&positions);
         let length = if length > 0.0 { length } else { 1.0 };
@@ -129,35 +130,37 @@ impl CoupledInterface {
         }
     }
 
-    /// R (rows x r): displacements of the nodes for unit coordinates, nothing deformed at the interface.
+    /// Returns R (rows x r): displacements of the nodes for unit coordinates without deformation of the
+    /// interface.
     pub(super) fn motion(&self) -> MatRef<'_, f64> {
         self.motion.as_ref()
     }
 
-    /// R about the mean of the nodes (rows x r), displacements and turns of the size of one: rotations by one over
-    /// [`CoupledInterface::length`], rows of rotations times it.
+    /// Returns R about the mean of the nodes (rows x r), scaled so that displacements and rotations are of
+    /// order one: columns of rotations are divided by [`CoupledInterface::length`], rows of rotations
+    /// multiplied by it.
     pub(super) fn balanced(&self) -> MatRef<'_, f64> {
         self.balanced.as_ref()
     }
 
-    /// Extent of the nodes about their mean.
+    /// Returns the extent of the nodes about their mean.
     pub(super) fn length(&self) -> f64 {
         self.length
     }
 
-    /// Number of rows that are displacements, the first ones.
+    /// Returns the number of leading rows that are displacements.
     pub(super) fn displaced_rows(&self) -> usize {
         self.displaced
     }
 
-    /// A (rows x r), A'R = I: weights that take the coordinates from the displacements, and nodal forces of
-    /// unit loads on the coordinates.
+    /// Returns A (rows x r) with A'R = I: weights that give the coordinates from the displacements, and
+    /// nodal forces of unit loads on the coordinates.
     pub(super) fn measure(&self) -> MatRef<'_, f64> {
         self.measure.as_ref()
     }
 
-    /// Returns the weights of [`measure`](Self::measure) about the mean of the nodes: what they leave zero is the same, and
-    /// a far reference point costs no digits.
+    /// Returns the weights of [`measure`](Self::measure) about the mean of the nodes. They vanish for the
+    /// same displacements, and a distant reference point costs no digits.
     pub(super) fn centred(&self) -> MatRef<'_, f64> {
         self.centred.as_ref()
     }
@@ -171,27 +174,27 @@ impl CoupledInterface {
         }
     }
 
-    /// The rows of the nodes.
+    /// Returns the rows of `whole` (N x c) that belong to this interface.
     pub(super) fn gather(&self, whole: MatRef<'_, f64>) -> Mat<f64> {
         Mat::from_fn(self.rows.len(), whole.ncols(), |i, j| whole[(self.rows[i], j)])
     }
 }
 
-/// The nodes of an interface and their rows.
+/// Nodes of an interface and their matrix rows.
 struct Members {
     /// Indices of the nodes, ascending.
     nodes: Vec<usize>,
-    /// Rows of their displacements, and of their rotations where they have them.
+    /// Rows of the displacements of the nodes, and of their rotations, if any.
     displaced: Vec<usize>,
     turned: Vec<usize>,
-    /// Whether every node has all rotations.
+    /// True if every node has all rotations.
     all_turn: bool,
 }
 
 impl Members {
     fn new(model: &FeModel, set: &NodeSet, places: &HashMap<i64, usize>) -> Self {
         let d = model.dimension();
-        // In the order of the node table: equal sets give equal results.
+        // The order of the node table makes results independent of the order in the set.
         let mut nodes: Vec<usize> = set.nodes.iter().filter_map(|id| places.get(id)).copied().collect();
         nodes.sort_unstable();
         nodes.dedup();
@@ -206,17 +209,18 @@ impl Members {
     }
 }
 
-/// Names of what acts along the axes and about them; in the plane about the third alone.
+/// Returns names along the axes and about them; in the plane about the third axis only.
 fn along_axes(dimension: usize, along: &str, about: &str) -> Vec<String> {
     let turning = if dimension == 2 { &AXES[2..] } else { &AXES[..] };
     let along = AXES[..dimension].iter().map(|axis| format!("{along}{axis}"));
     along.chain(turning.iter().map(|axis| format!("{about}{axis}"))).collect()
 }
 
-/// All interfaces of a model.
+/// Returns all interfaces of a model.
 ///
 /// # Errors
-/// [`InterfaceNode`](Code::InterfaceNode) when there is none; `what` needs one, as in `interface loads`.
+/// [`InterfaceNode`](Code::InterfaceNode) if the model has no interface; `what` names the purpose, such as
+/// `interface loads`.
 pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<CoupledInterface>> {
     if model.interfaces().is_empty() {
         let message = format!("the model has no interfaces, so there are no {what}");
@@ -227,7 +231,7 @@ pub(super) fn coupled_interfaces(model: &FeModel, what: &str) -> Result<Vec<Coup
     Ok(coupled_sets(model, model.interfaces()))
 }
 
-/// Node sets of a model as interfaces.
+/// Converts node sets of a model to interfaces.
 pub(super) fn coupled_sets(model: &FeModel, sets: &[NodeSet]) -> Vec<CoupledInterface> {
     let places: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     sets.iter().map(|set| CoupledInterface::new(model, set, &places)).collect()

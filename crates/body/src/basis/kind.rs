@@ -1,27 +1,28 @@
-//! The kinds of bases, with their names.
+//! Kinds of bases and their names.
 
-/// A kind of basis: the shapes that the deformation of a body is made of.
+/// Kind of basis: the shapes that span the deformation of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BasisKind {
-    /// Free-surface modes, and the residual vectors that the model or the scene asks for.
+    /// Free-surface modes, and the residual vectors that the model or the scene requests.
     #[default]
     Free,
-    /// Modes with the interfaces held, and the static responses to motions of these (Craig and Bampton).
+    /// Modes with the interfaces held, and the static responses to motions of the interfaces (Craig and
+    /// Bampton).
     CraigBampton,
     /// Free-surface modes, and the static responses to loads at the interfaces (Craig and Chang).
     CraigChang,
-    /// Shapes that were computed elsewhere: they are read from a file.
+    /// Shapes computed elsewhere and read from a file.
     Imported,
-    /// The fewest shapes that the motion of a scene is made of; another motion may need others.
+    /// Smallest set of shapes that spans the motion of a scene; another motion may need others.
     Scene,
 }
 
 impl BasisKind {
-    /// Every kind, in the order of the documentation.
+    /// All kinds, in the order of the documentation.
     pub const ALL: [Self; 5] =
         [Self::Free, Self::CraigBampton, Self::CraigChang, Self::Imported, Self::Scene];
 
-    /// Name in files, reports and on the command line.
+    /// Returns the name in files, reports and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Free => "free",
@@ -32,18 +33,19 @@ impl BasisKind {
         }
     }
 
-    /// Returns the kind of this name.
+    /// Returns the kind with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 
-    /// True if free-surface modes are its only modes, or are what its shapes are chosen from. Loads of a scene join
-    /// these, and its band may choose their number.
+    /// Returns true if the basis consists of free-surface modes only, or if its shapes are chosen from
+    /// them. Residual vectors for the loads of a scene may be added, and the frequency band of the scene
+    /// may set the number of modes.
     pub fn follows_scene(self) -> bool {
         matches!(self, Self::Free | Self::Scene)
     }
 
-    /// True if the modes are searched for among the free-surface modes: residual vectors may join them.
+    /// Returns true if the search is for free-surface modes, to which residual vectors may be added.
     pub fn searches_free_modes(self) -> bool {
         self.follows_scene() || self == Self::CraigChang
     }

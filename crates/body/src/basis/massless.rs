@@ -7,30 +7,32 @@ use flexbody_linalg::{CscMatrix, SparseLdl, SymmetricMatrix, contiguous_mut};
 use flexbody_model::FeModel;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Part of the rotational mass of a node that is rounding. What such a direction shares with other rows is at most the
-/// root of it, M being positive semidefinite.
+/// Part of the rotational mass of a node that counts as rounding. Since M is positive semidefinite, the
+/// coupling of such a direction with other rows is at most the root of this part.
 const NOTHING: f64 = 1e-13;
 
-/// Rows of the model with the components of a motion that moves no mass.
+/// Rows of the model and the components of a motion that moves no mass.
 type LocalMotion = Vec<(usize, f64)>;
 
-/// Loads without what they do to massless motions Z of single nodes, carried over to the rest:
-/// f - K Z (Z'K Z)^-1 Z'f.
+/// Removes the work of loads on massless motions Z of single nodes and carries their effect over to the
+/// rest: f - K Z (Z'K Z)^-1 Z'f.
 ///
-/// Modes of finite frequency feel no more of a load than that. The motion that it makes of Z alone,
-/// Z (Z'K Z)^-1 Z'f, moves no mass: it is in no mode, and in a residual vector it would be what rounding scales up.
+/// Modes of finite frequency respond to this part of a load only. The massless response Z (Z'K Z)^-1 Z'f
+/// belongs to no mode; in a residual vector, rounding would amplify it.
 ///
 /// # Errors
-/// [`FactorizationFailed`](Code::FactorizationFailed) where K does not hold these motions.
+/// [`FactorizationFailed`](Code::FactorizationFailed) if K does not resist these motions.
 pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> {
     let motions = massless_motions(model);
     let work = |load: &[f64]| -> Vec<f64> { motions.iter().map(|motion| work_on(motion, load)).collect() };
     let is_loaded = |j: &usize| work(loads.col_as_slice(*j)).iter().any(|work| *work != 0.0);
+    // Only loads that do work on massless motions change.
     let loaded: Vec<usize> = (0..loads.ncols()).filter(is_loaded).collect();
     if loaded.is_empty() {
         return Ok(loads);
     }
     let stiffness = model.stiffness();
+    // Factor Z'K Z; it must be regular.
     let factor =
         SparseLdl::new(&stiffness_of(stiffness, &motions), 0.0).filter(|own| own.null_rows().is_empty());
     let Some(factor) = factor else {
@@ -40,6 +42,7 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
     };
     let mut scratch = vec![0.0; motions.len()];
     for j in loaded {
+        // Amplitudes (Z'K Z)^-1 Z'f, then f - K Z times them.
         let mut amplitudes = work(loads.col_as_slice(j));
         factor.solve_in_place(1, &mut amplitudes, &mut scratch);
         let load = contiguous_mut(loads.col_mut(j));
@@ -54,12 +57,12 @@ pub(super) fn on_mass(model: &FeModel, mut loads: Mat<f64>) -> Result<Mat<f64>> 
     Ok(loads)
 }
 
-/// The work of a load on a motion.
+/// Returns the work of a load on a motion.
 fn work_on(motion: &LocalMotion, load: &[f64]) -> f64 {
     motion.iter().map(|&(row, part)| part * load[row]).sum()
 }
 
-/// Takes what rounding leaves of the work of a load on orthonormal motions.
+/// Removes the rounding errors in the work of a load on orthonormal motions.
 fn clear(motions: &[LocalMotion], load: &mut [f64]) {
     for motion in motions {
         let work = work_on(motion, load);
@@ -67,7 +70,7 @@ fn clear(motions: &[LocalMotion], load: &mut [f64]) {
     }
 }
 
-/// Orthonormal motions of single nodes, and of single rows without a node, that move no mass.
+/// Returns orthonormal motions of single nodes, and of single rows without a node, that move no mass.
 fn massless_motions(model: &FeModel) -> Vec<LocalMotion> {
     let (pencil, rows) = (model.pencil(), model.rows());
     let is_empty = |row: usize| pencil.mass().row(row / pencil.block()).0.is_empty();
@@ -83,8 +86,8 @@ fn massless_motions(model: &FeModel) -> Vec<LocalMotion> {
     motions
 }
 
-/// Directions in which the `count` rotations of a node, from row `first` on, carry no mass: shells that turn about
-/// their normal, rows that M leaves empty.
+/// Returns the directions in which the `count` rotations of a node, from row `first` on, carry no mass:
+/// rotations of shells about their normal, and empty rows of M.
 fn massless_rotations(model: &FeModel, first: usize, count: usize) -> Vec<LocalMotion> {
     let mass = model.pencil().mass();
     let rows = first..first + count;
@@ -99,7 +102,7 @@ fn massless_rotations(model: &FeModel, first: usize, count: usize) -> Vec<LocalM
     (0..count).filter(is_massless).map(motion).collect()
 }
 
-/// Z'K Z.
+/// Returns Z'K Z.
 fn stiffness_of(stiffness: &SymmetricMatrix, motions: &[LocalMotion]) -> SymmetricMatrix {
     let mut parts: Vec<Vec<(u32, f64)>> = vec![Vec::new(); stiffness.n()];
     for (at, motion) in motions.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Modal bases: which shapes span the deformation of a body, each kind in one file behind [`Basis`].
+//! Modal bases: shapes that span the deformation of a body, each kind in one file behind [`Basis`].
 
 mod choice;
 mod columns;
@@ -29,7 +29,7 @@ pub use coupled_model::CoupledModel;
 pub use craig_bampton::CraigBampton;
 pub use craig_chang::CraigChang;
 pub use fixed_interface::FixedInterface;
-/// What is asked for.
+/// Settings of a mode computation: number and accuracy of the modes, and the factor to use.
 pub use flexbody_eigen::EigenSettings as ModeSettings;
 pub use free_surface::{FreeSurface, first_eigenvalue_estimate, free_surface, search_plan};
 pub use imported::ImportedShapes;

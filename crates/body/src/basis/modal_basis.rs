@@ -1,4 +1,4 @@
-//! What every basis gives, and what is checked of it whichever it is.
+//! Common interface of all bases, and the checks common to all modes.
 
 use super::{BasisKind, CoordinatesInModelAxes, FixedInterface, ModeSettings};
 use faer::MatRef;
@@ -9,84 +9,86 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{gram, larger};
 use flexbody_model::FeModel;
 
-/// A kind of basis. A new one is one file of this room and one variant of
+/// A kind of basis. A new kind needs one file in this folder and one variant of
 /// [`BasisChoice`](super::BasisChoice).
 pub trait Basis {
-    /// Kind of the basis, whose name stands in files.
+    /// Returns the kind of the basis, whose name is stored in files.
     fn kind(&self) -> BasisKind;
 
-    /// The modes of a model in this basis: mass-normalised, M-orthogonal to the rigid motions, ascending.
+    /// Computes the modes of a model in this basis: mass-normalised, M-orthogonal to the rigid motions,
+    /// ascending.
     ///
     /// # Errors
-    /// Input that does not fit the model: exit code 2; mechanisms, indefinite matrices, no convergence, a
-    /// count that contradicts the modes: 3.
+    /// Input that does not fit the model: exit code 2. Mechanisms, indefinite matrices, no convergence, or
+    /// an inertia count that contradicts the modes: exit code 3.
     fn modes(&self, task: &Task<'_>) -> Result<ModalBasis>;
 }
 
 /// The model and the settings that a basis is computed for.
 #[derive(Clone, Copy)]
 pub struct Task<'a> {
-    /// The model.
+    /// Model to compute modes for.
     pub model: &'a FeModel,
-    /// Which modes and how good.
+    /// Number and accuracy of the wanted modes.
     pub settings: &'a ModeSettings,
-    /// Limits, listener and counter of the work.
+    /// Limits, progress listener and work counter.
     pub context: &'a Context<'a>,
 }
 
-/// What a basis lacks of the static response x = K^+ f to a load: |x - x_basis| / |x| in the norm of K, which
-/// is sqrt(1 - sum_p (psi_p'f)^2 / lambda_p / f'K^+ f).
+/// Truncation error of the static response x = K^+ f to a load: |x - x_basis| / |x| in the K-norm, which is
+/// sqrt(1 - sum_p (psi_p'f)^2 / lambda_p / f'K^+ f).
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Truncation {
     /// Name of the load.
     pub load: String,
-    /// With the free modes alone.
+    /// Error with the free modes alone.
     pub before: f64,
-    /// With the residual vectors.
+    /// Error with the residual vectors.
     pub after: f64,
 }
 
-/// Modes of a model, in model axes, whatever basis they come from.
+/// Modes of a model in any basis, in model axes.
 #[derive(Debug, Clone)]
 pub struct ModalBasis {
-    /// Eigenvalues, shapes (N x nf, by internal rows), residuals, completeness, work. Ritz values and vectors
-    /// of the basis' span where these are no eigenvectors, which the residuals tell.
+    /// Eigenvalues, shapes (N x nf, by internal rows), residuals, completeness and work. If the modes are
+    /// no eigenvectors, they are Ritz values and vectors of the span of the basis, with residuals
+    /// accordingly.
     pub solution: EigenSolution,
-    /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: what
-    /// digits and node positions leave of rigid motion.
+    /// Largest |r' K r| of the M-normalised rigid modes r, relative to the first flexible eigenvalue: the
+    /// strain energy of rigid motion due to the digits of the input and of the node positions.
     pub rigid_noise: f64,
-    /// For each mode, the standard deviation of lambda that the digits of K explain, relative to lambda.
+    /// Standard deviation of each lambda due to the digits of K, relative to lambda.
     pub input_noise: Vec<f64>,
-    /// Where each mode comes from.
+    /// Origin of each mode.
     pub provenance: Vec<String>,
-    /// For each load of the residual vectors, what the basis lacks.
+    /// Truncation error for each load of the residual vectors.
     pub truncation: Vec<Truncation>,
-    /// K and M in interface coordinates, of a basis that has them.
+    /// K and M in interface coordinates, for a basis that has them.
     pub coordinates: Option<CoordinatesInModelAxes>,
-    /// What the basis is made of and how far it goes, of one with fixed-interface modes.
+    /// Composition and frequency limit of a basis with fixed-interface modes.
     pub fixed_interface: Option<FixedInterface>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Relative energy of rigid motion above which the first mode is not a free mode: the body is tied to ground
-/// weakly.
+/// Relative energy of rigid motion above which the first mode is not a free mode: the body has a weak tie
+/// to ground.
 const RIGID_ENERGY: f64 = 0.05;
 
 /// Decimal digits of numbers written without loss.
 const ALL_DIGITS: u8 = 17;
 
-/// Noise of lambda above which the user is told.
+/// Relative noise of lambda above which a diagnostic reports the noise.
 const NOISE_TOLD: f64 = 1e-6;
 
-/// Relative error of the entries of K: half a unit of the last digit that they carry.
+/// Returns the relative error of the entries of K: half a unit of the last digit.
 pub(super) fn input_error(model: &FeModel) -> f64 {
     0.5 * 10f64.powi(1 - i32::from(model.digits()))
 }
 
-/// The eigenproblem of a model for vectors that are there already: nothing is searched, so no estimate is
-/// needed.
+/// Returns the eigenproblem of a model for vectors that already exist: there is no search and no first
+/// estimate.
 pub(super) fn problem_of_span<'a>(model: &'a FeModel, rigid: MatRef<'a, f64>) -> EigenProblem<'a> {
     let first_estimate = f64::INFINITY;
     let order = Some(model.elimination());
@@ -94,11 +96,13 @@ pub(super) fn problem_of_span<'a>(model: &'a FeModel, rigid: MatRef<'a, f64>) ->
 }
 
 impl ModalBasis {
-    /// Takes a solution, all of whose modes are called `provenance`, and measures the noise of its input.
+    /// Creates a basis from a solution whose modes all have the origin `provenance`, and measures the noise
+    /// of the input.
     ///
     /// # Errors
-    /// [`NoModes`](Code::NoModes) when it is empty; [`RigidMotionStrained`](Code::RigidMotionStrained) when
-    /// rigid motion has energy beside that of the first mode.
+    /// [`NoModes`](Code::NoModes) if the solution is empty;
+    /// [`RigidMotionStrained`](Code::RigidMotionStrained) if the energy of rigid motion is comparable with
+    /// that of the first mode.
     pub(super) fn new(
         model: &FeModel,
         problem: &EigenProblem<'_>,
@@ -133,7 +137,7 @@ impl ModalBasis {
     }
 }
 
-/// Why there is not a single mode.
+/// Returns the error for a solution without modes, with the reason.
 fn no_modes(model: &FeModel, settings: &ModeSettings, solution: &EigenSolution) -> Diagnostic {
     if settings.wanted == Wanted::Lowest(0) {
         let message = "no mode is asked for, and a body without modes is rigid".to_owned();
@@ -158,7 +162,8 @@ fn rigid_motion_strained(rigid_noise: f64) -> Diagnostic {
         .with_help("soft ties to ground, or a thin body whose matrices carry too few digits")
 }
 
-/// What the digits of the input leave of the eigenvalues, where that is worth a word.
+/// Returns a diagnostic about the noise of the eigenvalues due to the digits of the input, if the noise is
+/// large enough.
 fn noise_note(model: &FeModel, noise: f64) -> Option<Diagnostic> {
     if noise <= NOISE_TOLD {
         return None;

@@ -1,5 +1,5 @@
-//! Modes that an FE program has written by nodes: in the order of the model, with the rows that the file
-//! lacks, and beside what K and M say of them.
+//! Modes written by an FE program node by node: reordered to the rows of the model, completed where rows
+//! are missing, and checked against K and M.
 
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -10,13 +10,15 @@ use flexbody_model::{FeModel, RawModes};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Backward error of a factorisation beyond which rows are not completed by it: the digits that shapes have.
+/// Backward error of a factorisation above which missing rows are not completed with it. It corresponds to
+/// the digits of the shapes.
 const INACCURATE: f64 = 1e-7;
 
-/// Returns modes with their values along the axes of the model.
+/// Returns the modes with their values along the axes of the model.
 ///
 /// # Errors
-/// [`ShapesSize`](Code::ShapesSize) for a node that lacks directions which turn together.
+/// [`ShapesSize`](Code::ShapesSize) if a node has values for only some of the directions that turn
+/// together.
 pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawModes> {
     if std::mem::take(&mut raw.along_nodes) {
         model.given_rows().turn(&raw.labels, &mut raw.matrix).map_err(|node| {
@@ -29,7 +31,7 @@ pub(super) fn along_the_model(model: &FeModel, mut raw: RawModes) -> Result<RawM
     Ok(raw)
 }
 
-/// Shapes by internal rows (N x k), and what was done to get them.
+/// Returns the shapes by internal rows (N x k), and diagnostics about completed rows.
 ///
 /// # Errors
 /// [`ShapesSize`](Code::ShapesSize), [`ShapesZero`](Code::ShapesZero).
@@ -54,7 +56,8 @@ pub(super) fn by_rows(model: &FeModel, raw: &RawModes) -> Result<(Mat<f64>, Vec<
     Ok((shapes, vec![Diagnostic::new(Code::ModesCompleted, message).in_file(&raw.path)]))
 }
 
-/// Less than half of the displacements of the nodes say too little of the others.
+/// Returns an error if the file has less than half of the displacements of the nodes, too few to determine
+/// the others.
 fn refuse_too_few(model: &FeModel, raw: &RawModes, missing: &[usize]) -> Result<()> {
     let all = model.dimension() * model.nodes().len();
     let absent = missing.partition_point(|row| *row < all);
@@ -69,7 +72,7 @@ fn refuse_too_few(model: &FeModel, raw: &RawModes, missing: &[usize]) -> Result<
     Err(Diagnostic::new(Code::ShapesSize, message).in_file(&raw.path).with_help(help).into())
 }
 
-/// The first nodes that rows belong to.
+/// Returns the first nodes that rows belong to, as text.
 fn some_nodes(model: &FeModel, rows: &[usize]) -> String {
     let mut nodes: Vec<i64> = rows.iter().map(|row| model.label(*row).node).collect();
     nodes.dedup();
@@ -78,8 +81,8 @@ fn some_nodes(model: &FeModel, rows: &[usize]) -> String {
     format!("node{} {}{more}", if nodes.len() == 1 { "" } else { "s" }, named.join(", "))
 }
 
-/// The rows i that the file lacks, from (K - lambda M) x = 0 there: x_i = -(K - lambda M)_ii^-1 (K - lambda
-/// M)_ib x_b.
+/// Computes the missing rows i from (K - lambda M) x = 0: x_i = -(K - lambda M)_ii^-1 (K - lambda M)_ib
+/// x_b.
 fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &RawModes) -> Result<()> {
     let whole = model.pencil();
     let stiffness = whole.stiffness().principal(missing);
@@ -109,7 +112,7 @@ fn complete(model: &FeModel, shapes: &mut Mat<f64>, missing: &[usize], raw: &Raw
     Ok(())
 }
 
-/// Some rows, ascending, of M and the same columns.
+/// Returns the submatrix of M on some rows (ascending) and equal columns.
 fn principal_mass(pencil: &Pencil<'_>, rows: &[usize]) -> SymmetricMatrix {
     let (mass, block) = (pencil.mass(), pencil.block());
     if block == 1 {
@@ -128,7 +131,7 @@ fn principal_mass(pencil: &Pencil<'_>, rows: &[usize]) -> SymmetricMatrix {
     SymmetricMatrix::new(matrix).expect("rows and the same columns of a symmetric matrix")
 }
 
-/// What a file says of the modes whose shapes it has.
+/// Eigenvalues in a mode file, with the digits of eigenvalues and shapes.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct StatedModes {
     eigenvalues: Vec<Option<f64>>,
@@ -137,24 +140,25 @@ pub(super) struct StatedModes {
     path: PathBuf,
 }
 
-/// Share of a mode, in the norm of M, that must lie in modes of its frequency.
+/// Share of a mode, in the M-norm, that must lie in modes of its frequency.
 const ASSURED: f64 = 0.99;
 
-/// Modes within this part of an eigenvalue have one frequency: any mixture of their shapes is right.
+/// Relative distance of eigenvalues below which modes count as one frequency: any mixture of their shapes
+/// is valid.
 const CLOSE: f64 = 1e-3;
 
-/// Modes that are named one by one.
+/// Largest number of modes that a message names one by one.
 const NAMED: usize = 3;
 
-/// A mode that is not what its file says.
+/// Mode that differs from the data in its file.
 struct Difference {
     mode: usize,
     stated: f64,
-    /// x'Kx / x'Mx.
+    /// Rayleigh quotient x'Kx / x'Mx.
     rayleigh: f64,
-    /// Modal assurance criterion: the share of the mode in modes of its frequency.
+    /// Modal assurance criterion: share of the mode in modes of its frequency.
     assurance: f64,
-    /// Whether the digits of its shape explain the difference.
+    /// True if the digits of the shape explain the difference.
     rounded: bool,
 }
 
@@ -164,8 +168,8 @@ impl StatedModes {
         Self { eigenvalues, eigenvalue_digits, digits, path }
     }
 
-    /// The modes of the file (columns of `shapes`, of which those in `flexible` deform the body) beside what
-    /// K and M say of them; `None` where they agree.
+    /// Compares the modes of the file (columns of `shapes`, of which those in `flexible` deform the body)
+    /// with K and M. Returns `None` if they agree.
     pub(super) fn beside(
         &self,
         model: &FeModel,
@@ -215,7 +219,7 @@ impl StatedModes {
         let energies = column_products(shapes, pencil.apply_stiffness(shapes).as_ref());
         let stiffness = pencil.stiffness().diagonal();
         let shares = gram(solution.vectors.as_ref(), moved.as_ref());
-        // A share can be told where all modes are there.
+        // The share is known only if the solution contains all modes.
         let is_whole = solution.eigenvalues.len() == flexible.len();
         let precision = 10f64.powi(2 - i32::from(self.eigenvalue_digits));
         let of_mode = |&mode: &usize| {
@@ -237,7 +241,7 @@ impl StatedModes {
         flexible.iter().filter_map(of_mode).collect()
     }
 
-    /// Strain energy that rounding the values of a shape to their digits is expected to have, times two: the
+    /// Returns twice the strain energy expected from rounding the values of a shape to their digits: the
     /// sum of K_ii u_i^2 / 12, where u_i is one unit of the last digit of the value.
     fn rounding_energy(&self, stiffness: &[f64], shapes: MatRef<'_, f64>, mode: usize) -> f64 {
         let unit = |value: f64| match value == 0.0 {

@@ -1,4 +1,4 @@
-//! Responses of a model to forces that oscillate, for estimates.
+//! Responses of a model to harmonic forces, for estimates.
 
 use super::coupled_model::CoupledModel;
 use super::failure::explain;
@@ -9,12 +9,13 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{combine, gram, side_by_side, subtract_combination};
 use nalgebra::DMatrix;
 
-/// Responses x = (K - w^2 M)^-1 f to `loads` f (N x m) that oscillate at w, and y = (K - w^2 M)^-1 M x to the inertia
-/// of these, \[x, y\]: with x and y in its basis a reduced model has the transfer functions of the loads at w, and their
-/// slope. `None` where w^2 is an eigenvalue to rounding.
+/// Returns the responses x = (K - w^2 M)^-1 f to harmonic `loads` f (N x m) at w, and the responses
+/// y = (K - w^2 M)^-1 M x to their inertia, as \[x, y\]. With x and y in its basis, a reduced model has the exact
+/// transfer functions of the loads at w, and their slope. Returns `None` if w^2 is an eigenvalue to
+/// rounding.
 ///
-/// * `conditions`: C' (N x c) of a model that something holds, C x = C y = 0; none: of the free model, without rigid
-///   motion.
+/// * `conditions`: C' (N x c) of a model with constraints, C x = C y = 0; `None`: the free model, without
+///   rigid motion.
 /// * `square`: w^2 > 0.
 ///
 /// # Errors
@@ -33,7 +34,7 @@ pub fn oscillating_responses(
     let count = loads.ncols();
     let no_conditions = Mat::zeros(loads.nrows(), 0);
     let conditions = model.restrict(conditions.unwrap_or(&no_conditions).clone());
-    // What holds the model takes C'm such that C x = 0: the response to C' is found beside the others.
+    // The constraint forces C'm make C x = 0: compute the response to C' together with the others.
     let (mut x, mut to_conditions) = (Mat::new(), Mat::new());
     let further = |all: &Mat<f64>| {
         to_conditions = all.as_ref().subcols(count, conditions.ncols()).to_owned();
@@ -52,8 +53,8 @@ pub fn oscillating_responses(
     Ok(both.is_all_finite().then(|| model.expand(&both).into_owned()))
 }
 
-/// x <- x - X_C (C X_C)^-1 C x, with the responses X_C to the `conditions` C'. Not a number where these depend on each
-/// other.
+/// x <- x - X_C (C X_C)^-1 C x, with the responses X_C to the `conditions` C'. Gives NaN if the conditions
+/// depend on each other.
 fn hold(x: &mut Mat<f64>, conditions: &Mat<f64>, to_conditions: &Mat<f64>) {
     let count = conditions.ncols();
     if count == 0 {

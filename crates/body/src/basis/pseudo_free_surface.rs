@@ -1,6 +1,6 @@
-//! Pseudo-free-surface modes from any shapes (theory section 5): the rigid part is removed, what is left
-//! M-orthonormalised, and the small eigenproblem solved. Every identity of theory section 10 then holds,
-//! whatever the shapes were.
+//! Pseudo-free-surface modes from any shapes (theory section 5): the rigid part is removed, the remainder
+//! is M-orthonormalised, and the small eigenproblem is solved. Every identity of theory section 10 then
+//! holds for any shapes.
 
 use faer::{Mat, MatRef};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -8,41 +8,42 @@ use flexbody_linalg::{
     Pencil, column_products, combine, gram, side_by_side, subtract_combination, symmetric_eigen,
 };
 
-/// A shape of which rigid motion leaves less than this part of its M-norm is a rigid motion: those that
-/// eigen-solvers give stand at 1e-6 and below.
+/// Relative M-norm after removal of rigid motion below which a shape counts as a rigid motion. Rigid
+/// motions from eigen-solvers leave 1e-6 and less.
 const RIGID: f64 = 1e-5;
 
-/// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which it moves no mass: rounding leaves
-/// 1e-15.
+/// Squared M-norm of a shape relative to sum_i M_ii psi_i^2 below which the shape moves no mass: rounding
+/// leaves 1e-15.
 const MASSLESS: f64 = 1e-12;
 
-/// The same for what is left of a shape beside others: a singular M sees almost nothing of some combinations
-/// of shapes that it sees. Below, such a shape would be so large, and its eigenvalue so high, that the others
-/// lose their digits beside it.
+/// Limit of this ratio for the remainder of a shape after projection against others. With a singular M some
+/// combinations of shapes have almost no mass. Below the limit such a remainder, once normalised, would be
+/// so large and its eigenvalue so high that the other shapes lose their digits.
 const NEARLY_MASSLESS: f64 = 1e-4;
 
-/// Elastic energy of what is left of a shape beside others, relative to its own, above which it is a motion without mass
-/// and not the rounding of a shape that depends on others.
+/// Elastic energy of the remainder of a shape, relative to that of the whole shape, above which the
+/// remainder is a massless motion and not the rounding error of a dependent shape.
 const ELASTIC: f64 = 1e-10;
 
-/// The part of a set of shapes that spans deformations, and what became of the rest (indices from 0).
+/// Linearly independent deformations in a set of shapes, and the removed shapes by reason (indices from 0).
 #[derive(Debug, Clone)]
 pub(super) struct Independent {
-    /// M-orthonormal to rounding over the criterion of dependence; M-orthogonal to the rigid modes.
+    /// M-orthonormal up to rounding over the dependence limit, and M-orthogonal to the rigid modes.
     pub vectors: Mat<f64>,
-    /// Which shapes they are made of: column j lies in the span of the shapes up to kept\[j\].
+    /// Indices of the kept shapes: column j lies in the span of the shapes up to kept\[j\].
     pub kept: Vec<usize>,
     pub rigid: Vec<usize>,
     pub massless: Vec<usize>,
-    /// Those that the shapes before them span, with the part of the M-norm that is left.
+    /// Shapes that depend on the shapes before them, with the M-norm that projection leaves.
     pub dependent: Vec<(usize, f64)>,
 }
 
-/// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns in
-/// their order by the modified Gram-Schmidt process, twice. A column of which less than `dependent` of its
-/// M-norm is left after those before it, or after the rigid motions, is left out.
+/// Removes the rigid part, Psi - R R'M Psi (`rigid` R is M-orthonormal), and M-orthonormalises the columns
+/// in their order by the modified Gram-Schmidt process, repeated once. Columns whose relative M-norm falls
+/// below `dependent` after projection against the columns before them, or after removal of rigid motion,
+/// are dropped.
 ///
-/// `None`: a column has a negative M-norm beyond rounding, M is indefinite.
+/// Returns `None` if M is indefinite: a column has a negative squared M-norm beyond rounding.
 pub(super) fn independent(
     pencil: &Pencil<'_>,
     rigid: MatRef<'_, f64>,
@@ -52,7 +53,7 @@ pub(super) fn independent(
     let mut set = ShapeSet::new(pencil, shapes);
     set.scale_to_unit_size();
     set.scale_to_unit_mass()?;
-    // Twice: a shape may be rigid motion but for its last digits.
+    // Remove rigid motion twice: a shape may differ from a rigid motion only in its last digits.
     set.remove_rigid(rigid);
     set.leave_out_rigid(RIGID.max(dependent));
     set.remove_rigid(rigid);
@@ -61,14 +62,14 @@ pub(super) fn independent(
     Some(found)
 }
 
-/// Shapes on the way to be independent.
+/// Working set of the shapes during orthonormalisation.
 struct ShapeSet<'a> {
     pencil: &'a Pencil<'a>,
     mass_diagonal: Vec<f64>,
     shapes: Mat<f64>,
-    /// Whether each shape is still in the set.
+    /// True for each shape that is still in the set.
     is_in: Vec<bool>,
-    /// Directions that move no mass, or next to none, of shapes that are left out.
+    /// Removed directions with no mass or almost none.
     without_mass: Vec<Mat<f64>>,
     outcome: Independent,
 }
@@ -87,7 +88,7 @@ impl<'a> ShapeSet<'a> {
         Self { pencil, mass_diagonal, shapes, is_in, without_mass, outcome }
     }
 
-    /// Unit size first: squares of shapes in any unit stay in range.
+    /// Scales the shapes to unit size, so that their squares stay in the range of numbers for any unit.
     fn scale_to_unit_size(&mut self) {
         for j in 0..self.shapes.ncols() {
             let factor = 1.0 / self.shapes.col(j).norm_max();
@@ -97,12 +98,13 @@ impl<'a> ShapeSet<'a> {
         }
     }
 
-    /// Squares of the M-norms.
+    /// Returns the squared M-norms.
     fn squares(&self) -> Vec<f64> {
         column_products(self.shapes.as_ref(), self.pencil.apply_mass(self.shapes.as_ref()).as_ref())
     }
 
-    /// Unit M-norms; shapes that move no mass are left out. `None` when one has less than none.
+    /// Scales the shapes to unit M-norm and removes those without mass. Returns `None` if a squared M-norm
+    /// is negative beyond rounding.
     fn scale_to_unit_mass(&mut self) -> Option<()> {
         for (j, square) in self.squares().into_iter().enumerate() {
             let bound = diagonal_square(&self.mass_diagonal, &self.shapes, j);
@@ -126,7 +128,7 @@ impl<'a> ShapeSet<'a> {
         subtract_combination(self.shapes.as_mut(), rigid, along.as_ref());
     }
 
-    /// Leaves out what was rigid motion; unit M-norms again for the others.
+    /// Removes shapes that were rigid motions and scales the others to unit M-norm.
     fn leave_out_rigid(&mut self, rigid: f64) {
         for (j, square) in self.squares().into_iter().enumerate() {
             let left = square.max(0.0).sqrt();
@@ -139,8 +141,8 @@ impl<'a> ShapeSet<'a> {
         }
     }
 
-    /// The Gram-Schmidt process, and what it leaves out that moves no mass. The vectors found so far are the first columns
-    /// of the shapes and of their products.
+    /// Runs the Gram-Schmidt process; also returns removed directions without mass. The vectors found so
+    /// far are the first columns of the shapes and of their products with M.
     fn orthonormalised(self, dependent: f64) -> (Independent, Vec<Mat<f64>>) {
         let Self { pencil, mass_diagonal, mut shapes, is_in, mut without_mass, mut outcome } = self;
         let mut products = pencil.apply_mass(shapes.as_ref());
@@ -155,10 +157,10 @@ impl<'a> ShapeSet<'a> {
                 outcome.dependent.push((j, left));
                 continue;
             }
-            // Afresh: the product was the difference of larger ones.
+            // Compute the product with M directly: the updated product is a difference of larger numbers.
             let product = pencil.apply_mass(vector.as_ref());
             let square = column_products(vector.as_ref(), product.as_ref())[0];
-            // A singular M: what is left of shapes with mass may have none.
+            // With a singular M the remainder of shapes that have mass may have none.
             let bound = diagonal_square(&mass_diagonal, &vector, 0);
             if square <= NEARLY_MASSLESS * bound {
                 outcome.massless.push(j);
@@ -179,15 +181,15 @@ impl<'a> ShapeSet<'a> {
     }
 }
 
-/// True if what is `left` of a shape beside others has elastic energy of its own.
+/// Returns true if the remainder `left` of a shape has elastic energy of its own.
 fn is_elastic(pencil: &Pencil<'_>, left: &Mat<f64>, shape: MatRef<'_, f64>) -> bool {
     let energy = |x: MatRef<'_, f64>| column_products(x, pencil.apply_stiffness(x).as_ref())[0];
     energy(left.as_ref()) > ELASTIC * energy(shape)
 }
 
-/// The vectors V with the motions Z `without_mass` where their elastic forces hold them, V - Z (Z'K Z)^-1 Z'K V, and
-/// M-orthonormal again, to the `rigid` motions as well: Ritz vectors of finite frequency in the span of both have no other
-/// part of Z.
+/// Moves the massless motions Z `without_mass` in the vectors V to elastic equilibrium, V - Z (Z'K Z)^-1
+/// Z'K V, and M-orthonormalises again, also against the `rigid` motions. Ritz vectors of finite frequency
+/// in the span of both contain Z in no other way.
 fn in_equilibrium(
     pencil: &Pencil<'_>,
     rigid: MatRef<'_, f64>,
@@ -199,6 +201,7 @@ fn in_equilibrium(
     }
     let motions = side_by_side(&without_mass.iter().map(Mat::as_ref).collect::<Vec<_>>());
     let forces = pencil.apply_stiffness(motions.as_ref());
+    // K-orthonormalise Z, without directions of rounding.
     let energy = gram(motions.as_ref(), forces.as_ref());
     let sizes: Vec<f64> = (0..energy.nrows()).map(|j| energy[(j, j)].max(f64::MIN_POSITIVE).sqrt()).collect();
     let scaled = Mat::from_fn(sizes.len(), sizes.len(), |i, j| energy[(i, j)] / (sizes[i] * sizes[j]));
@@ -208,10 +211,13 @@ fn in_equilibrium(
     let unit = Mat::from_fn(sizes.len(), kept.len(), unit);
     let (motions, forces) =
         (combine(motions.as_ref(), unit.as_ref()), combine(forces.as_ref(), unit.as_ref()));
+    // V - Z Z'K V.
     let part = gram(forces.as_ref(), vectors.as_ref());
     subtract_combination(vectors.as_mut(), motions.as_ref(), part.as_ref());
+    // M-orthogonal to rigid motion again.
     let along = gram(rigid, pencil.apply_mass(vectors.as_ref()).as_ref());
     subtract_combination(vectors.as_mut(), rigid, along.as_ref());
+    // M-orthonormal again, in the order of the columns.
     let mut products = pencil.apply_mass(vectors.as_ref());
     for j in 0..vectors.ncols() {
         let (vector, _) = beside_first(j, &vectors, &products, j);
@@ -225,7 +231,7 @@ fn in_equilibrium(
     vectors
 }
 
-/// What is left of shape j beside the first `found` columns, and its product with M.
+/// Returns shape j after projection against the first `found` columns, and its product with M.
 fn beside_first(found: usize, shapes: &Mat<f64>, products: &Mat<f64>, j: usize) -> (Mat<f64>, Mat<f64>) {
     let mut vector = shapes.as_ref().subcols(j, 1).to_owned();
     let mut product = products.as_ref().subcols(j, 1).to_owned();
@@ -237,14 +243,14 @@ fn beside_first(found: usize, shapes: &Mat<f64>, products: &Mat<f64>, j: usize) 
     (vector, product)
 }
 
-/// sum_i M_ii psi_i^2 of column j.
+/// Returns sum_i M_ii psi_i^2 of column j.
 fn diagonal_square(mass_diagonal: &[f64], a: &Mat<f64>, j: usize) -> f64 {
     mass_diagonal.iter().zip(a.col(j).iter()).map(|(m, s)| m * s * s).sum()
 }
 
 impl Independent {
-    /// What the user should know of the shapes that were left out; `what` names them, as in
-    /// `imported shapes`, and `name` each.
+    /// Returns diagnostics about the removed shapes. `what` names the set, such as `imported shapes`;
+    /// `name` names a shape.
     pub(super) fn notes(
         &self,
         what: &str,
@@ -278,12 +284,12 @@ impl Independent {
     }
 }
 
-/// The part that is left of a norm, as messages name it: that below the rounding of one has no digits.
+/// Returns a relative norm as text for messages: values below the rounding of one have no digits.
 pub(super) fn part_in_words(left: f64) -> String {
     if left < f64::EPSILON { "rounding".to_owned() } else { format!("{left:.0e}") }
 }
 
-/// `a, b, c`, or `a, b, c, d, e and 7 more`.
+/// Joins names as `a, b, c`, or `a, b, c, d, e and 7 more`.
 pub(super) fn named(columns: Vec<String>) -> String {
     match columns.len() {
         0..=6 => columns.join(", "),
@@ -295,8 +301,8 @@ fn scale(a: &mut Mat<f64>, j: usize, factor: f64) {
     a.as_mut().col_mut(j).iter_mut().for_each(|value| *value *= factor);
 }
 
-/// For each mode, the shape with the largest share in it, and that share: the square of its amplitude in
-/// `parts` (shapes x modes) for M-orthonormal shapes and modes.
+/// Returns, for each mode, the shape with the largest share in it and that share: the square of its
+/// amplitude in `parts` (shapes x modes) for M-orthonormal shapes and modes.
 pub(super) fn largest_shares(parts: MatRef<'_, f64>) -> Vec<(usize, f64)> {
     let shares = |p: usize| parts.col(p).iter().map(|a| a * a).enumerate();
     let largest = |p: usize| shares(p).fold((0, 0.0), |most, one| if one.1 > most.1 { one } else { most });

@@ -1,5 +1,5 @@
-//! Residual vectors: static responses K^+ f that a basis cut off by frequency does not have, and those at
-//! chosen frequencies (theory section 8).
+//! Residual vectors: static responses K^+ f, or responses at chosen frequencies, without the contribution
+//! of the modes of a truncated basis (theory section 8).
 
 use super::columns::{Given, columns};
 use super::coupled_model::CoupledModel;
@@ -23,15 +23,17 @@ use flexbody_linalg::{add_combination, column_products, gram, side_by_side};
 use flexbody_model::{Coupling, FeModel, InertialRows, NodeSet, RawShapes};
 use nalgebra::Vector3;
 
-/// Part of the M-norm of a response that must be left beside the modes and the vectors before it.
+/// Smallest relative M-norm that a response must keep after projection against the modes and the residual
+/// vectors before it. Responses below this limit are dropped. A larger value drops more loads; a smaller
+/// value admits vectors that consist of rounding errors.
 const LEFT: f64 = 1e-8;
 
-/// Part of a load that must be left without its resultants: what moves the body only as a whole needs no
-/// mode.
+/// Smallest norm of a self-equilibrated load relative to the norm of the load. A load below this limit
+/// moves the body only as a rigid body and needs no residual vector.
 const SELF_EQUILIBRATED: f64 = 1e-10;
 
-/// K^+ f of every column of `loads` (N x m), which are made self-equilibrated by inertia relief; to some
-/// digits, for estimates.
+/// Returns the static responses K^+ f to all columns of `loads` (N x m), made self-equilibrated by inertia
+/// relief. The accuracy is that of an estimate ([`ResponseAccuracy::ROUGH`]).
 ///
 /// * `first`: about the first flexible eigenvalue.
 ///
@@ -43,10 +45,11 @@ pub fn free_static_responses(model: &CoupledModel<'_>, loads: Mat<f64>, first: f
     Ok(responses)
 }
 
-/// The responses of [`free_static_responses`], and those to the loads that `further` returns for these.
+/// Returns the responses of [`free_static_responses`] and the responses to a second set of loads. `further`
+/// is called once with the first responses (N x m) and returns the second loads.
 ///
 /// # Errors
-/// As [`free_static_responses`].
+/// The errors of [`free_static_responses`].
 pub fn free_static_responses_twice(
     model: &CoupledModel<'_>,
     loads: Mat<f64>,
@@ -63,9 +66,10 @@ pub fn free_static_responses_twice(
     Ok(both.map(|x| model.expand(&x).into_owned()))
 }
 
-/// Nodal forces (N x 6, in the plane N x 3) of unit forces and unit torques along the model axes at the
-/// reference point of the interface `name`; which are also the weights that take the motion of that point
-/// from the displacements. `None` where the model has no such interface, or it has no reference point.
+/// Returns the nodal forces (N x 6, of a plane model N x 3) of unit forces and unit torques along the model
+/// axes at the reference point of the interface `name`. The transpose of the matrix maps displacements to
+/// the motion of that point. Returns `None` if the model has no such interface, or the interface has no
+/// reference point.
 ///
 /// # Errors
 /// [`InterfaceNode`](Code::InterfaceNode).
@@ -79,7 +83,7 @@ pub fn interface_loads(model: &FeModel, name: &str) -> Result<Option<Mat<f64>>> 
     }))
 }
 
-/// Loads whose static responses are to be in the basis.
+/// Loads whose responses become residual vectors of the basis.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Loads {
     /// The six centrifugal loads that any constant angular velocity about the centre of mass is made of, f(w)
@@ -92,20 +96,20 @@ pub enum Loads {
     Interfaces,
     /// Nodal forces.
     User(UserLoads),
-    /// What a motion leaves unbalanced at the nodes (N x m): the loads that a body lacks the responses to.
+    /// Forces that a motion of the reduced body leaves unbalanced at the nodes (N x m).
     Motion(Mat<f64>),
-    /// The responses (K - w^2 M)^-1 f to loads that oscillate, instead of the static ones: with them the
-    /// transfer functions between these loads are those of the model at w, and with the same slope there
-    /// (moments of rational Krylov spaces; Grimme, Krylov projection methods for model reduction, 1997).
+    /// Responses (K - w^2 M)^-1 f to harmonic loads instead of static responses. With these in the basis,
+    /// the transfer functions between the loads and their slopes agree with the model at w (moments of
+    /// rational Krylov spaces; Grimme, Krylov projection methods for model reduction, 1997).
     At {
-        /// The loads, at rest.
+        /// Load amplitudes.
         loads: Box<Loads>,
-        /// w / 2 pi, positive, in hertz; no natural frequency.
+        /// Excitation frequency w / 2 pi in hertz, positive. Must not be a natural frequency.
         hertz: f64,
     },
 }
 
-/// Nodal forces in the order of a model's degrees of freedom, one load in each column.
+/// Nodal forces in the order of the degrees of freedom of a model, one load per column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UserLoads {
     loads: Mat<f64>,
@@ -113,7 +117,7 @@ pub struct UserLoads {
 }
 
 impl UserLoads {
-    /// Loads for `model`, given by its matrix rows.
+    /// Creates loads for `model` from forces on its matrix rows.
     ///
     /// # Errors
     /// Every error of [`ImportedShapes::new`](super::ImportedShapes::new); [`ShapesSize`](Code::ShapesSize) for a load
@@ -136,7 +140,7 @@ impl Loads {
         }
     }
 
-    /// Frequency at which they oscillate, in hertz; zero: at rest.
+    /// Returns the excitation frequency in hertz; zero for static loads.
     fn hertz(&self) -> f64 {
         match self {
             Self::At { hertz, .. } => *hertz,
@@ -144,7 +148,7 @@ impl Loads {
         }
     }
 
-    /// The file that they were read from.
+    /// Returns the file that the loads were read from, if any.
     pub fn source(&self) -> Option<&SourceFile> {
         match self {
             Self::User(loads) => loads.source.as_ref(),
@@ -153,7 +157,7 @@ impl Loads {
         }
     }
 
-    /// Names and nodal forces.
+    /// Returns the names of the loads and their nodal forces, one matrix per group of loads.
     fn forces(&self, model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
         match self {
             Self::Centrifugal => Ok(centrifugal(model)),
@@ -171,7 +175,7 @@ impl Loads {
     }
 }
 
-/// The columns of `loads`, each with its number as its name.
+/// Returns the columns of `loads`, each named by its number.
 fn numbered(what: &str, loads: &Mat<f64>) -> Vec<(String, Mat<f64>)> {
     let one = |j: usize| (format!("{what} {}", j + 1), loads.as_ref().subcols(j, 1).to_owned());
     (0..loads.ncols()).map(one).collect()
@@ -182,12 +186,12 @@ fn centrifugal(model: &FeModel) -> Vec<(String, Mat<f64>)> {
     let rows = InertialRows::new(model, model.centre_of_mass());
     let turning = rows.rigid();
     let momenta = rows.weigh(turning.as_ref().subcols(d, turning.ncols() - d));
-    // A plane body spins about z alone.
+    // A plane body spins about z only.
     let spins: &[(usize, usize)] =
         if d == 2 { &[(2, 2)] } else { &[(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2)] };
     let load = |&(k, l): &(usize, usize)| {
         let mut load = Mat::zeros(momenta.nrows(), 1);
-        // -e_k x (M B_x e_l) of every vector that turns.
+        // -e_k x (M B_x e_l) for every vector that turns with the body, summed over both orders of k and l.
         for (k, l) in if k == l { vec![(k, l)] } else { vec![(k, l), (l, k)] } {
             let momentum = momenta.as_ref().subcols(if d == 2 { 0 } else { l }, 1).to_owned();
             rows.add_turned(|_| -Vector3::ith(k, 1.0), &momentum, &mut load);
@@ -197,7 +201,7 @@ fn centrifugal(model: &FeModel) -> Vec<(String, Mat<f64>)> {
     spins.iter().map(load).collect()
 }
 
-/// The load on each coordinate of every interface.
+/// Returns a unit load on each coordinate of every interface.
 fn interfaces(model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
     let joints = coupled_interfaces(model, "interface loads")?;
     let one = |joint: &CoupledInterface, j: usize| {
@@ -210,18 +214,18 @@ fn interfaces(model: &FeModel) -> Result<Vec<(String, Mat<f64>)>> {
 
 /// All loads side by side.
 pub(super) struct NamedLoads {
-    /// What a static response is called.
+    /// Name of the kind of static response in messages.
     what: String,
     names: Vec<String>,
-    /// N x m.
+    /// Nodal forces (N x m).
     forces: Mat<f64>,
-    /// Of every load the frequency of its oscillation in hertz, and its square w^2 as an eigenvalue; zero: at
-    /// rest.
+    /// Excitation frequency of every load in hertz, and its square w^2 as an eigenvalue; both zero for
+    /// static loads.
     frequencies: Vec<(f64, f64)>,
 }
 
 impl NamedLoads {
-    /// The loads of a model.
+    /// Collects the loads of a model.
     ///
     /// # Errors
     /// [`InterfaceNode`](Code::InterfaceNode) without interfaces, [`Usage`](Code::Usage) at accuracy
@@ -234,7 +238,7 @@ impl NamedLoads {
         Self::of(model, loads, what)
     }
 
-    /// The loads of a model, whatever accuracy the modes have.
+    /// Collects the loads of a model without a check of the requested accuracy of the modes.
     ///
     /// # Errors
     /// [`InterfaceNode`](Code::InterfaceNode) without interfaces.
@@ -253,7 +257,7 @@ impl NamedLoads {
         Ok(Self { what: what.to_owned(), names, forces, frequencies })
     }
 
-    /// The frequencies, each once, with the numbers of its loads.
+    /// Returns each distinct frequency with the indices of its loads.
     fn by_frequency(&self) -> Vec<((f64, f64), Vec<usize>)> {
         let mut groups: Vec<((f64, f64), Vec<usize>)> = Vec::new();
         for (j, frequency) in self.frequencies.iter().enumerate() {
@@ -266,8 +270,9 @@ impl NamedLoads {
     }
 }
 
-/// Adds the static responses to `loads` to free-surface modes: M-orthonormalised against them and among each
-/// other, Ritz vectors of the span. What they add nothing to is left out and said.
+/// Adds the responses to `loads` to free-surface modes: M-orthonormalises them against the modes and
+/// against each other and returns the Ritz vectors of the span. Loads whose responses add nothing are
+/// dropped and reported in a diagnostic.
 pub(super) fn with_residual_vectors(
     model: &FeModel,
     problem: &EigenProblem<'_>,
@@ -291,7 +296,8 @@ pub(super) fn with_residual_vectors(
     let truncation = responses.truncation(problem, &ritz);
     let mut notes = free.diagnostics;
     notes.extend(added.note(loads));
-    // What was proved of the free modes stays: the Ritz values of the others lie above the next eigenvalue.
+    // The proofs about the free modes stay valid: the Ritz values of the other modes lie above the next
+    // eigenvalue.
     let solution = EigenSolution {
         eigenvalues: ritz.eigenvalues,
         vectors: ritz.vectors,
@@ -304,8 +310,9 @@ pub(super) fn with_residual_vectors(
     Ok(basis)
 }
 
-/// Part of the static response to every load at an interface that the `free` modes lack. Empty without interfaces,
-/// and if the responses cannot be computed in the memory that there is: they need a factor of K - sigma M.
+/// Returns, for the static response to every load at an interface, the part outside the span of the `free`
+/// modes. The list is empty without interfaces, and if the responses do not fit the memory: they need a
+/// factor of K - sigma M.
 pub(super) fn interface_truncation(
     model: &FeModel,
     free: &EigenSolution,
@@ -328,9 +335,10 @@ pub(super) fn interface_truncation(
     found().unwrap_or_default()
 }
 
-/// True if the responses to all loads at interfaces fit the memory beside a factor like that of the search.
+/// Returns true if the responses to all loads at interfaces fit the memory beside a factor of the size that
+/// the modal search used.
 fn responses_fit(model: &FeModel, free: &EigenSolution, context: &Context<'_>) -> bool {
-    /// Blocks of all loads that are held at once: forces, responses, and these times K and M.
+    /// Number of blocks of all loads held at once: forces, responses, and their products with K and M.
     const BLOCKS: usize = 5;
     let loads = |set: &NodeSet| if set.coupling() == Coupling::Free { 3 * set.nodes.len() } else { 6 };
     let columns: usize = model.interfaces().iter().map(loads).sum();
@@ -339,7 +347,7 @@ fn responses_fit(model: &FeModel, free: &EigenSolution, context: &Context<'_>) -
     bytes.saturating_add(factor) <= context.available()
 }
 
-/// What free modes do not have of the responses to loads (N x m).
+/// Returns the parts of the responses to `loads` that lie outside the span of the free modes (N x m).
 fn beside_modes(
     model: &FeModel,
     problem: &EigenProblem<'_>,
@@ -367,7 +375,7 @@ fn beside_modes(
     Ok(beside)
 }
 
-/// Why there is no response at a frequency.
+/// Returns the error for a failed response at a frequency.
 fn no_response(model: &FeModel, hertz: f64, failure: EigenFailure) -> Error {
     let EigenFailure::Inaccurate { residual } = failure else { return explain(model, failure) };
     let message =
@@ -377,19 +385,19 @@ fn no_response(model: &FeModel, hertz: f64, failure: EigenFailure) -> Error {
         .into()
 }
 
-/// Responses to loads, and what free modes have of them.
+/// Responses to loads and their parts outside the free modes.
 struct Responses<'a> {
     loads: &'a NamedLoads,
-    /// K^+ f, at a frequency (K - w^2 M)^-1 f, without what the modes have of it (N x m).
+    /// Part of K^+ f, or at a frequency of (K - w^2 M)^-1 f, outside the span of the modes (N x m).
     beside: Mat<f64>,
-    /// The same with what the modes have of K^+ f (N x m).
+    /// Whole response: `beside` plus the modal part of K^+ f (N x m).
     whole: Mat<f64>,
-    /// Squares of the norms of the whole responses in K and in M, and of what is beside the modes.
+    /// Squared norms of the whole responses and of `beside` in K and in M.
     energy: Vec<f64>,
     mass: Vec<f64>,
     energy_beside: Vec<f64>,
     mass_beside: Vec<f64>,
-    /// Whether each load deforms the body.
+    /// True for each load that deforms the body.
     deforms: Vec<bool>,
 }
 
@@ -402,7 +410,7 @@ impl<'a> Responses<'a> {
     ) -> Self {
         let (pencil, forces) = (&problem.pencil, &loads.forces);
         let (modes, lambda) = (free.vectors.as_ref(), &free.eigenvalues);
-        // K^+ f = Psi Lambda^-1 Psi'f + what the modes do not have.
+        // K^+ f = Psi Lambda^-1 Psi'f + the part outside the modes.
         let modal = gram(modes, forces.as_ref());
         let amplitudes = Mat::from_fn(modal.nrows(), modal.ncols(), |p, j| modal[(p, j)] / lambda[p]);
         let mut whole = beside.clone();
@@ -424,7 +432,8 @@ impl<'a> Responses<'a> {
         }
     }
 
-    /// What the modes lack, M-orthonormalised against them; `None` when M is indefinite.
+    /// Returns the parts outside the modes, M-orthonormalised against the modes. Returns `None` if M is
+    /// indefinite.
     fn added(&self, problem: &EigenProblem<'_>, modes: MatRef<'_, f64>) -> Option<Added> {
         let names = &self.loads.names;
         let mut dropped: Vec<String> = Vec::new();
@@ -452,7 +461,7 @@ impl<'a> Responses<'a> {
         Some(Added { vectors: found.vectors, kept, dropped })
     }
 
-    /// Returns the part of each static response that the free modes alone lack.
+    /// Returns the truncated part of each static response for the free modes alone.
     fn lacking(&self) -> Vec<Truncation> {
         let lacking = |(j, load): (usize, &String)| {
             let error = self.error(self.energy_beside[j], j);
@@ -461,12 +470,14 @@ impl<'a> Responses<'a> {
         self.loads.names.iter().enumerate().map(lacking).collect()
     }
 
-    /// Norm in K of a part of the response `j`, given by its square, relative to that of the whole response.
+    /// Returns the K-norm of a part of the response `j`, given by its square, relative to the K-norm of the
+    /// whole response.
     fn error(&self, part: f64, j: usize) -> f64 {
         if self.deforms[j] { (part.max(0.0) / self.energy[j]).sqrt() } else { 0.0 }
     }
 
-    /// What the free modes lack of each static response, and what the modes of the whole span do.
+    /// Returns the relative truncation error of each static response, for the free modes alone and for the
+    /// modes of the extended span.
     fn truncation(mut self, problem: &EigenProblem<'_>, ritz: &EigenSolution) -> Vec<Truncation> {
         let modal = gram(ritz.vectors.as_ref(), self.loads.forces.as_ref());
         let amplitudes =
@@ -484,7 +495,7 @@ impl<'a> Responses<'a> {
     }
 }
 
-/// Which loads do more than move the body as a whole.
+/// Returns, for every load, true if the load does more than move the body as a rigid body.
 fn deforming(problem: &EigenProblem<'_>, forces: &Mat<f64>, energy: &[f64]) -> Vec<bool> {
     let resultants = gram(problem.rigid, forces.as_ref());
     let equilibrated = forces - problem.pencil.apply_mass(problem.rigid) * resultants;
@@ -494,19 +505,20 @@ fn deforming(problem: &EigenProblem<'_>, forces: &Mat<f64>, energy: &[f64]) -> V
     (0..forces.ncols()).map(deforms).collect()
 }
 
-/// The responses that join the free modes.
+/// Responses that are added to the free modes.
 struct Added {
     /// M-orthonormal, M-orthogonal to rigid motions and free modes.
     vectors: Mat<f64>,
-    /// The load that each of them came from.
+    /// Index of the load of each vector.
     kept: Vec<usize>,
-    /// Names of the other loads, each with the reason.
+    /// Names of the dropped loads, each with the reason.
     dropped: Vec<String>,
 }
 
 impl Added {
-    /// What each mode is made of: a free mode, or mostly the response to a load. `parts` (span x modes) are
-    /// the products of the modes with the vectors of the span, `free` of which are free modes.
+    /// Returns the origin of each mode: a free mode, or mostly the response to a load. `parts` (span x
+    /// modes) holds the products of the modes with the vectors of the span, the first `free` of which are
+    /// free modes.
     fn provenance(&self, loads: &NamedLoads, parts: MatRef<'_, f64>, free: usize) -> Vec<String> {
         let origin = |p: usize| {
             let share = |c: usize| parts[(c, p)].powi(2);
@@ -521,7 +533,7 @@ impl Added {
         (0..parts.ncols()).map(origin).collect()
     }
 
-    /// What the user should know of the loads that are left out.
+    /// Returns a diagnostic that lists the dropped loads, if there are any.
     fn note(&self, loads: &NamedLoads) -> Option<Diagnostic> {
         let NamedLoads { what, names, .. } = loads;
         let dropped = &self.dropped;

@@ -1,4 +1,4 @@
-//! The rigid modes, which every basis is freed from.
+//! Rigid modes, which are removed from every basis.
 
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -6,11 +6,11 @@ use flexbody_base::error::{Error, Result};
 use flexbody_linalg::{Pencil, combine, gram, symmetric_eigen};
 use flexbody_model::{FeModel, centre_and_length};
 
-/// The rigid modes of a model from its node positions (N x 6, in the plane N x 3); orthonormal in the mass of
-/// `pencil`.
+/// Returns the rigid modes of a model from its node positions (N x 6, in the plane N x 3), orthonormal in
+/// the mass of `pencil`.
 ///
 /// # Errors
-/// [`BodyDegenerate`](Code::BodyDegenerate) where the nodes or the mass lie on one line.
+/// [`BodyDegenerate`](Code::BodyDegenerate) if the nodes or the mass lie on one line.
 pub fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
     let positions = &model.nodes().positions;
     let (centre, length) = centre_and_length(positions);
@@ -26,15 +26,16 @@ pub fn rigid_modes(model: &FeModel, pencil: &Pencil<'_>) -> Result<Mat<f64>> {
         let root = Mat::from_fn(r.ncols(), r.ncols(), |i, j| eigen.vectors[(i, j)] / eigen.values[j].sqrt());
         Some(combine(r.as_ref(), root.as_ref()))
     };
-    // Twice: the second pass removes what the condition of the first Gram matrix left.
+    // Orthonormalise twice: the second pass removes the error due to the condition of the first Gram
+    // matrix.
     orthonormal(&fields)
         .and_then(|once| orthonormal(&once))
         .ok_or_else(|| Error::from(degenerate(model, centre, length)))
 }
 
-/// FB416: whether the nodes lie on one line, or only their mass does.
+/// Returns the error FB416, which says if the nodes lie on one line, or only their mass.
 fn degenerate(model: &FeModel, centre: [f64; 3], length: f64) -> Diagnostic {
-    /// Nodes closer to a line than this part of the extent of the body lie on it.
+    /// Distance from a line, relative to the extent of the body, below which nodes lie on it.
     const ON_LINE: f64 = 1e-7;
     let positions = &model.nodes().positions;
     let nodes = positions.len();

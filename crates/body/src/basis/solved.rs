@@ -1,5 +1,5 @@
-//! Free-surface modes that another eigen-solver found for the same K and M: Rayleigh quotients and residuals
-//! are computed anew, and nothing is taken on trust but, where no count of our own is wanted, the count.
+//! Free-surface modes from another eigen-solver for the same K and M. Rayleigh quotients and residuals are
+//! recomputed. Only the inertia count may be taken from the other solver, if no own count is requested.
 
 use super::BasisKind;
 use super::failure::explain;
@@ -15,35 +15,35 @@ use flexbody_eigen::{
 use flexbody_linalg::larger;
 use flexbody_model::FeModel;
 
-/// The inertia count of another program.
+/// Inertia count made by another program.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CountElsewhere {
-    /// Negative pivots of K - shift M.
+    /// Number of negative pivots of K - shift M.
     pub negative: usize,
-    /// Pivots that were zero.
+    /// Number of zero pivots.
     pub zero: usize,
-    /// The shift.
+    /// Shift of the count, an eigenvalue.
     pub shift: f64,
-    /// Whose count it is, as in `MUMPS of PETSc 3.18.5`.
+    /// Name of the program, such as `MUMPS of PETSc 3.18.5`.
     pub by: String,
 }
 
-/// Modes of a model as another eigen-solver found them.
+/// Modes of a model from another eigen-solver.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SolvedModes {
-    /// N x k by internal rows, ascending: the wanted modes and all others of their last eigenvalue.
+    /// Modes by internal rows (N x k), ascending: the wanted modes and all others of their last eigenvalue.
     pub vectors: Mat<f64>,
-    /// The eigenvalues that the solver states.
+    /// Eigenvalues as stated by the solver.
     pub eigenvalues: Vec<f64>,
-    /// The eigenvalue after them, where the solver has it.
+    /// Next eigenvalue after the last, if the solver found it.
     pub next_eigenvalue: Option<f64>,
-    /// The count, where there is one.
+    /// Inertia count of the solver, if there is one.
     pub count: Option<CountElsewhere>,
-    /// Which solver it was, for settings: `slepc`.
+    /// Name of the solver for settings, such as `slepc`.
     pub engine: String,
-    /// Whether the built-in inertia count is made.
+    /// True if the built-in inertia count is to be made.
     pub prove: bool,
-    /// The file that they were read from.
+    /// File that the modes were read from.
     pub source: SourceFile,
 }
 
@@ -56,7 +56,7 @@ impl Basis for SolvedModes {
         let Task { model, settings, context } = *task;
         let rigid = rigid_modes(model, &model.pencil())?;
         let problem = problem_of_span(model, rigid.as_ref());
-        // All that were found: the modes of one eigenvalue get their canonical form together.
+        // Use all modes found: the modes of one eigenvalue get their canonical form together.
         let accuracy = match (self.prove, settings.accuracy) {
             (false, _) => Accuracy::Fast,
             (true, Accuracy::Fast) => Accuracy::Standard,
@@ -75,7 +75,7 @@ impl Basis for SolvedModes {
 }
 
 impl SolvedModes {
-    /// Refuses what are no eigenvectors of the model.
+    /// Returns an error if the columns are no eigenvectors of the model.
     fn refuse_others(&self, solution: &EigenSolution, accuracy: Accuracy) -> Result<()> {
         let inaccurate =
             |message: String| Err(Error::from(Diagnostic::new(Code::ClusterInaccurate, message)));
@@ -99,8 +99,8 @@ impl SolvedModes {
         }
     }
 
-    /// What is known of missed modes: by the count of our own where it was made, else by that of the solver,
-    /// which is then named.
+    /// Returns the completeness by the built-in count if it was made, otherwise by the count of the solver,
+    /// whose name then appears.
     fn completeness(&self, model: &FeModel, rigid: usize, own: Completeness) -> Result<Completeness> {
         let missing = |message: String| {
             let found = Diagnostic::new(Code::CompletenessFailed, message);
@@ -130,7 +130,7 @@ impl SolvedModes {
         Ok(Completeness { proof, shift: *shift, negative_pivots, modes_below: below, remark })
     }
 
-    /// Leaves the wanted modes; what there is to say of the others.
+    /// Keeps only the wanted modes and returns diagnostics about the others.
     fn cut(&self, model: &FeModel, solution: &mut EigenSolution, wanted: Wanted) -> Vec<Diagnostic> {
         let found = solution.eigenvalues.len();
         let given = match wanted {
@@ -166,7 +166,8 @@ impl SolvedModes {
         notes
     }
 
-    /// Whose word completeness is.
+    /// Returns a diagnostic about the program that counted the modes, unless the built-in count proved
+    /// them.
     fn told(&self, model: &FeModel, completeness: &Completeness) -> Option<Diagnostic> {
         let Completeness { proof, negative_pivots, remark, .. } = completeness;
         let help = "flexbody assemble --prove counts once more, where its factor fits the memory";

@@ -1,4 +1,4 @@
-//! Modes of a model in the frame of its body, and back.
+//! Transformation of modes between a model and the frame of its body.
 
 use crate::flex_body::{FlexBody, Frame, InternalRows};
 use crate::invariants::{
@@ -14,7 +14,7 @@ use flexbody_model::{DirectorMass, FeModel, NodeMoments, rigid_count};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
-/// The body frame and the node positions in it.
+/// Body frame and the node positions in it.
 pub struct NodesInFrame {
     /// Origin and axes of the body frame in model coordinates.
     pub frame: Frame,
@@ -23,56 +23,57 @@ pub struct NodesInFrame {
 }
 
 impl NodesInFrame {
-    /// Moves the nodes of `model` into `frame`.
+    /// Transforms the nodes of `model` to `frame`.
     pub fn new(model: &FeModel, frame: Frame) -> Self {
         Self { frame, positions: frame.to_body(&model.nodes().positions) }
     }
 }
 
-/// Unit translations along the axes of a frame and unit rotations about them (rows of the model).
+/// Returns unit translations along the axes of a frame and unit rotations about them (rows of the model).
 fn rigid_fields(model: &FeModel, frame: &Frame) -> Mat<f64> {
     let mut fields = model.rigid_fields(frame.origin.into(), 1.0);
     frame.rotate_rigid(&mut fields);
     fields
 }
 
-/// R'MR of the unit translations and rotations of a frame.
+/// Returns R'MR of the unit translations and rotations of a frame.
 pub fn rigid_mass(model: &FeModel, frame: &Frame) -> Mat<f64> {
     let rigid = rigid_fields(model, frame);
     gram(rigid.as_ref(), model.pencil().apply_mass(rigid.as_ref()).as_ref())
 }
 
-/// Psi' A Psi, where the matrix A and the modes are in model axes.
+/// Returns Psi' A Psi for a matrix A and modes in model axes.
 pub(super) fn reduced(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
     let mut product = zeros(vectors.nrows(), vectors.ncols());
     multiply(a, 1, vectors, product.as_mut());
     symmetric_part(&gram(vectors, product.as_ref()))
 }
 
-/// [`reduced`], rounded once at its end.
+/// Returns Psi' A Psi as [`reduced`] does, accumulated in twice the precision and rounded once at the end.
 pub(super) fn reduced_in_twice_the_precision(a: &SymmetricMatrix, vectors: MatRef<'_, f64>) -> Mat<f64> {
     let projection = projection_compensated(a, vectors);
     Mat::from_fn(vectors.ncols(), vectors.ncols(), |i, j| projection[i][j].hi)
 }
 
-/// The modes of a body.
+/// Modes of a body in model axes and in body axes.
 pub struct BodyModes {
-    /// In the rows and axes of the model.
+    /// Modes in the rows and axes of the model (N x nf).
     pub vectors: Mat<f64>,
-    /// Displacements in body axes, three per node and then per vector without a place.
+    /// Displacements in body axes: three per node, then three per vector without a position.
     pub displacements: Mat<f64>,
-    /// Rotations in body axes, three per node, zero where a node has none.
+    /// Rotations in body axes, three per node, zero at nodes without rotations.
     pub rotations: Option<Mat<f64>>,
-    /// Rows without a place: vectors in body axes, then massless rows.
+    /// Rows without a position: vectors in body axes, then massless rows.
     pub internal: Option<InternalRows>,
-    /// What the modes of the search were multiplied by.
+    /// Sign that each mode of the search was multiplied by.
     pub signs: Vec<f64>,
     nodes: usize,
 }
 
 impl BodyModes {
-    /// The modes `vectors` (N x nf, model axes) with canonical signs in body axes: the component of largest
-    /// magnitude is positive, rotations of nodes times the size of the body.
+    /// Creates the modes of a body from `vectors` (N x nf, model axes) with canonical signs in body axes:
+    /// the component of largest magnitude is positive, where rotations of nodes count times the size of the
+    /// body.
     pub fn new(model: &FeModel, place: &NodesInFrame, mut vectors: Mat<f64>) -> Self {
         let rows = model.rows();
         let (nodes, nf) = (model.nodes().len(), vectors.ncols());
@@ -107,7 +108,8 @@ impl BodyModes {
         Self { vectors, displacements, rotations, internal, signs, nodes }
     }
 
-    /// The modes of a body that was made of `model`; `None` when it lacks rows of the model, or has others.
+    /// Returns the modes of a body that was made from `model`; `None` if the body has other rows than the
+    /// model.
     pub fn of_body(model: &FeModel, body: &FlexBody) -> Option<Self> {
         let modes = body.modes();
         Some(Self {
@@ -120,17 +122,17 @@ impl BodyModes {
         })
     }
 
-    /// Displacements of the nodes (3n x nf).
+    /// Returns the displacements of the nodes (3n x nf).
     pub fn of_nodes(&self) -> MatRef<'_, f64> {
         self.displacements.as_ref().subrows(0, 3 * self.nodes)
     }
 
-    /// The invariants, by the formulas that the mass of `model` allows.
+    /// Condenses the modes by the formulas that fit the mass of `model`.
     pub fn condensed(&self, model: &FeModel, place: &NodesInFrame, modal_stiffness: Mat<f64>) -> Invariants {
         self.by(model, place, modal_stiffness, condense, condense_general)
     }
 
-    /// The same without W2 and W3, of mass-normalised modes: rigid motion alone is multiplied by M.
+    /// Condenses mass-normalised modes without W2 and W3: only rigid motion is multiplied by M.
     pub fn condensed_linear(
         &self,
         model: &FeModel,
@@ -140,7 +142,7 @@ impl BodyModes {
         self.by(model, place, modal_stiffness, condense_linear, condense_general_linear)
     }
 
-    /// The stiffnesses of inertia of nodes with rotational mass; `None` where there are none.
+    /// Returns the stiffness of inertia of nodes with rotational mass; `None` if there are none.
     pub fn inertia_stiffness(&self, model: &FeModel, frame: &Frame) -> Option<InertiaStiffness> {
         let (mass, rotations) = (model.director_mass()?, self.rotations.as_ref()?);
         let mut fields = mass.extend_rigid(model.rigid_fields(frame.origin.into(), 1.0).as_ref());
@@ -153,7 +155,7 @@ impl BodyModes {
         Some(InertiaStiffness::new(moments, rotations.as_ref(), model.dimension()))
     }
 
-    /// Columns that the condensation with and without W2 or W3 multiplies by M.
+    /// Returns the number of columns that the condensation multiplies by M; `linear` omits W2 and W3.
     pub fn condensed_columns(&self, model: &FeModel, linear: bool) -> u64 {
         let nf = self.vectors.ncols() as u64;
         match (model.scalar_mass(), linear) {
@@ -165,7 +167,7 @@ impl BodyModes {
         }
     }
 
-    /// The invariants by the formulas `solid` or `general`.
+    /// Condenses by the formulas `solid` or `general`, depending on the mass of `model`.
     fn by(
         &self,
         model: &FeModel,
@@ -191,9 +193,9 @@ impl BodyModes {
         general(model.pencil().mass(), &motion, self.vectors.as_ref(), modal_stiffness)
     }
 
-    /// The invariants of a mass of points and directors: about the centre of mass, then about the origin of the
-    /// frame. What does not turn with the nodes belongs to no frame but the one it is condensed in; so a body is
-    /// the same whatever frame it is described in.
+    /// Condenses a mass of points and directors about the centre of mass, then shifts the result to the
+    /// origin of the frame. The part of the mass that does not turn with the nodes depends on the frame of
+    /// the condensation; with the centre of mass the body does not depend on the frame of its description.
     fn of_directors(
         &self,
         model: &FeModel,
@@ -212,21 +214,21 @@ impl BodyModes {
     }
 }
 
-/// The centre of mass in a frame.
+/// Returns the centre of mass in a frame.
 fn centre_of_mass(model: &FeModel, frame: &Frame) -> Vector3<f64> {
     let (mass, first_moment) = rigid_first_moment(rigid_mass(model, frame).as_ref());
     first_moment / mass
 }
 
-/// The rows without a place of modes in model rows (`vectors`), of which `displacements` has the vectors in
-/// body axes.
+/// Returns the rows without a position of modes in model rows (`vectors`); `displacements` holds their
+/// vectors in body axes.
 fn internal(model: &FeModel, vectors: &Mat<f64>, displacements: &Mat<f64>) -> Option<InternalRows> {
     let [moving, massless] = model.rows().without_place();
     let label = |row: usize| {
         let label = model.label(row);
         [label.node, i64::from(label.direction)]
     };
-    // In the plane vectors have two rows here and three in space, as nodes have.
+    // Vectors have two rows in a plane model and three in the body, as nodes do.
     let of_vectors = moving.step_by(model.dimension()).flat_map(|row| {
         let [node, _] = label(row);
         (1..=3).map(move |direction| [node, direction])
@@ -241,7 +243,7 @@ fn internal(model: &FeModel, vectors: &Mat<f64>, displacements: &Mat<f64>) -> Op
     (!dofs.is_empty()).then_some(InternalRows { dofs, shape })
 }
 
-/// Shapes with three components per node: those of a plane model (2n x nf) have none along z.
+/// Returns shapes with three components per node; shapes of a plane model (2n x nf) get zeros along z.
 fn in_space(shapes: MatRef<'_, f64>, dimension: usize) -> Mat<f64> {
     if dimension == 3 {
         return copied(shapes);

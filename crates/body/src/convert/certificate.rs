@@ -1,15 +1,16 @@
-//! What is proved of the modes of a body, and what rounding leaves.
+//! Certificate of a body: proofs about its modes, and bounds of rounding.
 
 use super::ModalModel;
 use crate::flex_body::{Certificate, Guarantee};
 use flexbody_eigen::{Proof, energy_noise};
 use flexbody_model::rigid_count;
 
-/// How many standard deviations of its rounding an entry of Psi' K Psi may be off: none of many is.
+/// Number of standard deviations of its rounding error that an entry of Psi' K Psi may deviate: large
+/// enough for all of many entries.
 const ROUNDINGS: f64 = 10.0;
 
 impl ModalModel<'_> {
-    /// The certificate of the body.
+    /// Returns the certificate of the body.
     pub(super) fn certificate(&self, guarantee: Option<Guarantee>) -> Certificate {
         let Self { model, found, .. } = self;
         let completeness = &found.solution.completeness;
@@ -29,12 +30,13 @@ impl ModalModel<'_> {
         }
     }
 
-    /// What rounding of the products with K may leave in Psi' K Psi, relative to sqrt(lambda_p lambda_q).
+    /// Returns a bound of the rounding errors of products with K in Psi' K Psi, relative to sqrt(lambda_p
+    /// lambda_q).
     ///
-    /// Errors of the size of a roundoff in the entries of K change psi_p' K psi_q by sum_ij dK_ij psi_ip psi_jq,
-    /// whose standard deviation the Cauchy-Schwarz inequality bounds by the root of those of psi_p' K psi_p and
-    /// psi_q' K psi_q: the matrix of the squares K_ij^2 is positive semidefinite like K. The largest of these
-    /// relative to its eigenvalue bounds every entry.
+    /// Rounding errors in the entries of K change psi_p' K psi_q by sum_ij dK_ij psi_ip psi_jq. The
+    /// Cauchy-Schwarz inequality bounds the standard deviation by the geometric mean of those of psi_p' K
+    /// psi_p and psi_q' K psi_q, since the matrix of the squares K_ij^2 is positive semidefinite like K.
+    /// The largest of these relative to its eigenvalue bounds every entry.
     fn eigenvalue_rounding(&self) -> f64 {
         let noise = energy_noise(self.model.stiffness(), self.modes.vectors.as_ref(), f64::EPSILON);
         let relative =

@@ -1,27 +1,26 @@
-//! The condensation of the mass into invariants, in one or two steps.
+//! Condensation of the mass into invariants, in one or two steps.
 
 use super::ModalModel;
 use crate::flex_body::{Guarantee, TermDecision, TermGroup, TermGroups};
 use crate::invariants::{Invariants, condense_certified};
 
-/// The mass of a model condensed on its modes: what the invariants are, how sure their digits are, and what
-/// is left out.
+/// Mass of a model condensed on its modes: the invariants, their guaranteed digits, and the dropped groups.
 ///
-/// Without W2 and W3 no product with M is formed but that of rigid motion, and of solids no nf x nf array but
-/// K_ff and m_ff (theory section 4).
+/// Without W2 and W3, M is multiplied by rigid motion only, and for solids no nf x nf arrays except K_ff
+/// and m_ff are formed (theory section 4).
 #[derive(Debug, Clone)]
 pub struct Condensation {
     pub(super) invariants: Invariants,
-    /// What accuracy `certified` proves.
+    /// Guaranteed bounds of accuracy `certified`.
     pub(super) guarantee: Option<Guarantee>,
-    /// Why groups of the kinetic energy are there or not; empty where nobody decided.
+    /// Reason for keeping or dropping each group; empty if no selection was made.
     pub(super) terms: Vec<TermDecision>,
-    /// Columns that were multiplied by M.
+    /// Number of columns multiplied by M.
     pub(super) columns: u64,
 }
 
 impl ModalModel<'_> {
-    /// I0 and W1: enough for a scene to decide about the groups W2 and W3.
+    /// Condenses I0 and W1, enough for a scene to decide about the groups W2 and W3.
     pub fn condense_linear(&self) -> Condensation {
         let stiffness = self.modal_stiffness.clone();
         let invariants = self.modes.condensed_linear(self.model, &self.place, stiffness);
@@ -33,7 +32,7 @@ impl ModalModel<'_> {
         }
     }
 
-    /// All groups.
+    /// Condenses all groups.
     pub fn condense(&self) -> Condensation {
         let columns = self.modes.condensed_columns(self.model, false);
         let (invariants, guarantee) = match self.certified() {
@@ -46,8 +45,8 @@ impl ModalModel<'_> {
         Condensation { invariants, guarantee, terms: Vec::new(), columns }
     }
 
-    /// What `terms` keep of the groups, where `linear` is known. Accuracy `certified` condenses everything
-    /// first: its digits are about the whole.
+    /// Condenses the groups that `terms` keep; `linear` holds the data already known. Accuracy `certified`
+    /// condenses everything first, since its digits refer to all data.
     pub fn condense_kept(&self, linear: Condensation, terms: Vec<TermDecision>) -> Condensation {
         let dropped = terms.iter().filter(|term| !term.kept);
         let groups =
@@ -63,7 +62,8 @@ impl ModalModel<'_> {
         Condensation { invariants: condensed.invariants.with_groups(groups), terms, ..condensed }
     }
 
-    /// Invariants in double-double arithmetic with guaranteed digits, where the modes have guaranteed bounds.
+    /// Returns the invariants in double-double arithmetic with guaranteed digits, if the modes have
+    /// guaranteed bounds.
     fn certified(&self) -> Option<(Invariants, Guarantee)> {
         let (bounds, mass) = (self.found.solution.bounds.as_ref()?, self.model.scalar_mass()?);
         let shapes = self.modes.displacements.as_ref();
@@ -81,7 +81,7 @@ impl ModalModel<'_> {
     }
 }
 
-/// The decision about a group before there is one.
+/// Returns the placeholder decision about a group that is not computed yet.
 fn not_computed(group: TermGroup) -> TermDecision {
     let reason = "not computed yet".to_owned();
     TermDecision { group, kept: false, tier: 0, bound: 0.0, limit: 0.0, reason }

@@ -1,5 +1,4 @@
-//! The last stage of a conversion: the body, what lumped masses would have given, and what the user should
-//! know.
+//! Last stage of a conversion: the body, the lumped comparators, and diagnostics.
 
 use super::geometric_stiffness::softening_warning;
 use super::remarks::{free_frequencies, interface_compliance, poor_fits};
@@ -19,26 +18,26 @@ use flexbody_model::FeModel;
 /// A finished conversion.
 #[derive(Debug, Clone)]
 pub struct Conversion {
-    /// The product.
+    /// Converted body.
     pub body: FlexBody,
     /// Mass properties in model axes.
     pub mass_properties: MassProperties,
-    /// Fully lumped pipelines, where asked for.
+    /// Results of the fully lumped pipelines that were requested.
     pub lumped_modes: Vec<LumpedPipeline>,
     /// Work of the eigen-solver.
     pub work: Work,
-    /// Columns that the condensation multiplied by M, for the consistent mass.
+    /// Number of columns that the condensation of the consistent mass multiplied by M.
     pub condensed_columns: u64,
-    /// Memory and precision as decided before the work; none on the dense path.
+    /// Memory and precision as decided before the work; `None` on the dense path.
     pub plan: Option<Plan>,
     /// Warnings and notes.
     pub diagnostics: Vec<Diagnostic>,
 }
 
-/// Converts a checked model.
+/// Converts a checked model to a body.
 ///
 /// # Errors
-/// Those of [`ModalModel::find`], and of a damping that feeds energy to the modes.
+/// The errors of [`ModalModel::find`]; an error for damping that adds energy to the modes.
 pub fn convert(model: &FeModel, settings: &ConvertSettings, context: &Context<'_>) -> Result<Conversion> {
     let modal = ModalModel::find(model, settings, context)?;
     let condensed = modal.condense();
@@ -46,18 +45,19 @@ pub fn convert(model: &FeModel, settings: &ConvertSettings, context: &Context<'_
 }
 
 impl ModalModel<'_> {
-    /// The body with what is condensed so far, without comparators: what a scene decides on.
+    /// Returns the body with the groups condensed so far, without comparators. A selection for a scene
+    /// works on this body.
     ///
     /// # Errors
-    /// Of a damping that feeds energy to the modes.
+    /// An error for damping that adds energy to the modes.
     pub fn body(&self, condensed: &Condensation) -> Result<FlexBody> {
         FlexBody::new(self.parts(condensed, Vec::new())?.0)
     }
 
-    /// The conversion with what was condensed.
+    /// Finishes the conversion with the condensed data.
     ///
     /// # Errors
-    /// Of a damping that feeds energy to the modes, and of a comparator.
+    /// Errors for damping that adds energy to the modes, and for a comparator that fails.
     pub fn finish(self, condensed: Condensation, context: &Context<'_>) -> Result<Conversion> {
         let exact = &condensed.invariants;
         context.phase("lumped comparison");
@@ -83,8 +83,7 @@ impl ModalModel<'_> {
         })
     }
 
-    /// Everything that a body is made of, and a warning about modes that are damped beyond the critical
-    /// damping.
+    /// Returns all parts of the body, and a warning about modes damped beyond critical damping.
     fn parts(
         &self,
         condensed: &Condensation,
@@ -116,7 +115,7 @@ impl ModalModel<'_> {
         Ok((parts, overdamped))
     }
 
-    /// Where the body comes from.
+    /// Returns the provenance of the body.
     fn source(&self) -> Source {
         let (model, settings) = (self.model, self.settings);
         Source {
@@ -134,7 +133,7 @@ impl ModalModel<'_> {
         }
     }
 
-    /// Part of the mass that does not turn with the nodes, where there is any.
+    /// Returns a text about the part of the mass that does not turn with the nodes, if there is any.
     fn approximation(&self) -> Option<String> {
         let share = self.model.fixed_mass_share();
         (share > 0.0).then(|| {
@@ -144,7 +143,7 @@ impl ModalModel<'_> {
         })
     }
 
-    /// The modes with the damping that the model states.
+    /// Returns the modes with the damping of the model, and a warning about overdamped modes.
     fn damped_modes(&self, invariants: &Invariants) -> Result<(Modes, Option<Diagnostic>)> {
         let solution = &self.found.solution;
         let eigenvalues = &solution.eigenvalues;
@@ -167,14 +166,14 @@ impl ModalModel<'_> {
         Ok((modes, overdamped))
     }
 
-    /// Motions of the interfaces as coordinates, in body axes, for bases that have them.
+    /// Returns K and M in interface coordinates, in body axes, for bases that have them.
     fn coordinates(&self) -> Option<InterfaceCoordinates> {
         let own = self.found.coordinates.as_ref()?;
         let axes = &self.place.frame.axes;
         Some(own.in_axes(axes, self.model.dimension(), &self.modes.signs))
     }
 
-    /// Warnings and notes about the finished body.
+    /// Returns warnings and notes about the finished body.
     fn remarks(&self, overdamped: Option<Diagnostic>, body: &FlexBody) -> Vec<Diagnostic> {
         let softening = softening_warning(self.model, &self.settings.basis, body);
         let found = self.found.diagnostics.iter().cloned();

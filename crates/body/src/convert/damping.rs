@@ -1,4 +1,4 @@
-//! Damping of the modes: what the user states, reduced to them.
+//! Damping of the modes: the damping of the model, reduced to the modes.
 
 use super::body_modes::reduced;
 use crate::invariants::Invariants;
@@ -9,26 +9,26 @@ use flexbody_eigen::energy_noise;
 use flexbody_linalg::{SymmetricMatrix, symmetric_eigen};
 use flexbody_model::{Damping, FeModel, ratio_at};
 
-/// Standard deviations of what the digits of D leave that count as rounding.
+/// Number of standard deviations of the noise due to the digits of D that count as rounding.
 const NOISE_FACTOR: f64 = 30.0;
 
-/// Smallest eigenvalue of the damping, scaled to a unit diagonal, that still is rounding.
+/// Smallest eigenvalue of the damping, scaled to a unit diagonal, that counts as rounding.
 const SEMIDEFINITE: f64 = -1e-8;
 
 /// Damping of modes.
 pub struct ModalDamping {
     /// Psi' D Psi (nf x nf). Unit: 1/time.
     pub matrix: Mat<f64>,
-    /// Its diagonal over 2 omega_j.
+    /// Damping ratios: diagonal of `matrix` over 2 omega_j.
     pub ratio: Vec<f64>,
-    /// When modes are damped beyond the critical damping.
+    /// Warning about modes damped beyond critical damping.
     pub warning: Option<Diagnostic>,
 }
 
-/// Damping of the modes `vectors` (N x nf, model axes); `None` when none is stated.
+/// Returns the damping of the modes `vectors` (N x nf, model axes); `None` if the model has no damping.
 ///
 /// # Errors
-/// [`DampingIndefinite`](Code::DampingIndefinite).
+/// [`DampingIndefinite`](Code::DampingIndefinite) if the damping adds energy to a motion.
 pub fn modal_damping(
     model: &FeModel,
     vectors: MatRef<'_, f64>,
@@ -42,7 +42,7 @@ pub fn modal_damping(
         (Mat::from_fn(critical.len(), critical.len(), diagonal), ratio)
     };
     let from_matrix = |matrix: Mat<f64>| {
-        // What is below zero here is rounding: anything else was refused.
+        // Negative values are rounding here: other negative values were rejected.
         let ratio = critical.iter().enumerate().map(|(j, c)| matrix[(j, j)].max(0.0) / c).collect();
         (matrix, ratio)
     };
@@ -80,7 +80,7 @@ pub fn modal_damping(
     Ok(Some(ModalDamping { matrix, ratio, warning }))
 }
 
-/// D must not feed energy to any motion of the modes, but for what its digits leave.
+/// Returns an error if D adds energy to any motion of the modes beyond the noise of its digits.
 fn check_semidefinite(
     model: &FeModel,
     d: &SymmetricMatrix,
@@ -98,7 +98,7 @@ fn check_semidefinite(
             reduced[(j, j)]
         ));
     }
-    // Scaled to a unit diagonal, so that slow modes count as much as fast ones.
+    // Scale to a unit diagonal, so that slow modes count as much as fast ones.
     let size: Vec<f64> = (0..noise.len()).map(|j| raised(j).sqrt().max(f64::MIN_POSITIVE)).collect();
     let scaled = Mat::from_fn(size.len(), size.len(), |i, j| {
         if i == j { raised(j) / size[j] / size[j] } else { reduced[(i, j)] / size[i] / size[j] }

@@ -1,5 +1,5 @@
-//! Geometric stiffness of the modes: what the user gives for unit loads, reduced to them and turned into body
-//! axes.
+//! Geometric stiffness of the modes: matrices of unit loads given by the user, reduced to the modes and
+//! turned to body axes.
 
 use super::body_modes::reduced;
 use crate::basis::{BasisChoice, Loads};
@@ -10,22 +10,22 @@ use flexbody_base::error::Result;
 use flexbody_model::{FeModel, GeometricStiffness, LoadKind, UnitLoad};
 use nalgebra::{Matrix3, Vector3};
 
-/// Direction cosines up to this are rounding.
+/// Direction cosines up to this magnitude are rounding and count as zero.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
-/// Beyond this what follows from the entries would not be finite.
+/// Largest entry whose products stay finite.
 const LARGEST: f64 = 1e290;
 
-/// Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit loads along
-/// the columns of `axes`. Components that were not given count as zero, so that K_geo of any load is the same
-/// in all axes; what nothing given contributes to is left out. Kinds in the order of the model, components in
-/// theirs.
+/// Returns Psi' K_geo Psi of the modes `vectors` (rows and axes of the model, signs of the body) for unit
+/// loads along the columns of `axes`. Components that are not given count as zero, so that K_geo of any
+/// load is equal in all axes. Components without any contribution are omitted. Kinds are in the order of
+/// the model, components in their own order.
 ///
-/// * `shift`: origin of the frame from the point that spin and angular acceleration were given about, frame axes;
-///   zero but for a frame on an interface. Unit: length.
+/// * `shift`: origin of the frame relative to the point that spin and angular acceleration refer to, frame
+///   axes; zero except for a frame on an interface. Unit: length.
 ///
 /// # Errors
-/// [`MatrixNotFinite`](Code::MatrixNotFinite) when the products overflow.
+/// [`MatrixNotFinite`](Code::MatrixNotFinite) if the products overflow.
 pub fn modal_geometric_stiffness(
     model: &FeModel,
     vectors: MatRef<'_, f64>,
@@ -55,8 +55,9 @@ pub fn modal_geometric_stiffness(
     Ok(out)
 }
 
-/// A warning when centrifugal loads are wanted in the basis, so that the body spins, but geometric stiffness
-/// for spin is not given: at what rate the softening begins to count.
+/// Returns a warning if the basis contains centrifugal loads, which means that the body spins, but
+/// geometric stiffness for spin is not given. The warning states the spin rate at which softening becomes
+/// significant.
 pub(super) fn softening_warning(model: &FeModel, basis: &BasisChoice, body: &FlexBody) -> Option<Diagnostic> {
     let BasisChoice::Free(free) = basis else { return None };
     let given = model.geometric_stiffness().iter().any(|one| one.load.kind == LoadKind::Spin);

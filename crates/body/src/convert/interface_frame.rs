@@ -1,4 +1,4 @@
-//! The modes of a body whose frame stands on an interface.
+//! Modes of a body whose frame is fixed to an interface.
 //!
 //! With R the rigid motions about the reference point (model rows) and t (6 x nf) the motion of the interface in
 //! the free modes Psi, the shapes
@@ -7,9 +7,9 @@
 //! Psi' = Psi - R t,    m' = Psi''M Psi' = I + t'(R'M R) t,    Psi''K Psi' = diag(lambda)
 //! ```
 //!
-//! leave the interface at rest; with the motion of the frame they span what the free modes span. The constrained
-//! modes are Psi' X with X'm'X = I and X'diag(lambda)X = diag(mu): those of the body that is held at the interface,
-//! as far as the span has them.
+//! leave the interface at rest. Together with the motion of the frame they have the span of the free modes.
+//! The constrained modes are Psi' X with X'm'X = I and X'diag(lambda)X = diag(mu): the modes of the body
+//! held at the interface, within that span.
 
 use super::{BodyModes, NodesInFrame, rigid_mass};
 use crate::basis::ModalBasis;
@@ -26,7 +26,7 @@ use flexbody_model::{Coupling, FeModel, Nodes};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
-/// The frame on interface `name` of `model`: its reference point and the axes of the model.
+/// Returns the frame at interface `name` of `model`: its reference point and the axes of the model.
 ///
 /// # Errors
 /// [`SceneBody`](Code::SceneBody) if the model has no such interface, [`CarrierImpossible`](Code::CarrierImpossible)
@@ -46,8 +46,8 @@ pub(super) fn frame_of_interface(model: &FeModel, name: &str) -> Result<Frame> {
     }
 }
 
-/// The interfaces of a model in the body frame; of a `coupled` basis with the coupling that it took where
-/// none was stated.
+/// Returns the interfaces of a model in the body frame. For a `coupled` basis, interfaces without a stated
+/// coupling get the coupling that the basis used.
 pub fn interfaces_in_frame(model: &FeModel, frame: &Frame, coupled: bool) -> Vec<Interface> {
     let index: HashMap<i64, usize> = model.nodes().ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     let sets = model.interfaces().iter();
@@ -64,8 +64,8 @@ fn impossible(message: String) -> Error {
     Diagnostic::new(Code::CarrierImpossible, message).into()
 }
 
-/// Replaces the free modes of `found` by those of the body that is held at interface `name`; `place` is the frame
-/// of [`frame_of_interface`].
+/// Replaces the free modes of `found` by the modes of the body held at interface `name`; `place` is the
+/// frame of [`frame_of_interface`].
 ///
 /// # Errors
 /// [`CarrierImpossible`](Code::CarrierImpossible) if the nodes of the interface do not determine its rotation.
@@ -97,7 +97,7 @@ pub(super) fn constrain(
     let modes = combine(shapes.as_ref(), solve_upper(&lower, &left).as_ref());
     let eigenvalues: Vec<f64> = values.iter().map(|root| root * root).collect();
 
-    // Residuals as modes of the free body: the reaction at the interface is in them.
+    // Residuals refer to the equations of the free body and include the reaction at the interface.
     let pencil = model.pencil();
     let (kx, mx) = (pencil.apply_stiffness(modes.as_ref()), pencil.apply_mass(modes.as_ref()));
     let residual = |(j, mu): (usize, &f64)| relative_residual(kx.col(j), mx.col(j), *mu);
@@ -111,7 +111,8 @@ pub(super) fn constrain(
     Ok(())
 }
 
-/// Translation and rotation (6 x nf, in the plane 3 x nf) of the reference point of interface `name` in the modes.
+/// Returns translation and rotation (6 x nf, in the plane 3 x nf) of the reference point of interface
+/// `name` in the modes.
 fn motion_of_interface(
     model: &FeModel,
     place: &NodesInFrame,
@@ -137,7 +138,8 @@ fn motion_of_interface(
     })
 }
 
-/// The proof about the free modes as a remark: of the modes of the held body none is proved.
+/// Returns the completeness of the constrained modes, for which nothing is proved; the proof about the free
+/// modes becomes a remark.
 fn not_proved(of_free: &Completeness, name: &str, nf: usize) -> Completeness {
     let free = match of_free.proof {
         Proof::InertiaCount => format!("the {nf} free modes are proved complete below the shift"),

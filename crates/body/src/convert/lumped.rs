@@ -1,5 +1,4 @@
-//! What lumped masses would have given: invariants on the same modes, and the pipeline with modes of their
-//! own.
+//! Lumped comparators: invariants on the modes of the body, and the pipeline with modes of the lumped mass.
 
 use super::body_modes::reduced;
 use super::{BodyModes, Lumping, ModalModel};
@@ -17,37 +16,38 @@ use flexbody_linalg::gram;
 use flexbody_model::FeModel;
 use std::collections::HashMap;
 
-/// The fully lumped pipeline of one scheme: modes from the lumped mass as well.
+/// Result of a fully lumped pipeline: the modes come from the lumped mass as well.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LumpedPipeline {
-    /// Scheme.
+    /// Lumping scheme.
     pub scheme: String,
-    /// Its eigenvalues, ascending; empty when it has no real modes.
+    /// Eigenvalues with the lumped mass, ascending; empty if it has no real modes.
     pub eigenvalues: Vec<f64>,
     /// Smallest singular value of Psi' M Psi_l: the cosine of the largest angle between the two modal
     /// subspaces.
     pub subspace_cosine: f64,
-    /// Error norms of its invariants after the subspaces were aligned.
+    /// Error norms of the invariants after alignment of the subspaces.
     pub comparison: Vec<(String, f64)>,
-    /// Why there is no result; empty when there is one.
+    /// Reason for a missing result; empty if there is one.
     pub remark: String,
-    /// Why the figures of the invariants and the cosine say little; empty when they do not.
+    /// Reason to distrust the error norms and the cosine; empty if there is none.
     pub caution: String,
 }
 
-/// Relative difference of eigenvalues up to which modes count as a group with one frequency: discretisation splits
-/// the pairs of symmetric parts by less, and any vectors of the group may be its modes. A larger value warns of
-/// neighbours that are told apart.
+/// Relative difference of eigenvalues up to which modes count as one group with one frequency.
+/// Discretisation splits the pairs of symmetric parts by less, and any vectors of the group may be its
+/// modes. A larger value also warns about neighbours that are distinct.
 const SAME_FREQUENCY: f64 = 1e-3;
 
-/// Cosine below which the two subspaces have a direction that is nearer to what the other one leaves out (45 degrees).
+/// Cosine below which a direction of one subspace is closer to the complement of the other than to the
+/// other itself (45 degrees).
 const NEARLY_DISJOINT: f64 = std::f64::consts::FRAC_1_SQRT_2;
 
 impl Lumping {
-    /// The masses of the nodes of `model`.
+    /// Returns the masses of the nodes of `model`.
     ///
     /// # Errors
-    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes.
+    /// [`LumpedMassTable`](Code::LumpedMassTable) if user masses do not fit the nodes.
     pub fn masses(&self, model: &FeModel) -> Result<LumpedMasses> {
         match self {
             Lumping::RowSum => Ok(LumpedMasses::row_sum(&model.nodal_mass())),
@@ -72,7 +72,7 @@ impl Lumping {
     }
 }
 
-/// Invariants of `masses` on the same modes, and what they are off by.
+/// Returns the invariants of `masses` on the modes of the body, and their error norms.
 pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &Invariants) -> LumpedBody {
     let shapes = modal.modes.of_nodes();
     let own = lumped_invariants(modal, masses, shapes, exact.modal_stiffness().clone(), exact.groups());
@@ -84,8 +84,8 @@ pub(super) fn comparator(modal: &ModalModel<'_>, masses: &LumpedMasses, exact: &
     }
 }
 
-/// What lumped masses make of the groups that the body holds. Of a plane body with a general mass nothing but
-/// the rotation about z is known, and lumped masses are compared in this alone.
+/// Returns the lumped invariants for the groups that the body holds. For a plane body with a general mass
+/// only the rotation about z is known, and the comparison is limited to it.
 fn lumped_invariants(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,
@@ -99,7 +99,8 @@ fn lumped_invariants(
     if only_about_z { own.about_z() } else { own }.with_groups(groups)
 }
 
-/// Modes and invariants from the lumped mass, aligned with the exact subspace before they are compared.
+/// Computes modes and invariants from the lumped mass, aligned with the exact subspace before the
+/// comparison.
 pub(super) fn pipeline(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,
@@ -133,8 +134,8 @@ pub(super) fn pipeline(
     })
 }
 
-/// Says why the compared subspaces are arbitrary, or have little in common: `cuts` are the last eigenvalue of each and
-/// the next one.
+/// Returns the reason why the compared subspaces are arbitrary or have little in common, as text. `cuts`
+/// holds, for each subspace, its name, its last eigenvalue and the next one.
 fn caution(
     modal: &ModalModel<'_>,
     cuts: &[(&str, Option<f64>, Option<f64>)],
@@ -159,7 +160,7 @@ fn caution(
     format!("{}; errors of invariants are arbitrary, take another --modes", found.join("; "))
 }
 
-/// As many modes of the lumped mass as the body has; else why there are none.
+/// Returns as many modes of the lumped mass as the body has, or the reason why there are none.
 fn own_modes(
     modal: &ModalModel<'_>,
     masses: &LumpedMasses,

@@ -1,4 +1,4 @@
-//! The main job: from a checked model to a flexible body, in stages that are values.
+//! Conversion from a checked model to a flexible body, in stages whose results are values.
 //!
 //! ```text
 //! FeModel ─ ModalModel::find ─→ modes in the body frame

@@ -1,4 +1,4 @@
-//! A model with its modes, in the frame of its body: the first stage of a conversion.
+//! First stage of a conversion: a model with its modes, in the frame of its body.
 
 use super::body_modes::{reduced, reduced_in_twice_the_precision};
 use super::{
@@ -18,13 +18,13 @@ use flexbody_linalg::context::{Context, Work, WorkCounter};
 use flexbody_model::{FeModel, GeometricStiffness, Nodes};
 use nalgebra::Vector3;
 
-/// A checked model and its modes in body axes; of the mass nothing is condensed yet.
+/// Checked model and its modes in body axes; the mass is not condensed yet.
 pub struct ModalModel<'m> {
     pub(super) model: &'m FeModel,
     pub(super) settings: &'m ConvertSettings,
-    /// The comparators that are wanted.
+    /// Requested comparators.
     pub(super) schemes: Vec<LumpedMasses>,
-    /// What is known of the modes; their vectors are those of `modes`.
+    /// Data of the modes; their vectors are stored in `modes`.
     pub(super) found: ModalBasis,
     pub(super) mass_properties: MassProperties,
     pub(super) place: NodesInFrame,
@@ -44,8 +44,8 @@ impl<'m> ModalModel<'m> {
     /// Finds the modes and chooses the frame.
     ///
     /// # Errors
-    /// Those of [`free_surface`](crate::basis::free_surface) and [`choose_frame`];
-    /// [`LumpedMassTable`](Code::LumpedMassTable) when user masses do not fit the nodes (found before any
+    /// The errors of [`free_surface`](crate::basis::free_surface) and [`choose_frame`];
+    /// [`LumpedMassTable`](Code::LumpedMassTable) if user masses do not fit the nodes (checked before any
     /// work).
     pub fn find(model: &'m FeModel, settings: &'m ConvertSettings, context: &Context<'_>) -> Result<Self> {
         refuse_uncertifiable(model, settings.modes.accuracy)?;
@@ -64,7 +64,7 @@ impl<'m> ModalModel<'m> {
             interface_frame::constrain(model, &place, name, coupled, &mut found)?;
         }
         let modes = BodyModes::new(model, &place, std::mem::replace(&mut found.solution.vectors, Mat::new()));
-        // `certified` makes its own.
+        // Accuracy `certified` computes its own K_ff.
         let twice = found.solution.is_noisy() && settings.modes.accuracy == Accuracy::Standard;
         let reduced = if twice { reduced_in_twice_the_precision } else { reduced };
         let modal_stiffness = reduced(model.stiffness(), modes.vectors.as_ref());
@@ -94,14 +94,15 @@ impl<'m> ModalModel<'m> {
         })
     }
 
-    /// Number of modes.
+    /// Returns the number of modes.
     pub(super) fn n_modes(&self) -> usize {
         self.modes.vectors.ncols()
     }
 }
 
-/// Refuses accuracy `certified` for rows that are no displacements, which have no place in the double-double
-/// condensation, and for a mass that is stored otherwise along x, y and z: bounds would be about the mean.
+/// Returns an error for accuracy `certified` if a row is no displacement, since the double-double
+/// condensation covers displacements only, or if the stored mass differs along x, y and z, since the bounds
+/// would cover the mean.
 fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
     if accuracy == Accuracy::Certified && model.scalar_mass().is_some() && !model.has_exact_scalar_mass() {
         let message = format!(
@@ -119,10 +120,10 @@ fn refuse_uncertifiable(model: &FeModel, accuracy: Accuracy) -> Result<()> {
     Ok(())
 }
 
-/// The frame on an interface, if one is asked for.
+/// Returns the frame on an interface, if requested.
 ///
 /// # Errors
-/// [`Usage`](Code::Usage) beside settings that are about free modes; those of
+/// [`Usage`](Code::Usage) together with settings that need free modes; the errors of
 /// [`frame_of_interface`](interface_frame::frame_of_interface).
 fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame>> {
     let Some(name) = settings.frame.interface() else { return Ok(None) };
@@ -140,7 +141,7 @@ fn own_frame(model: &FeModel, settings: &ConvertSettings) -> Result<Option<Frame
     interface_frame::frame_of_interface(model, name).map(Some)
 }
 
-/// The body frame that is wanted, and the mass properties in model axes.
+/// Returns the requested body frame, and the mass properties in model axes.
 fn body_frame(model: &FeModel, wanted: &FrameChoice) -> Result<(Frame, MassProperties)> {
     let wanted = match wanted {
         FrameChoice::Mean(frame) => *frame,

@@ -1,14 +1,14 @@
-//! What the user is told about a finished body.
+//! Notes and warnings about a finished body.
 
 use crate::flex_body::{FlexBody, Interface};
 use faer::Mat;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::Coupling;
 
-/// Part by which a frequency may be too high before the user is told.
+/// Relative error of a frequency above which a note reports it.
 const TOO_HIGH: f64 = 0.01;
 
-/// A note about the frequencies of the free body that a Craig-Bampton body does not hold.
+/// Returns a note about the frequencies of the free body that a Craig-Bampton body does not reproduce.
 pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
     let fixed = body.certificate().fixed_interface.as_ref()?;
     let (theta, hertz) = (&body.modes().eigenvalue, body.frequencies_hz());
@@ -35,11 +35,12 @@ pub(super) fn free_frequencies(body: &FlexBody) -> Option<Diagnostic> {
     Some(Diagnostic::new(Code::FreeFrequencies, message))
 }
 
-/// Part of the static compliance at an interface below which nothing is said.
+/// Part of the static compliance at an interface above which a note reports it.
 const COMPLIANCE: f64 = 0.01;
 
-/// A note about the part of the static compliance that the modes lack at each interface, if that is known and more
-/// than one percent. Compliance is f'K^+ f of a unit force or moment f, the square of the norm in [`Truncation`].
+/// Returns a note about the truncated part of the static compliance at each interface, if it is known and
+/// above one percent. Compliance is f'K^+ f of a unit force or moment f, the square of the norm in
+/// [`Truncation`].
 ///
 /// [`Truncation`]: crate::flex_body::Truncation
 pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
@@ -63,10 +64,10 @@ pub fn interface_compliance(body: &FlexBody) -> Option<Diagnostic> {
     })
 }
 
-/// Part of the motion of an interface that is rounding.
+/// Deformation of an interface, relative to its motion, that counts as rounding.
 const RIGID_FIT: f64 = 1e-8;
 
-/// Warnings about interfaces that are declared rigid, but are not in the modes of the body.
+/// Returns warnings about interfaces that are declared rigid but deform in the modes of the body.
 pub fn poor_fits(body: &FlexBody) -> Vec<Diagnostic> {
     body.interfaces().iter().filter_map(|interface| poor_fit(interface, body)).collect()
 }

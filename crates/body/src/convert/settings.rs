@@ -1,11 +1,11 @@
-//! What is asked of a conversion.
+//! Settings of a conversion.
 
 use crate::basis::{BasisChoice, Loads, ModeSettings};
 use crate::invariants::{FrameChoice, LumpedScheme};
 use flexbody_eigen::Wanted;
 use flexbody_model::{Damping, FeModel, SurfaceMesh};
 
-/// A lumped comparator that is wanted.
+/// Kind of lumped comparator.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Lumping {
     /// Row sums of Ms.
@@ -26,37 +26,38 @@ impl Lumping {
     }
 }
 
-/// Which surface the body is to have, to be drawn by.
+/// Choice of the surface that draws the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum MeshChoice {
-    /// That of the model, where it has one.
+    /// Surface of the model, if it has one.
     #[default]
     Whole,
-    /// The same with so many triangles at the most.
+    /// Surface of the model, reduced to at most this number of triangles.
     AtMost(usize),
-    /// None.
+    /// No surface.
     Without,
 }
 
 /// Settings of a conversion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvertSettings {
-    /// Which modes and how good.
+    /// Number and accuracy of the modes.
     pub modes: ModeSettings,
-    /// Which basis.
+    /// Choice of the basis.
     pub basis: BasisChoice,
     /// Body frame.
     pub frame: FrameChoice,
-    /// Comparators.
+    /// Lumped comparators to compute.
     pub lumped: Vec<Lumping>,
-    /// Also compute the modes of each lumped mass.
+    /// True if the modes of each lumped mass are computed as well.
     pub lumped_modes: bool,
     /// Surface of the body.
     pub mesh: MeshChoice,
 }
 
 impl Default for ConvertSettings {
-    /// 20 modes, the centre of mass and the axes of the model as frame, and the two comparators that need nothing but the matrices.
+    /// Returns the default settings: 20 modes, a frame at the centre of mass along the axes of the model,
+    /// and the two comparators that need only the matrices.
     fn default() -> Self {
         Self {
             modes: ModeSettings::default(),
@@ -70,7 +71,7 @@ impl Default for ConvertSettings {
 }
 
 impl ConvertSettings {
-    /// The settings that can change the result, for the file.
+    /// Returns the settings that can change the result, for the file.
     pub(super) fn described(&self, model: &FeModel) -> serde_json::Value {
         let (modes, below) = match self.modes.wanted {
             Wanted::Lowest(count) => ((count < usize::MAX).then_some(count), None),
@@ -93,14 +94,14 @@ impl ConvertSettings {
         if let Some(engine) = self.basis.engine() {
             described["engine"] = serde_json::json!(engine);
         }
-        // Whether there is a surface at all is seen in the file.
+        // The file itself shows if there is a surface.
         if let (MeshChoice::AtMost(most), Some(_)) = (self.mesh, model.mesh()) {
             described["mesh_triangles"] = serde_json::json!(most);
         }
         described
     }
 
-    /// The surface of the body.
+    /// Returns the surface of the body.
     pub(super) fn surface(&self, model: &FeModel) -> Option<SurfaceMesh> {
         let mesh = model.mesh()?;
         match self.mesh {
@@ -111,7 +112,7 @@ impl ConvertSettings {
     }
 }
 
-/// The numbers that a damping is stated by; null for a matrix.
+/// Returns the numbers that define a damping; null for a matrix.
 fn damping_numbers<D>(damping: &Damping<D>) -> serde_json::Value {
     match damping {
         Damping::Ratio(ratio) => serde_json::json!(ratio),

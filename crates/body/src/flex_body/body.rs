@@ -15,27 +15,28 @@ use flexbody_base::numbers::significant;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{Coupling, GeometricStiffness, LoadKind, Nodes, SurfaceMesh, UnitLoad, span};
 
-/// A flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
+/// Flexible body: frame, nodes, modes, exact invariants and their certificate. Validated at construction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FlexBody {
     parts: Parts,
 }
 
-/// Motions at which the stiffness of inertia has a given part of the stiffness of some motion of a body, whatever
-/// their direction; `None` where it is zero at all of them.
+/// Motions at which the stiffness of inertia reaches a given part of the stiffness against some deformation
+/// of the body, for the most unfavourable direction. A value is `None` if the stiffness of inertia is zero
+/// for that motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertiaRates {
     /// Spin, in hertz.
     pub spin_hz: Option<f64>,
-    /// Acceleration of the origin less gravity. Unit: length/time^2.
+    /// Acceleration of the origin minus gravity. Unit: length/time^2.
     pub acceleration: Option<f64>,
     /// Angular acceleration. Unit: 1/time^2.
     pub angular_acceleration: Option<f64>,
 }
 
 impl InertiaRates {
-    /// `a spin of 12.3 Hz, an acceleration of 4.5e3 m/s^2, an angular acceleration of 1.2e4 1/s^2`, of the loads
-    /// that are asked for; empty where there is none.
+    /// Returns a text such as `a spin of 12.3 Hz, an acceleration of 4.5e3 m/s^2, an angular acceleration
+    /// of 1.2e4 1/s^2` for the loads that `asked` accepts; empty if there are none.
     pub fn in_words(&self, units: &UnitSystem, asked: impl Fn(&LoadKind) -> bool) -> String {
         let (length, time) = (units.length.name(), units.time.name());
         let all = [
@@ -74,78 +75,78 @@ impl FlexBody {
     /// # Errors
     /// [`BodySchema`](flexbody_base::diagnostic::Code::BodySchema), one diagnostic per violation.
     pub fn new(mut parts: Parts) -> Result<Self> {
-        // As files have them.
+        // Files hold the terms in the order of the groups.
         parts.terms.sort_by_key(|term| term.group);
         let problems = problems(&parts);
         if problems.is_empty() { Ok(Self { parts }) } else { Err(Error::new(problems)) }
     }
 
-    /// All parts.
+    /// Returns all parts.
     pub fn parts(&self) -> &Parts {
         &self.parts
     }
 
-    /// All parts, for changes after which everything still holds that [`FlexBody::new`] checks.
+    /// Returns all parts for a change that keeps every condition that [`FlexBody::new`] checks.
     pub(super) fn parts_mut(&mut self) -> &mut Parts {
         &mut self.parts
     }
 
-    /// Gives the parts away, to change them and build a new body.
+    /// Returns the parts, to change them and to build a new body.
     pub fn into_parts(self) -> Parts {
         self.parts
     }
 
-    /// Number of nodes n.
+    /// Returns the number of nodes n.
     pub fn n_nodes(&self) -> usize {
         self.parts.nodes.len()
     }
 
-    /// Number of modes nf.
+    /// Returns the number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.parts.modes.eigenvalue.len()
     }
 
-    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    /// Returns the dimension: 3, or 2 for a body that moves in its plane z = 0 only.
     pub fn dimension(&self) -> usize {
         self.parts.dimension
     }
 
-    /// Provenance.
+    /// Returns the provenance.
     pub fn source(&self) -> &Source {
         &self.parts.source
     }
 
-    /// Units of all numbers.
+    /// Returns the units of all numbers.
     pub fn units(&self) -> &UnitSystem {
         &self.parts.units
     }
 
-    /// Body frame in model coordinates.
+    /// Returns the body frame in model coordinates.
     pub fn frame(&self) -> &Frame {
         &self.parts.frame
     }
 
-    /// Reference conditions: what ties the body frame to the deformed body.
+    /// Returns the reference conditions that tie the body frame to the deformed body.
     pub fn conditions(&self) -> &ReferenceConditions {
         &self.parts.conditions
     }
 
-    /// Node numbers and positions in the body frame.
+    /// Returns node numbers and positions in the body frame.
     pub fn nodes(&self) -> &Nodes {
         &self.parts.nodes
     }
 
-    /// The surface to draw the body by, where it is known.
+    /// Returns the surface to draw the body by, if it is known.
     pub fn mesh(&self) -> Option<&SurfaceMesh> {
         self.parts.mesh.as_ref()
     }
 
-    /// Largest distance of two nodes. Unit: length.
+    /// Returns the largest distance between two nodes. Unit: length.
     pub fn extent(&self) -> f64 {
         span(&self.parts.nodes.positions)
     }
 
-    /// Largest displacement of a node by mode `j` at unit amplitude.
+    /// Returns the largest displacement of a node in mode `j` at unit amplitude.
     ///
     /// # Panics
     /// When `j` is not below the number of modes.
@@ -155,12 +156,12 @@ impl FlexBody {
         (0..self.n_nodes()).map(square).fold(0.0, f64::max).sqrt()
     }
 
-    /// Modes.
+    /// Returns the modes.
     pub fn modes(&self) -> &Modes {
         &self.parts.modes
     }
 
-    /// D (nf x nf): the modal damping or, where there is none, diag(2 zeta_j omega_j). Unit: 1/time.
+    /// Returns D (nf x nf): the modal damping or, if there is none, diag(2 zeta_j omega_j). Unit: 1/time.
     pub fn damping(&self) -> Mat<f64> {
         let modes = &self.parts.modes;
         let by_ratio = |j: usize| 2.0 * modes.damping_ratio[j] * modes.eigenvalue[j].sqrt();
@@ -169,30 +170,31 @@ impl FlexBody {
         })
     }
 
-    /// f_j = sqrt(lambda_j) / (2 pi) in hertz (nf), whatever the body's unit of time is.
+    /// Returns f_j = sqrt(lambda_j) / (2 pi) in hertz (nf), independent of the body's unit of time.
     pub fn frequencies_hz(&self) -> Vec<f64> {
         let hertz = self.parts.units.hertz();
         self.parts.modes.eigenvalue.iter().map(|l| l.sqrt() / std::f64::consts::TAU * hertz).collect()
     }
 
-    /// Exact invariants about the frame origin, body axes.
+    /// Returns the exact invariants about the frame origin, body axes.
     pub fn invariants(&self) -> &Invariants {
         &self.parts.invariants
     }
 
-    /// Geometric stiffness of unit loads along body axes, reduced to the modes.
+    /// Returns the geometric stiffness of unit loads along body axes, reduced to the modes.
     pub fn geometric_stiffness(&self) -> &[GeometricStiffness<Mat<f64>>] {
         &self.parts.geometric_stiffness
     }
 
-    /// Stiffness of inertia of nodes whose rotations carry mass: terms of the kinetic energy of second order in
-    /// their rotations, signs of geometric stiffness (theory sections 6 and 7.4).
+    /// Returns the stiffness of inertia of nodes whose rotations carry mass: the terms of the kinetic
+    /// energy of second order in the rotations, with the sign of geometric stiffness (theory sections 6 and
+    /// 7.4).
     pub fn inertia_stiffness(&self) -> Option<&InertiaStiffness> {
         self.parts.inertia_stiffness.as_ref()
     }
 
-    /// The stiffness of inertia plus the geometric stiffness for a unit of `load`, which is added to K_ff; `None`
-    /// where the body has neither.
+    /// Returns the stiffness of inertia plus the geometric stiffness for a unit of `load`, to be added to
+    /// K_ff. Returns `None` if the body has neither.
     pub fn stiffness_under(&self, load: &UnitLoad) -> Option<Mat<f64>> {
         let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
         let all = of_inertia.chain(self.geometric_stiffness()).filter(|one| one.load == *load);
@@ -202,8 +204,9 @@ impl FlexBody {
         })
     }
 
-    /// The motions at which the stiffness of inertia has `part` of the stiffness of some motion of the body; `None`
-    /// where it has none, or K_ff is not positive definite.
+    /// Returns the motions at which the stiffness of inertia reaches `part` of the stiffness against some
+    /// deformation. Returns `None` if the body has no stiffness of inertia, or if K_ff is not positive
+    /// definite.
     pub fn inertia_rates(&self, part: f64) -> Option<InertiaRates> {
         let shares = self.inertia_stiffness()?.shares(self.invariants().modal_stiffness().as_ref())?;
         let at = |share: f64| (share > 0.0).then_some(part / share);
@@ -214,7 +217,7 @@ impl FlexBody {
         })
     }
 
-    /// The loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.
+    /// Returns the loads that the body has a [stiffness](FlexBody::stiffness_under) for, each once.
     pub fn stiffening_loads(&self) -> Vec<UnitLoad> {
         let of_inertia = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
         let mut loads: Vec<UnitLoad> = Vec::new();
@@ -226,59 +229,59 @@ impl FlexBody {
         loads
     }
 
-    /// Lumped comparators.
+    /// Returns the lumped comparators.
     pub fn lumped(&self) -> &[LumpedBody] {
         &self.parts.lumped
     }
 
-    /// Proof of completeness and noise floor.
+    /// Returns the proof of completeness and the noise floor.
     pub fn certificate(&self) -> &Certificate {
         &self.parts.certificate
     }
 
-    /// Interfaces.
+    /// Returns the interfaces.
     pub fn interfaces(&self) -> &[Interface] {
         &self.parts.interfaces
     }
 
-    /// Whether an interface was declared to move as a rigid body.
+    /// Returns true if an interface was declared to move as a rigid body.
     pub fn has_rigid_interfaces(&self) -> bool {
         self.parts.interfaces.iter().any(|interface| interface.coupling == Some(Coupling::Rigid))
     }
 
-    /// K and M in interface coordinates, of a basis that has them.
+    /// Returns K and M in interface coordinates, if the basis has them.
     pub fn coordinates(&self) -> Option<&InterfaceCoordinates> {
         self.parts.coordinates.as_ref()
     }
 
-    /// What was decided about the groups of the kinetic energy; empty where nobody asked.
+    /// Returns the decisions about the groups of the kinetic energy; empty if no selection was made.
     pub fn terms(&self) -> &[TermDecision] {
         &self.parts.terms
     }
 
-    /// Name of the basis that the modes were computed in, as the settings of the conversion record it.
+    /// Returns the name of the basis of the modes, as recorded by the settings of the conversion.
     pub fn basis_name(&self) -> Option<&str> {
         self.source().settings["basis"].as_str()
     }
 
-    /// Kind of basis of this name; `None` of a body that records none, or one that is not known here.
+    /// Returns the kind of basis. Returns `None` if the body records no basis, or an unknown one.
     pub fn basis(&self) -> Option<BasisKind> {
         self.basis_name().and_then(BasisKind::from_name)
     }
 
-    /// Precision of shapes and of the inertia of the modes.
+    /// Returns the precision of shapes and of the inertia of the modes.
     pub fn storage(&self) -> Storage {
         self.parts.storage
     }
 
-    /// The groups of the kinetic energy that the body holds.
+    /// Returns the groups of the kinetic energy that the body holds.
     pub fn groups(&self) -> TermGroups {
         self.parts.invariants.groups()
     }
 
-    /// Every identity that the file itself can be held to (theory section 10), those of the interface
-    /// coordinates included; `frame` is what the body frame was meant to be. Limits of a body with 32-bit
-    /// arrays have room for their rounding.
+    /// Checks every identity that the file alone can fulfil (theory section 10), including those of the
+    /// interface coordinates. `frame` is the intended body frame. The limits for a body with 32-bit arrays
+    /// include their rounding.
     pub fn identities(&self, frame: BodyFrame) -> Vec<IdentityCheck> {
         let expected = Expected {
             mass_normalised: true,
@@ -295,7 +298,8 @@ impl FlexBody {
             },
         };
         let checks = identities(&self.parts.invariants, &expected);
-        // Rows of the largest Gram matrix: its eigenvalues move by as many roundings.
+        // Rounding moves the eigenvalues of the largest Gram matrix by at most the number of its rows times
+        // one rounding.
         let rounding = self.parts.storage.rounding() * (4 + 3 * self.n_modes()) as f64;
         let mut checks = relaxed(checks, rounding + self.parts.certificate.inertia_rounding);
         checks.extend(self.parts.frame_at_rest());
@@ -305,10 +309,9 @@ impl FlexBody {
     }
 }
 
-/// Limits of identities of a body whose arrays are rounded, which adds `rounding` to what rounding of 64-bit
-/// floats leaves.
+/// Returns the checks with `rounding` added to their limits, for bodies with rounded arrays.
 fn relaxed(mut checks: Vec<IdentityCheck>, rounding: f64) -> Vec<IdentityCheck> {
-    // What has no tolerance, as being finite, does not get any.
+    // Checks without a tolerance, such as finiteness, keep the limit zero.
     for check in checks.iter_mut().filter(|check| check.limit > 0.0) {
         check.limit += rounding;
         check.passed = check.value <= check.limit;

@@ -1,4 +1,4 @@
-//! A body whose frame is fixed to one of its interfaces: what hangs from a carried interface.
+//! A body whose frame is fixed to one of its interfaces: the body is carried by that interface.
 //!
 //! With t_j and theta_j the translation and rotation of the interface in mode j, about its reference point,
 //!
@@ -6,10 +6,10 @@
 //! psi'_j(x) = psi_j(x) - t_j - theta_j x x,    x from the reference point
 //! ```
 //!
-//! are modes in which the interface rests in the body frame. They span, with the rigid motion of the frame,
-//! the motions of the old modes, K_ff is what it was, and the prescribed motion of the frame *is* that of the
-//! interface: no constraint is left to solve. The body that hangs from the interface has the eigenpairs of
-//! (K_ff, m_ff), with m_ff of the new modes.
+//! are modes in which the interface is at rest in the body frame. Together with the rigid motion of the
+//! frame they span the motions of the old modes, and K_ff does not change. The prescribed motion of the
+//! frame is the motion of the interface, so that no constraint is left to solve. The body held at the
+//! interface has the eigenpairs of (K_ff, m_ff), with m_ff of the new modes.
 
 use super::rigid_motion::{rotations_without, shapes_without, stacked};
 use super::{FlexBody, LoadKind, ReferenceConditions, TermGroups};
@@ -20,26 +20,28 @@ use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen}
 use flexbody_model::{Coupling, DampingRatios};
 use nalgebra::{Matrix3, Vector3};
 
-/// Largest part that modes may leave of the static response of the carried body before that is said.
+/// Largest truncation error of the static response of a carried body that passes without a warning.
 const RESOLVED: f64 = 0.01;
 
-/// Deformation of a rigid interface, relative to its motion, above which it is not rigid.
+/// Largest deformation of an interface declared rigid, relative to its motion, that passes without a
+/// warning.
 const DEFORMED: f64 = 1e-4;
 
-/// Motions of the interface below this part of the largest displacement of a mode are rounding.
+/// Motion of the interface, relative to the largest displacement of a mode, below which the motion is taken
+/// for rounding.
 const AT_REST: f64 = 1e-12;
 
-/// What a body is carried by.
+/// Carrier of a body: the place that its frame is fixed to.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Carrier {
     /// The reference point of the interface of this name.
     Interface(String),
-    /// The node of this number, which must have rotations.
+    /// Node of this number, which must have rotations.
     Node(i64),
 }
 
 impl Carrier {
-    /// The carrier that files of simulations name: `interface NAME` or `node 17`.
+    /// Parses the name of a carrier in simulation files: `interface NAME` or `node 17`.
     pub fn from_words(words: &str) -> Option<Self> {
         match words.split_once(' ')? {
             ("interface", name) => Some(Self::Interface(name.to_owned())),
@@ -58,26 +60,26 @@ impl std::fmt::Display for Carrier {
     }
 }
 
-/// Where a body is carried, and how that place moves in every mode.
+/// Reference point of a carrier and its motion in every mode.
 struct CarriedPoint {
     /// Reference point, body frame.
     reference: Vector3<f64>,
-    /// Translations, then rotations (6 x nf), body axes.
+    /// Translations, then rotations, of the point in the modes (6 x nf), body axes.
     motion: Mat<f64>,
 }
 
 impl FlexBody {
-    /// The same body in the frame of `carrier`: its reference point is the origin, the axes are those of the
-    /// model, and the modes are those of the head of this module. A body that is carried already is returned
-    /// as it is.
+    /// Returns this body in the frame of `carrier`: the origin is the reference point of the carrier, the
+    /// axes are those of the model, and the carrier is at rest in every mode (see the module
+    /// documentation). A body already carried there keeps its modes.
     ///
-    /// Geometric stiffness is left out, whatever frame the body has: the loads together with the reaction at the
-    /// interface stress the carried body. The stiffness of inertia follows from the moments of the nodes and
-    /// their rotations relative to the carrier.
+    /// Geometric stiffness is dropped for every frame of the original body, since the loads together with
+    /// the reaction at the interface stress the carried body. The stiffness of inertia follows from the
+    /// moments of the nodes and their rotations relative to the carrier.
     ///
     /// # Errors
-    /// FB212 for names that the body has not; FB214 where `carrier` has no reference point or no orientation,
-    /// and for a body without all groups of the kinetic energy.
+    /// FB212 if the body has no interface or node of this name; FB214 if `carrier` has no reference point
+    /// or no orientation, or if the body does not hold all groups of the kinetic energy.
     pub fn carried(&self, carrier: &Carrier) -> Result<Self> {
         if self.groups() != TermGroups::ALL {
             let lacking: Vec<&str> = self.groups().dropped().map(|group| group.name()).collect();
@@ -107,7 +109,7 @@ impl FlexBody {
             lumped.invariants = lumped.invariants.without_rigid_motion(motion.as_ref());
         }
         parts.geometric_stiffness.retain(|one| matches!(one.load.kind, LoadKind::Named(_)));
-        // Nodes turn by less now, relative to the frame that the carrier turns.
+        // The nodes turn relative to the carrier, which turns the frame.
         parts.inertia_stiffness = match (&parts.inertia_stiffness, &parts.modes.rotation) {
             (Some(own), Some(rotation)) => Some(own.with_rotations(rotation.as_ref(), parts.dimension)),
             _ => None,
@@ -115,22 +117,23 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// Whether the body lacks geometric stiffness as it is carried that it has as it is.
+    /// Returns true if this body has geometric stiffness that is dropped when the body is carried.
     pub fn loses_geometric_stiffness(&self) -> bool {
         self.geometric_stiffness().iter().any(|one| !matches!(one.load.kind, LoadKind::Named(_)))
     }
 
-    /// lambda of the body in its frame: eigenvalues of (K_ff, m_ff), ascending. Those of free modes are their
-    /// own; those of a carried body are of the body held at its interface. Unit: 1/time^2.
+    /// Returns the eigenvalues lambda of (K_ff, m_ff), ascending: for free modes their eigenvalues, for a
+    /// carried body those of the body held at its interface. Unit: 1/time^2.
     pub fn eigenvalues_in_frame(&self) -> Option<Vec<f64>> {
         Some(self.eigenpairs_in_frame()?.0)
     }
 
-    /// Gives the body the damping ratio of `ratios` at its frequency for each of its eigenpairs in its frame: D =
-    /// m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes these are the modes.
+    /// Sets modal damping: each eigenpair in the frame of the body gets the ratio of `ratios` at its
+    /// frequency, D = m_ff X diag(2 ratio omega) X' m_ff. For a body of free modes the eigenpairs are the
+    /// modes.
     ///
     /// # Errors
-    /// Those of [`FlexBody::new`].
+    /// The errors of [`FlexBody::new`].
     pub fn with_damping_ratios(&self, ratios: &DampingRatios) -> Result<Self> {
         let mut parts = self.clone().into_parts();
         let ratio = |eigenvalue: f64| ratios.at(self.units().frequency_of(eigenvalue.max(0.0)));
@@ -149,12 +152,12 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// A warning where the modes of a body that is carried leave more than a hundredth of its static response
-    /// to accelerations of the interface.
+    /// Returns a warning if the modes of a carried body leave more than one hundredth of its static
+    /// response to accelerations of the interface unresolved.
     ///
-    /// The estimate is what the upper half of the modes adds to the elastic energy: that of free modes
-    /// converges like the inverse of their number, so that as much again is missing. Residual vectors of the
-    /// interface and a Craig-Bampton basis with it need none.
+    /// The estimate is the contribution of the upper half of the modes to the elastic energy. With free
+    /// modes the energy converges like the inverse of their number, so the missing part is about as large.
+    /// Residual vectors of the interface and a Craig-Bampton basis with it need no warning.
     pub fn unresolved(&self, carrier: &Carrier, original: &Self) -> Option<Diagnostic> {
         if original.resolves(carrier) {
             return None;
@@ -178,8 +181,8 @@ impl FlexBody {
         })
     }
 
-    /// A warning where an interface is to be rigid and the modes of this body, as it was before it was
-    /// carried, deform it: its mean motion is carried then.
+    /// Returns a warning if an interface is declared rigid and the modes of this body, taken before it was
+    /// carried, deform the interface. The carrier then follows the mean motion of the interface.
     pub fn softened(&self, carrier: &Carrier) -> Option<Diagnostic> {
         let Carrier::Interface(name) = carrier else { return None };
         let interface = self.interfaces().iter().find(|interface| interface.name == *name)?;
@@ -198,14 +201,14 @@ impl FlexBody {
         })
     }
 
-    /// Whether the basis has the static responses to loads at `carrier`.
+    /// Returns true if the basis contains the static responses to loads at `carrier`.
     fn resolves(&self, carrier: &Carrier) -> bool {
         let Carrier::Interface(name) = carrier else { return false };
         let named = |text: &str| text.strip_prefix(name.as_str()).is_some_and(|rest| rest.starts_with(' '));
-        // `residual vector: 98 % bore force x`.
+        // Example of a provenance: `residual vector: 98 % bore force x`.
         let made_for = |provenance: &str| provenance.split_once(" % ").is_some_and(|(_, load)| named(load));
         let modes = self.modes();
-        // All motions of the model, but rigid ones.
+        // The basis is complete if it spans all motions of the model except rigid ones.
         let complete = self.n_modes() + 6 >= self.source().n_dofs && self.source().n_dofs > 0;
         complete
             || self.coordinates().is_some_and(|all| all.names.iter().any(|coordinate| named(coordinate)))
@@ -214,7 +217,7 @@ impl FlexBody {
             || modes.provenance.iter().any(|one| made_for(one))
     }
 
-    /// Eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).
+    /// Returns eigenvalues and m_ff-orthonormal eigenvectors of (K_ff, m_ff).
     fn eigenpairs_in_frame(&self) -> Option<(Vec<f64>, Mat<f64>)> {
         let lower = dense_cholesky(self.invariants().modal_mass())?;
         let half = solve_lower(&lower, self.invariants().modal_stiffness());
@@ -225,7 +228,7 @@ impl FlexBody {
     /// True if the origin of the frame is the reference point of `carrier`, which moves in no mode.
     ///
     /// # Errors
-    /// FB212 and FB214, as [`FlexBody::carried`].
+    /// The errors FB212 and FB214 of [`FlexBody::carried`].
     fn rests_on(&self, carrier: &Carrier) -> Result<bool> {
         if let (ReferenceConditions::Interface(own), Carrier::Interface(name)) = (self.conditions(), carrier)
             && own == name
@@ -236,7 +239,7 @@ impl FlexBody {
         Ok(at.reference == Vector3::zeros() && self.rests(&at.motion))
     }
 
-    /// Whether the place with `motion` moves in no mode.
+    /// Returns true if a point with `motion` (6 x nf) moves in no mode.
     fn rests(&self, motion: &Mat<f64>) -> bool {
         let extent = self.extent();
         (0..self.n_modes()).all(|j| {
@@ -292,10 +295,11 @@ fn refused(message: String) -> Error {
     Diagnostic::new(Code::CarrierImpossible, message).into()
 }
 
-/// Energy, relative to that of the direction with most, below which there is nothing in a direction.
+/// Relative energy of a direction, compared with the largest, below which the direction counts as free of
+/// energy.
 const NO_ENERGY: f64 = 1e-9;
 
-/// The largest b'P b / b'W b over all directions b that `whole` = W has energy in.
+/// Returns the largest b'P b / b'W b over all directions b in which `whole` = W has energy.
 fn largest_part(part: &Matrix3<f64>, whole: &Matrix3<f64>) -> f64 {
     let eigen = whole.symmetric_eigen();
     let most = eigen.eigenvalues.max();

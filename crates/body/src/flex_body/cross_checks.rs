@@ -1,15 +1,15 @@
-//! What parts of a body say of each other that no theorem about one of them alone does (theory section 10): a
-//! file whose digests were stated anew after a change is found by these where mechanics can tell.
+//! Cross-checks between parts of a body that no theorem about a single part covers (theory section 10).
+//! They detect a changed file with recomputed digests, as far as mechanics can.
 
 use super::{MassStructure, Parts};
 use crate::invariants::{CauchySchwarz, IdentityCheck, LumpedScheme};
 use flexbody_linalg::{larger, largest};
 
-/// Two ways to the same sum: rounding, relative to its Cauchy-Schwarz bound.
+/// Allowed rounding error between two ways to one sum, relative to its Cauchy-Schwarz bound.
 const ROUNDING: f64 = 1e-12;
 
 impl Parts {
-    /// Masses, modes and damping against each other.
+    /// Checks masses, modes and damping against each other.
     pub(super) fn cross_checks(&self) -> Vec<IdentityCheck> {
         let row_sums =
             if self.source.mass_structure == MassStructure::General { None } else { self.row_sums() };
@@ -17,7 +17,7 @@ impl Parts {
         all.chain(self.inertia_stiffness_of_moments()).collect()
     }
 
-    /// Row sums keep the mass, the centre of mass and the linear momentum of every mode.
+    /// Checks that row sums preserve the mass, the centre of mass and the linear momentum of every mode.
     fn row_sums(&self) -> Option<IdentityCheck> {
         let lumped =
             &self.lumped.iter().find(|lumped| lumped.scheme == LumpedScheme::RowSum.name())?.invariants;
@@ -27,7 +27,7 @@ impl Parts {
             |difference: f64, bound: f64| if difference == 0.0 { 0.0 } else { difference.abs() / bound };
         let first =
             (0..3).map(|k| relative(own.first_moment()[k] - lumped.first_moment()[k], bound.first_moment(k)));
-        // Rows without a place are none of a node's.
+        // Rows without a position belong to no node.
         let modes = if self.modes.internal.is_none() { own.n_modes() } else { 0 };
         let c1 = (0..modes).flat_map(|p| {
             let bound = &bound;
@@ -42,21 +42,21 @@ impl Parts {
         ))
     }
 
-    /// The stiffness of inertia follows from the moments of the nodes and their rotations.
+    /// Checks that the stiffness of inertia follows from the moments of the nodes and their rotations.
     fn inertia_stiffness_of_moments(&self) -> Option<IdentityCheck> {
         let (own, rotation) = (self.inertia_stiffness.as_ref()?, self.modes.rotation.as_ref()?);
         let formula = "K = sum over the nodes of theta' (sym G - tr G I) theta";
-        // Both rotations of a product are rounded.
+        // Both rotations in a product are rounded.
         let limit = ROUNDING + 4.0 * self.storage.rounding();
         let value = own.deviation(rotation.as_ref(), self.dimension);
         Some(IdentityCheck::new("inertia_stiffness", formula, value, limit))
     }
 
-    /// Damping ratios are those of the diagonal of the modal damping.
+    /// Checks that the damping ratios follow from the diagonal of the modal damping.
     fn damping_ratios(&self) -> Option<IdentityCheck> {
         let damping = self.modes.modal_damping.as_ref()?;
         let size = damping.norm_max();
-        // A ratio is never negative: what is below zero on the diagonal is rounding.
+        // A ratio is never negative: negative diagonal entries are rounding.
         let difference = |(j, lambda): (usize, &f64)| {
             let by_ratio = 2.0 * self.modes.damping_ratio[j] * lambda.sqrt();
             let difference = (by_ratio - damping[(j, j)].max(0.0)).abs();

@@ -1,4 +1,4 @@
-//! A body with other reference conditions: in mean axes, or with its frame on an interface.
+//! Change of the reference conditions of a body: to mean axes, or to a frame on an interface.
 
 use super::modal_change::{ModalChange, diagonal_eigenvalues, reduced_residuals};
 use super::{Carrier, Certificate, FlexBody, LoadKind, LumpedBody, Modes, Parts, ReferenceConditions};
@@ -11,13 +11,13 @@ use nalgebra::Matrix3;
 use std::borrow::Cow;
 
 impl FlexBody {
-    /// Returns the body in mean axes: rigid motion is taken out of the modes, which are normalised again (theory 5.2).
-    /// A body in mean axes is returned as it is.
+    /// Returns the body in mean axes: rigid motion is removed from the modes, which are normalised again
+    /// (theory 5.2). A body already in mean axes is returned unchanged.
     ///
     /// # Errors
-    /// [`CarrierImpossible`](Code::CarrierImpossible) for a body without all groups of the kinetic energy, with
-    /// geometric stiffness of forces or accelerations, or with rows that belong to no node: how these change is not
-    /// known without the FE model.
+    /// [`CarrierImpossible`](Code::CarrierImpossible) for a body without all groups of the kinetic energy,
+    /// with geometric stiffness of forces or accelerations, or with rows that belong to no node: their
+    /// change is unknown without the FE model.
     pub fn in_mean_axes(&self) -> Result<Cow<'_, Self>> {
         if self.conditions().is_mean() {
             return Ok(Cow::Borrowed(self));
@@ -31,7 +31,7 @@ impl FlexBody {
     /// Returns the body in mean axes with its frame at `at`; `Model` keeps origin and axes.
     ///
     /// # Errors
-    /// Every error of [`FlexBody::in_mean_axes`].
+    /// The errors of [`FlexBody::in_mean_axes`].
     pub fn in_mean_axes_at(&self, at: BodyFrame) -> Result<Self> {
         let body = self.in_mean_axes()?.into_owned();
         let invariants = body.invariants();
@@ -49,11 +49,11 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// Returns the body with its frame on the interface `name`: origin at its reference point, axes of the model, the
-    /// modes those of the body that is held there (constrained modes in the span of the frame and the modes).
+    /// Returns the body with its frame on the interface `name`: origin at its reference point, axes of the
+    /// model, and the modes of the body held there (constrained modes in the span of frame and modes).
     ///
     /// # Errors
-    /// Every error of [`FlexBody::carried`] and [`FlexBody::in_mean_axes`].
+    /// The errors of [`FlexBody::carried`] and [`FlexBody::in_mean_axes`].
     pub fn on_interface(&self, name: &str) -> Result<Self> {
         let conditions = ReferenceConditions::Interface(name.to_owned());
         if *self.conditions() == conditions {
@@ -68,10 +68,11 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// Refuses a body that is not in mean axes for a `task` (`select`, `trade`) that decides about free modes.
+    /// Returns an error if the body is not in mean axes, for a `task` (`select`, `trade`) that decides
+    /// about free modes.
     ///
     /// # Errors
-    /// [`SceneBody`](Code::SceneBody).
+    /// [`SceneBody`](Code::SceneBody) for a body with other reference conditions.
     pub fn require_mean_axes(&self, task: &str) -> Result<()> {
         if self.conditions().is_mean() {
             return Ok(());
@@ -81,7 +82,8 @@ impl FlexBody {
         Err(Diagnostic::new(Code::SceneBody, message).with_help(help).into())
     }
 
-    /// Refuses a change of the reference conditions to `wanted` under which a part of the body would be unknown.
+    /// Returns an error if the change of the reference conditions to `wanted` would leave a part of the
+    /// body unknown.
     fn refuse_changed_frame(&self, wanted: &str) -> Result<()> {
         let conditions = self.conditions();
         let refuse = |what: &str, help: &str| {
@@ -151,13 +153,14 @@ fn impossible(message: String) -> Error {
     Diagnostic::new(Code::CarrierImpossible, message).into()
 }
 
-/// Lumped invariants with the same change of the modes, compared again.
+/// Applies the change of modes to lumped invariants and compares them again.
 fn changed_lumped(own: &LumpedBody, change: &ModalChange, exact: &Invariants) -> LumpedBody {
     let invariants = change.invariants(&own.invariants);
     LumpedBody { comparison: error_norms(exact, &invariants), invariants, ..own.clone() }
 }
 
-/// The certificate of a body whose modes are combinations of those that were proved.
+/// Returns the certificate of a body whose modes are combinations of modes with a proof: the proof does not
+/// carry over.
 fn unproved(parts: &Parts) -> Certificate {
     let own = &parts.certificate;
     let about = "combinations of the modes of a body with other reference conditions";

@@ -1,4 +1,4 @@
-//! A body with its numbers in other units.
+//! Conversion of a body to other units.
 
 use super::{
     Certificate, FixedInterface, FlexBody, Guarantee, InterfaceCoordinates, InternalRows, LumpedBody, Modes,
@@ -10,7 +10,7 @@ use flexbody_base::error::Result;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{GeometricStiffness, LoadKind, NodeMoments};
 
-/// What a number is multiplied by when its unit changes, from its powers of mass, length and time.
+/// Factor of a number for a change of units, from its powers of mass, length and time.
 #[derive(Clone, Copy)]
 struct Change {
     mass: f64,
@@ -19,17 +19,17 @@ struct Change {
 }
 
 impl Change {
-    /// mass^(halves/2) length^l time^t.
+    /// Returns mass^(halves/2) length^l time^t.
     fn of(self, mass_halves: i32, length: i32, time: i32) -> f64 {
         self.mass.sqrt().powi(mass_halves) * self.length.powi(length) * self.time.powi(time)
     }
 
-    /// One over time squared.
+    /// Returns the factor of an eigenvalue: one over time squared.
     fn eigenvalue(self) -> f64 {
         self.of(0, 0, -2)
     }
 
-    /// A modal coordinate of a mass-normalised mode: sqrt(mass) length.
+    /// Returns the factor of a modal coordinate of a mass-normalised mode: sqrt(mass) length.
     fn modal(self) -> f64 {
         self.of(1, 1, 0)
     }
@@ -60,14 +60,14 @@ impl Change {
         }
     }
 
-    /// K_geo of a unit load: 1/time^2 over the unit of the load.
+    /// Returns K_geo of a unit load in the new units: 1/time^2 over the unit of the load.
     fn geometric(self, given: &GeometricStiffness<Mat<f64>>) -> GeometricStiffness<Mat<f64>> {
         let load = match given.load.kind {
             LoadKind::Acceleration => self.of(0, 1, -2),
             LoadKind::AngularAcceleration | LoadKind::Spin => self.of(0, 0, -2),
             LoadKind::Force(_) => self.of(2, 1, -2),
             LoadKind::Moment(_) => self.of(2, 2, -2),
-            // Of a load that is known by its name only, the unit is the user's.
+            // The unit of a load known by its name only is chosen by the user.
             LoadKind::Named(_) => 1.0,
         };
         GeometricStiffness {
@@ -114,7 +114,8 @@ fn times(a: &Mat<f64>, factor: f64) -> Mat<f64> {
 }
 
 impl Change {
-    /// Unit of a coordinate by its name: a modal amplitude, the rotation `... rx`, or a displacement.
+    /// Returns the factor of a coordinate by its name: a modal amplitude, the rotation `... rx`, or a
+    /// displacement.
     fn coordinate(self, name: &str) -> f64 {
         let last = name.rsplit(' ').next().unwrap_or(name);
         if name.starts_with("fixed-interface mode ") {
@@ -144,12 +145,12 @@ impl Change {
 }
 
 impl FlexBody {
-    /// The same body with every number in `units`, which count as stated. Modes stay mass-normalised: their
-    /// shapes change with the unit of mass. Geometric stiffness of a load that is known by its name only
-    /// keeps the unit of its load.
+    /// Returns this body with every number in `units`, which then count as stated. Modes stay
+    /// mass-normalised: their shapes change with the unit of mass. Geometric stiffness of a load known by
+    /// its name only keeps the unit of its load.
     ///
     /// # Errors
-    /// Those of [`FlexBody::new`], where numbers leave the range of double precision.
+    /// The errors of [`FlexBody::new`], if numbers leave the range of double precision.
     pub fn in_units(&self, units: &UnitSystem) -> Result<Self> {
         let old = self.units();
         let ratio = |old: f64, new: f64| old / new;

@@ -1,50 +1,52 @@
-//! Interfaces of a body: what a joint needs of them.
+//! Interfaces of a body with the data that a joint needs.
 
 use super::rigid_motion::{has_rotations, stacked};
 use faer::{Mat, MatRef};
 use flexbody_linalg::combine;
 use flexbody_model::{Coupling, InterfaceMotion, Nodes};
 
-/// A named interface of the body.
+/// Named interface of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Interface {
     /// Name.
     pub name: String,
-    /// Indices into the body's nodes.
+    /// Indices into the nodes of the body.
     pub nodes: Vec<usize>,
-    /// How the nodes are coupled to the reference point, where that was stated.
+    /// Coupling of the nodes to the reference point, if stated.
     pub coupling: Option<Coupling>,
-    /// Reference point in the body frame; none of a free interface.
+    /// Reference point in the body frame; `None` for a free interface.
     pub reference: Option<[f64; 3]>,
 }
 
-/// Displacement relative to the largest of the modes below which an interface is at rest, as one that the frame of the
-/// body stands on: rounding is not its deformation.
+/// Displacement relative to the largest of the modes below which an interface counts as at rest, such as
+/// the interface that carries the frame: its rounding errors are no deformation.
 const AT_REST: f64 = 1e-6;
 
-/// What the modes do at the reference point of an interface, in body axes: the rigid motion that fits that of
-/// the nodes best.
+/// Motion of the reference point of an interface in the modes, body axes: the rigid motion that best fits
+/// the motion of the nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceRows {
-    /// 3 x nf.
+    /// Translation (3 x nf).
     pub translation: Mat<f64>,
-    /// 3 x nf; none where the nodes lie on one line and determine no rotation.
+    /// Rotation (3 x nf); `None` if the nodes lie on one line and do not determine it.
     pub rotation: Option<Mat<f64>>,
-    /// Root mean square over the nodes of what the fit leaves of the displacement (nf): zero where they move
-    /// as a rigid body.
+    /// Root mean square over the nodes of the deviation from the fit (nf): zero if the nodes move as a
+    /// rigid body.
     pub misfit: Vec<f64>,
-    /// Root mean square over the nodes of their largest displacement in any mode, at least that of an interface at rest.
+    /// Root mean square over the nodes of their largest displacement in any mode, at least that of an
+    /// interface at rest.
     largest: f64,
 }
 
 impl InterfaceRows {
-    /// Translation and rotation of the reference point in every mode (6 x nf); `None` where no rotation is determined.
+    /// Returns translation and rotation of the reference point in every mode (6 x nf); `None` if the
+    /// rotation is not determined.
     pub fn rigid_motion(&self) -> Option<Mat<f64>> {
         self.rotation.as_ref().map(|rotation| stacked(&self.translation, rotation))
     }
 
-    /// The mode in which the interface deforms most, and how much, relative to its largest motion in any
-    /// mode.
+    /// Returns the mode in which the interface deforms most, and this deformation relative to the largest
+    /// motion of the interface in any mode.
     pub fn deformation(&self) -> (usize, f64) {
         let worst = |most: (usize, f64), (j, &e): (usize, &f64)| if e > most.1 { (j, e) } else { most };
         let (mode, misfit) = self.misfit.iter().enumerate().fold((0, 0.0), worst);
@@ -53,8 +55,8 @@ impl InterfaceRows {
 }
 
 impl Interface {
-    /// The rows of the modes (`shape` and, where nodes have rotations, `rotation`: 3n x nf) at the reference
-    /// point; `None` without one, or where they are no finite numbers.
+    /// Computes the motion of the reference point in the modes (`shape` and, if nodes have rotations,
+    /// `rotation`: 3n x nf). Returns `None` without a reference point, or if a result is not finite.
     pub fn rows(
         &self,
         nodes: &Nodes,
@@ -73,6 +75,7 @@ impl Interface {
                 (Some(row), Some(rotation)) => rotation[(3 * self.nodes[row / 3] + row % 3, j)],
                 _ => shape[(3 * self.nodes[row / d] + row % d, j)],
             });
+        // Best-fitting rigid motion, and the deviation of the displacements from it.
         let q = motion.fit(all.as_ref());
         let u = all.as_ref().subrows(0, d * k).to_owned();
         let left = &u - combine(motion.rigid().subrows(0, d * k), q.as_ref());

@@ -1,4 +1,4 @@
-//! What must hold for a body in the coordinates of its interfaces.
+//! Identities of a body in the coordinates of its interfaces.
 
 use super::{InterfaceCoordinates, Parts, ReferenceConditions};
 use crate::invariants::IdentityCheck;
@@ -8,30 +8,32 @@ use flexbody_model::{rigid_count, rigid_fields, span};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
 
-/// What the numbers of two ways to the same energy may differ by.
+/// Allowed difference of an energy computed in two ways.
 const ENERGY: f64 = 1e-9;
 
-/// Rounding of B'M B, relative to the sum of the magnitudes of its summands, which cancel in slender bodies with many
-/// modes. Measured: 1e-16 to 2.8e-16 of these sums, which reach 2.5e9 for a bar of five thousand times its width with 240
-/// fixed-interface modes.
+/// Rounding error of B'M B, relative to the sum of the magnitudes of its summands, which cancel in slender
+/// bodies with many modes. Measured: 1e-16 to 2.8e-16 of these sums, which reach 2.5e9 for a bar of five
+/// thousand times its width with 240 fixed-interface modes.
 const SUMMANDS: f64 = 4.0 * f64::EPSILON;
 
-/// Motion that rounding leaves an interface on which the frame stands, relative to the largest displacement of the mode.
+/// Allowed motion of the interface that carries the frame, relative to the largest displacement of the
+/// mode; rounding causes it.
 const AT_REST: f64 = 1e-9;
 
 impl Parts {
-    /// The identity of a frame that stands on an interface: its reference point is the origin and moves in no mode.
+    /// Checks a frame on an interface: the reference point is the origin and is at rest in every mode.
     pub(super) fn frame_at_rest(&self) -> Option<IdentityCheck> {
         let ReferenceConditions::Interface(name) = &self.conditions else { return None };
         let interface = self.interfaces.iter().find(|interface| interface.name == *name)?;
         let reference = interface.reference?;
         let rotation = self.modes.rotation.as_ref().map(Mat::as_ref);
         let rows = interface.rows(&self.nodes, self.modes.shape.as_ref(), rotation, self.dimension)?;
-        // A rotation displaces the nodes of the interface by their distances; a single node has none.
+        // A rotation displaces the nodes of the interface by their distances; for a single node the extent
+        // of the body counts.
         let places: Vec<[f64; 3]> = interface.nodes.iter().map(|&i| self.nodes.positions[i]).collect();
         let (extent, own) = (span(&self.nodes.positions), span(&places));
         let arm = if own > 0.0 { own } else { extent };
-        // Rotations of a single node that rests are zeros, as those of nodes without rotations.
+        // Rotations of a single node at rest are zeros, as for nodes without rotations.
         let unknown = if self.modes.rotation.is_some() { 0.0 } else { f64::INFINITY };
         let moved = |j: usize| {
             let turned = rows.rotation.as_ref().map_or(unknown, |rotation| arm * rotation.col(j).norm_max());
@@ -47,8 +49,8 @@ impl Parts {
         ))
     }
 
-    /// What must hold for the interface coordinates: they carry the energies of the modes and the mass of the
-    /// rigid body.
+    /// Returns the identities of the interface coordinates: they reproduce the energies of the modes and
+    /// the mass of the rigid body.
     pub fn interface_identities(&self) -> Vec<IdentityCheck> {
         let Some(coordinates) = &self.coordinates else { return Vec::new() };
         let InterfaceCoordinates { stiffness, mass, of_modes, .. } = coordinates;
@@ -66,7 +68,8 @@ impl Parts {
                 "interface_stiffness",
                 "B' K B = diag(lambda)",
                 worst(&|i, j| energy[(i, j)] / (root[i] * root[j]) - identity(i, j), nf, nf),
-                // What K makes of rigid motion is in the shapes, but not in the modes.
+                // The shapes contain the strain energy of rigid motion due to rounding of K, the modes do
+                // not.
                 ENERGY + 10.0 * self.certificate.rigid_noise + self.certificate.eigenvalue_rounding,
             ),
             interface_mass(&inertia, &twice(&magnitudes(mass), &magnitudes(of_modes))),
@@ -95,8 +98,8 @@ impl Parts {
         checks
     }
 
-    /// R (nc x 6, in the plane nc x 3): rigid motion about the origin of the body frame in interface
-    /// coordinates. `None` when the coordinates are not those of the interfaces.
+    /// Returns R (nc x 6, in the plane nc x 3): rigid motion about the origin of the body frame in
+    /// interface coordinates. Returns `None` if the coordinates are not those of the interfaces.
     pub fn rigid_coordinates(&self) -> Option<Mat<f64>> {
         let (coordinates, d) = (self.coordinates.as_ref()?, self.dimension);
         let fields = |positions: &[[f64; 3]]| rigid_fields(positions, d, [0.0; 3], 1.0);
@@ -120,19 +123,20 @@ impl Parts {
         }
         let size = coordinates.names.len();
         let modal = coordinates.names.iter().filter(|name| name.starts_with("fixed-interface mode ")).count();
-        // Rotations of the nodes of a free interface are not told from the interface alone.
+        // The interface alone does not determine the rotations of the nodes of a free interface.
         (rows.len() + modal == size).then(|| {
             Mat::from_fn(size, rigid_count(d), |i, j| rows.get(i).map_or(0.0, |row: &Vec<f64>| row[j]))
         })
     }
 
-    /// The mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the origin of
-    /// the body frame, body axes: translations, then rotations.
+    /// Returns the mass matrix \[m I, -c~; c~, I0\] of the rigid body (6 x 6, in the plane 3 x 3) about the
+    /// origin of the body frame, body axes: translations, then rotations.
     pub fn rigid_mass(&self) -> Mat<f64> {
         let (m, c, inertia) =
             (self.invariants.mass(), self.invariants.first_moment(), self.invariants.inertia());
         let lever: Matrix3<f64> = Vector3::cross_matrix(&c);
-        // Translations and rotations that are there: in the plane two and the third.
+        // Existing translations and rotations: in the plane two translations and the rotation about the
+        // third axis.
         let axes: Vec<usize> = if self.dimension == 2 { vec![0, 1, 5] } else { (0..6).collect() };
         Mat::from_fn(axes.len(), axes.len(), |i, j| match (axes[i], axes[j]) {
             (i, j) if i < 3 && j < 3 => m * f64::from(i == j),
@@ -147,8 +151,8 @@ fn magnitudes(a: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)].abs())
 }
 
-/// Checks B'M B = I against the rounding of its summands, whose magnitudes add up to `sums`: the entry that misses its
-/// limit by most.
+/// Checks B'M B = I against the rounding error of its summands, whose magnitudes add up to `sums`. Returns
+/// the check of the worst entry.
 fn interface_mass(product: &Mat<f64>, sums: &Mat<f64>) -> IdentityCheck {
     let n = product.nrows();
     let entries = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));

@@ -1,4 +1,4 @@
-//! The product: a validated flexible body, independent of the files it came from and goes to.
+//! Validated flexible body, independent of the files it came from and goes to.
 
 mod body;
 mod carried;

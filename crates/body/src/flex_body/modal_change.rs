@@ -1,4 +1,4 @@
-//! Changes of the modal coordinates of a body: to mean axes, or to normalised modes in the frame that it has
+//! Changes of the modal coordinates of a body: to mean axes, or to normalised modes in the present frame
 //! (theory 5.2).
 
 use super::rigid_motion::{rotations_without, shapes_without};
@@ -6,23 +6,24 @@ use crate::invariants::{GeneralTerms, Invariants, symmetric_part};
 use faer::Mat;
 use flexbody_linalg::{dense_cholesky, solve_lower, solve_upper, symmetric_eigen};
 
-/// Part of the squared M-norm that rigid motion leaves of a motion of the modes, below which the motion is rigid.
+/// Part of the squared M-norm left after removal of rigid motion, below which a combination of modes is a
+/// rigid motion.
 const RIGID: f64 = 1e-10;
 
-/// Modes psi' = (Psi - R(x) A) X with the rigid motions R about the origin of the frame. Nodal motions that the
-/// frame and the modes span together stay the same.
+/// New modes psi' = (Psi - R(x) A) X with the rigid motions R about the origin of the frame. The span of
+/// frame motion and modes does not change.
 #[derive(Debug, Clone)]
 pub struct ModalChange {
     /// X (nf x nf').
     modes: Mat<f64>,
-    /// A (6 x nf): translation and rotation that is taken from each old mode; `None` if the frame stays tied to the
-    /// body as it is.
+    /// A (6 x nf): translation and rotation removed from each old mode; `None` if the frame stays tied to
+    /// the body unchanged.
     taken: Option<Mat<f64>>,
-    /// Rigid motions among the modes, which are left out.
+    /// Rigid motions among the modes, which are removed.
     left_out: RigidMotions,
 }
 
-/// Rigid motions that a set of modes spans.
+/// Rigid motions in the span of a set of modes.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RigidMotions {
     /// Dimension of the span.
@@ -32,7 +33,8 @@ pub struct RigidMotions {
 }
 
 impl RigidMotions {
-    /// `modes 1, 4 are rigid motions`, `3 combinations of the modes are rigid motions`; `None` without any.
+    /// Returns a text such as `modes 1, 4 are rigid motions` or `3 combinations of the modes are rigid
+    /// motions`; `None` if there are none.
     pub fn in_words(&self) -> Option<String> {
         let named =
             |modes: &[usize]| modes.iter().map(|j| (j + 1).to_string()).collect::<Vec<_>>().join(", ");
@@ -50,18 +52,19 @@ impl RigidMotions {
     }
 }
 
-/// Rigid motions of a dimension, among three translations and three rotations.
+/// Returns the indices of the rigid motions of a dimension, among three translations and three rotations.
 fn rigid_axes(dimension: usize) -> &'static [usize] {
     if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
 }
 
-/// The modes split by what rigid motion leaves of them.
+/// Modes split into a rigid part and deformation.
 struct Split {
-    /// A (6 x nf): the rigid motion that is nearest to each mode in the norm of M.
+    /// A (6 x nf): the rigid motion nearest to each mode in the M-norm.
     rigid: Mat<f64>,
-    /// Z (nf x nf'): combinations of the modes that deform the body, orthonormal in m_ff and in what is left of it.
+    /// Z (nf x nf'): combinations of the modes that deform the body, orthonormal in m_ff and orthogonal in
+    /// the mass without rigid motion.
     deforming: Mat<f64>,
-    /// Part of the squared M-norm that rigid motion leaves of each of them.
+    /// Part of the squared M-norm of each combination left after removal of rigid motion.
     left: Vec<f64>,
     rigid_motions: RigidMotions,
 }
@@ -90,7 +93,8 @@ impl Split {
                 j + 1
             ));
         }
-        // What is left of m_ff, relative to it: squared sines of the angles to rigid motion.
+        // m_ff without rigid motion, relative to m_ff: its eigenvalues are the squared sines of the angles
+        // to rigid motion.
         let Some(modal_lower) = dense_cholesky(modal.clone()) else {
             return Err("modes depend on each other: their mass matrix is not positive definite".to_owned());
         };
@@ -115,22 +119,23 @@ impl Split {
     }
 }
 
-/// Rigid motions among the modes of a body in space.
+/// Returns the rigid motions among the modes of a body in space.
 ///
 /// # Errors
-/// The reason in words if the mass is that of no body.
+/// A text with the reason if the mass data belong to no physical body.
 pub fn rigid_motions(invariants: &Invariants) -> Result<RigidMotions, String> {
     Split::new(invariants, 3).map(|split| split.rigid_motions)
 }
 
 impl ModalChange {
-    /// The change to mean axes: the rigid part is taken out of the modes, and these are normalised.
+    /// Returns the change to mean axes: removes the rigid part of the modes and normalises them.
     ///
     /// # Errors
-    /// The reason in words: modes that depend on each other or deform nothing, a stiffness that is not positive.
+    /// A text with the reason: modes that depend on each other or deform nothing, or a stiffness that is
+    /// not positive.
     pub(crate) fn to_mean_axes(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let split = Split::new(invariants, dimension)?;
-        // Z scaled by what is left: orthonormal in the mass beside rigid motion.
+        // Scale Z to be orthonormal in the mass without rigid motion.
         let scaled = Mat::from_fn(split.deforming.nrows(), split.left.len(), |i, j| {
             split.deforming[(i, j)] / split.left[j].sqrt()
         });
@@ -138,28 +143,28 @@ impl ModalChange {
         Ok(Self { modes, taken: Some(split.rigid), left_out: split.rigid_motions })
     }
 
-    /// The change to normalised modes in the frame that the body has: rigid motions among the modes are left out,
-    /// m_ff becomes the unit matrix and K_ff diagonal.
+    /// Returns the change to normalised modes in the present frame: rigid motions among the modes are
+    /// removed, m_ff becomes the unit matrix and K_ff diagonal.
     ///
     /// # Errors
-    /// Every error of `ModalChange::to_mean_axes`.
+    /// The errors of `ModalChange::to_mean_axes`.
     pub fn in_own_frame(invariants: &Invariants, dimension: usize) -> Result<Self, String> {
         let split = Split::new(invariants, dimension)?;
         let modes = eigenmodes(invariants, &split.deforming)?;
         Ok(Self { modes, taken: None, left_out: split.rigid_motions })
     }
 
-    /// Rigid motions among the modes, which are left out.
+    /// Returns the rigid motions among the modes, which are removed.
     pub fn left_out(&self) -> &RigidMotions {
         &self.left_out
     }
 
-    /// X'A X.
+    /// Returns X'A X.
     pub fn congruent(&self, a: &Mat<f64>) -> Mat<f64> {
         symmetric_part(&(self.modes.transpose() * a * &self.modes))
     }
 
-    /// Displacements of nodes (3n x nf) at `positions` in the new modes.
+    /// Returns the displacements of nodes (3n x nf) at `positions` in the new modes.
     pub fn shapes(&self, shape: &Mat<f64>, positions: &[[f64; 3]]) -> Mat<f64> {
         match &self.taken {
             Some(taken) => shapes_without(taken, shape, positions) * &self.modes,
@@ -167,7 +172,7 @@ impl ModalChange {
         }
     }
 
-    /// Rotations of nodes (3n x nf) in the new modes; nodes without rotations, whose rows are zeros, keep them.
+    /// Returns the rotations of nodes (3n x nf) in the new modes. Nodes without rotations have zero rows.
     pub fn rotations(&self, rotation: &Mat<f64>) -> Mat<f64> {
         match &self.taken {
             Some(taken) => rotations_without(taken, rotation) * &self.modes,
@@ -175,22 +180,22 @@ impl ModalChange {
         }
     }
 
-    /// The invariants in the new modes (see [`Invariants::without_rigid_motion`] for masses that do not commute with
-    /// rotations).
+    /// Returns the invariants in the new modes (see [`Invariants::without_rigid_motion`] for masses that do
+    /// not commute with rotations).
     pub fn invariants(&self, old: &Invariants) -> Invariants {
         let tied = self.taken.as_ref().map(|taken| old.without_rigid_motion(taken.as_ref()));
         normalised(tied.as_ref().unwrap_or(old).with_basis(self.modes.as_ref()))
     }
 }
 
-/// Invariants whose stored modal mass, if they have one of their own, is the unit matrix.
+/// Returns the invariants with the unit matrix as modal mass, if they store a modal mass.
 fn normalised(new: Invariants) -> Invariants {
     let Some(general) = new.general().cloned() else { return new };
     let (groups, count) = (new.groups(), new.n_modes());
     new.with_general(GeneralTerms { modal_mass: Mat::identity(count, count), ..general }).with_groups(groups)
 }
 
-/// The diagonal of K_ff, ascending: rounding may have exchanged entries that repeat.
+/// Returns the diagonal of K_ff, ascending: rounding may have exchanged repeated entries.
 pub fn diagonal_eigenvalues(invariants: &Invariants) -> Vec<f64> {
     let mut largest = 0.0f64;
     let mut next = |j: usize| {
@@ -200,14 +205,14 @@ pub fn diagonal_eigenvalues(invariants: &Invariants) -> Vec<f64> {
     (0..invariants.n_modes()).map(&mut next).collect()
 }
 
-/// Residuals |K x - lambda x| / (2 lambda) of the unit vectors x in the reduced stiffness.
+/// Returns the residuals |K x - lambda x| / (2 lambda) of the unit vectors x in the reduced stiffness.
 pub fn reduced_residuals(invariants: &Invariants, eigenvalue: &[f64]) -> Vec<f64> {
     let k = invariants.modal_stiffness();
     let beside = |j: usize| (0..eigenvalue.len()).filter(|i| *i != j).map(|i| k[(i, j)].powi(2)).sum::<f64>();
     eigenvalue.iter().enumerate().map(|(j, l)| beside(j).sqrt() / (2.0 * l)).collect()
 }
 
-/// Eigenmodes of K_ff in the span of `basis` (nf x nf'), whose mass is the unit matrix.
+/// Returns the eigenmodes of K_ff in the span of `basis` (nf x nf'), whose mass is the unit matrix.
 fn eigenmodes(invariants: &Invariants, basis: &Mat<f64>) -> Result<Mat<f64>, String> {
     let stiffness = symmetric_part(&(basis.transpose() * invariants.modal_stiffness() * basis));
     let eigen = symmetric_eigen(stiffness.as_ref());
@@ -216,7 +221,7 @@ fn eigenmodes(invariants: &Invariants, basis: &Mat<f64>) -> Result<Mat<f64>, Str
     };
     let mut modes = basis * &eigen.vectors;
     for j in 0..modes.ncols() {
-        // The largest part of each new mode keeps its sign.
+        // Choose the sign that makes the largest component of each mode positive.
         let larger = |a: f64, b: &f64| if b.abs() > a.abs() { *b } else { a };
         if modes.col(j).iter().fold(0.0, larger) < 0.0 {
             (0..modes.nrows()).for_each(|i| modes[(i, j)] = -modes[(i, j)]);

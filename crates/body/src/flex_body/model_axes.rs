@@ -1,4 +1,4 @@
-//! A body in a frame along the axes of its model.
+//! Transformation of a body to a frame along the axes of its model.
 
 use super::{FlexBody, GeometricStiffness, InternalRows, LumpedBody, ReferenceConditions, UnitLoad};
 use crate::invariants::InertiaStiffness;
@@ -7,37 +7,37 @@ use flexbody_base::error::Result;
 use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
 
-/// Direction cosines up to this are rounding.
+/// Direction cosines up to this magnitude are rounding and count as zero.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
 impl FlexBody {
-    /// The same body in a frame whose axes are those of the model and whose origin is at `origin` (body
-    /// frame). Nothing but the description changes: modal coordinates, mode shapes in space and energies stay
-    /// what they are. Interface coordinates are left out.
+    /// Returns this body in a frame along the axes of the model with its origin at `origin` (body frame).
+    /// Only the description changes: modal coordinates, spatial mode shapes and energies stay equal.
+    /// Interface coordinates are dropped.
     ///
-    /// Positions x' = A (x - d), shapes A psi with A = `frame().axes`; the invariants by (5.1) of the theory.
-    /// Geometric stiffness for spin and angular acceleration about the new origin follows from that for
-    /// acceleration, a = a' - alpha x d - omega x (omega x d).
+    /// Positions become x' = A (x - d), shapes A psi with A = `frame().axes`; the invariants follow (5.1)
+    /// of the theory. Geometric stiffness for spin and angular acceleration about the new origin follows
+    /// from that for acceleration, a = a' - alpha x d - omega x (omega x d).
     ///
     /// # Errors
-    /// Every error of [`FlexBody::new`], when numbers overflow.
+    /// The errors of [`FlexBody::new`], if numbers overflow.
     pub fn in_model_axes(&self, origin: Vector3<f64>) -> Result<Self> {
         let mut body = self.in_frame(origin, self.frame().axes.transpose())?;
-        // Without the rounding of a product of axes with their transpose.
+        // Set the axes exactly: the product of axes with their transpose has rounding errors.
         body.parts_mut().frame.axes = Matrix3::identity();
         Ok(body)
     }
 
-    /// Returns the body in a frame at `origin` with the columns of `axes` as axes, both in the body frame: as
-    /// [`FlexBody::in_model_axes`].
+    /// Returns the body in a frame at `origin` with the columns of `axes` as its axes, both given in the
+    /// body frame; see [`FlexBody::in_model_axes`] for the changes.
     ///
     /// # Errors
-    /// Every error of [`FlexBody::new`], when numbers overflow.
+    /// The errors of [`FlexBody::new`], if numbers overflow.
     pub fn in_frame(&self, origin: Vector3<f64>, axes: Matrix3<f64>) -> Result<Self> {
         let (to_new, to_body) = (axes.transpose(), axes);
         let mut parts = self.parts().clone();
         if !parts.conditions.is_mean() && origin != Vector3::zeros() {
-            // The frame is tied to the interface as before, but its origin is elsewhere.
+            // The frame stays tied to the interface, but its origin is elsewhere.
             parts.conditions = ReferenceConditions::Unstated;
         }
         parts.frame.origin += parts.frame.axes * origin;
@@ -66,8 +66,8 @@ impl FlexBody {
         Self::new(parts)
     }
 
-    /// The geometric stiffness of unit loads about the point `d` and along the columns of `axes`, both in the body
-    /// frame.
+    /// Returns the geometric stiffness of unit loads about the point `d` and along the columns of `axes`,
+    /// both in the body frame.
     pub fn geometric_stiffness_in(
         &self,
         d: &Vector3<f64>,
@@ -76,8 +76,8 @@ impl FlexBody {
         along(&stiffness_about(self.geometric_stiffness(), d, self.dimension()), axes)
     }
 
-    /// The stiffness of inertia about the point `d` and along the columns of `axes`, both in the body frame; `None`
-    /// where the body has none.
+    /// Returns the stiffness of inertia about the point `d` and along the columns of `axes`, both in the
+    /// body frame; `None` if the body has none.
     pub fn inertia_stiffness_in(&self, d: &Vector3<f64>, axes: &Matrix3<f64>) -> Option<InertiaStiffness> {
         let (own, rotation) = (self.inertia_stiffness()?, self.modes().rotation.as_ref()?);
         if *d == Vector3::zeros() && *axes == Matrix3::identity() {
@@ -89,22 +89,23 @@ impl FlexBody {
 }
 
 impl InternalRows {
-    /// Returns the rows with their vectors along the columns of `axes`; rows that are no vectors, which come last,
-    /// stay.
+    /// Returns the rows with their vectors along the columns of `axes`. Rows that are no vectors come last
+    /// and do not change.
     pub fn in_axes(&self, axes: &Matrix3<f64>) -> Self {
         let shape = turned(self.shape.as_ref(), &axes.transpose(), vectors(self));
         Self { dofs: self.dofs.clone(), shape }
     }
 }
 
-/// Rows of vectors, three per vector: they stand first, and are labelled with the directions 1, 2, 3.
+/// Returns the number of rows that belong to vectors: they come first, three per vector, with the
+/// directions 1, 2, 3 in their labels.
 fn vectors(internal: &InternalRows) -> usize {
     let complete =
         |dofs: &[[i64; 2]]| dofs.len() == 3 && (0..3).all(|k| dofs[k] == [dofs[0][0], (k + 1) as i64]);
     3 * internal.dofs.chunks(3).take_while(|dofs| complete(dofs)).count()
 }
 
-/// Vectors in groups of three rows, in other axes; rows from `end` on stay.
+/// Returns vectors (groups of three rows) in other axes; rows from `end` on do not change.
 fn turned(shape: MatRef<'_, f64>, axes: &Matrix3<f64>, end: usize) -> Mat<f64> {
     Mat::from_fn(shape.nrows(), shape.ncols(), |row, j| {
         if row >= end {
@@ -115,7 +116,7 @@ fn turned(shape: MatRef<'_, f64>, axes: &Matrix3<f64>, end: usize) -> Mat<f64> {
     })
 }
 
-/// Geometric stiffness for motion of the point `d` instead of the origin.
+/// Returns the geometric stiffness for motion of the point `d` instead of the origin.
 pub fn stiffness_about(
     given: &[GeometricStiffness<Mat<f64>>],
     d: &Vector3<f64>,
@@ -148,7 +149,7 @@ pub fn stiffness_about(
     all
 }
 
-/// Geometric stiffness for loads along the columns of `axes` (present axes).
+/// Returns the geometric stiffness for loads along the columns of `axes` (given in the present axes).
 fn along(given: &[GeometricStiffness<Mat<f64>>], axes: &Matrix3<f64>) -> Vec<GeometricStiffness<Mat<f64>>> {
     let mut all = Vec::new();
     for GeometricStiffness { load, matrix } in given {

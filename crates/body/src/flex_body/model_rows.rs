@@ -1,4 +1,4 @@
-//! The modes of a body in the rows and axes of the model that it was made of.
+//! Modes of a body in the rows and axes of its model.
 
 use super::{FlexBody, Interface};
 use crate::basis::CoupledModel;
@@ -7,8 +7,8 @@ use flexbody_linalg::gram;
 use flexbody_model::{FeModel, NodeSet};
 
 impl FlexBody {
-    /// The modes Psi (N x nf) in the rows and axes of the model that the body was made of; `None` when it
-    /// lacks rows of the model, or has others.
+    /// Returns the modes Psi (N x nf) in the rows and axes of the model that the body was made of; `None`
+    /// if the body has other rows than the model.
     pub fn vectors_of(&self, model: &FeModel) -> Option<Mat<f64>> {
         let split = self.rows_in_space(model)? - 3 * self.n_nodes();
         let (rows, modes, d) = (model.rows(), self.modes(), model.dimension());
@@ -33,10 +33,10 @@ impl FlexBody {
         }))
     }
 
-    /// The model under the couplings that every mode keeps: rigid interfaces of a Craig-Bampton body move as rigid bodies
-    /// there too.
+    /// Returns the model with the couplings that every mode preserves: rigid interfaces of a Craig-Bampton
+    /// body move as rigid bodies there as well.
     ///
-    /// * `vectors`: the modes in the rows of the model, as [`FlexBody::vectors_of`] returns them.
+    /// * `vectors`: modes in the rows of the model, as returned by [`FlexBody::vectors_of`].
     pub fn coupled_model<'m>(&self, model: &'m FeModel, vectors: MatRef<'_, f64>) -> CoupledModel<'m> {
         let set = |interface: &Interface| NodeSet {
             coupling: interface.coupling,
@@ -46,22 +46,22 @@ impl FlexBody {
         CoupledModel::of_modes(model, &sets, vectors)
     }
 
-    /// Psi'K Psi_r (nf x nr) with the modes Psi_r of another body of the same model: how each sees the
-    /// deformations of the other. `None` as [`FlexBody::vectors_of`].
+    /// Returns Psi'K Psi_r (nf x nr) with the modes Psi_r of another body of the same model: the elastic
+    /// coupling of the two bases. Returns `None` in the cases of [`FlexBody::vectors_of`].
     pub fn stiffness_beside(&self, other: &Self, model: &FeModel) -> Option<Mat<f64>> {
         let (own, others) = (self.vectors_of(model)?, other.vectors_of(model)?);
         Some(gram(own.as_ref(), model.pencil().apply_stiffness(others.as_ref()).as_ref()))
     }
 
-    /// Displacements of the modes in body axes, three per node and then per vector without a place; `None` as
-    /// [`FlexBody::vectors_of`].
+    /// Returns the displacements of the modes in body axes, three per node, then three per vector without a
+    /// position. Returns `None` in the cases of [`FlexBody::vectors_of`].
     pub(crate) fn displacements_of(&self, model: &FeModel) -> Option<Mat<f64>> {
         let rows = self.rows_in_space(model)?;
         Some(Mat::from_fn(rows, self.n_modes(), |row, j| self.displacement(row, j)))
     }
 
-    /// Displacement rows in space of nodes and vectors without a place, where the body has the rows of the
-    /// model.
+    /// Returns the number of spatial displacement rows of nodes and of vectors without a position, if the
+    /// body has the rows of the model.
     fn rows_in_space(&self, model: &FeModel) -> Option<usize> {
         let (rows, modes) = (model.rows(), self.modes());
         let massless = rows.without_place()[1].len();

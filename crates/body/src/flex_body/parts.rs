@@ -1,4 +1,4 @@
-//! What a flexible body is made of: plain data, not yet checked.
+//! Plain data of a flexible body, not yet checked.
 
 use super::{Interface, ReferenceConditions, Storage, TermDecision};
 use crate::basis::{FixedInterface, InterfaceCoordinates, Truncation};
@@ -8,20 +8,23 @@ use flexbody_base::provenance::SourceFile;
 use flexbody_base::units::UnitSystem;
 use flexbody_model::{BodyNumber, GeometricStiffness, Nodes, SurfaceMesh};
 
-/// Where a body came from.
+/// Provenance of a body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Source {
     /// Model name.
     pub name: String,
     /// Files and fingerprints.
     pub files: Vec<SourceFile>,
-    /// Which body of several in the same matrices it is, where these were split.
+    /// Number of this body if the matrices held several bodies and were split.
     pub number: Option<BodyNumber>,
-    /// Number of matrix rows of the FE model; 0 where these are not known, and the nodes may be some of many.
+    /// Number of matrix rows of the FE model; 0 if unknown, and then the nodes may be a subset of the
+    /// model's nodes.
     pub n_dofs: usize,
-    /// `rotation-invariant`: M = Ms kron I3; `diagonal`: the same and diagonal; `general`: neither.
+    /// Structure of the mass matrix. `rotation-invariant`: M = Ms kron I3; `diagonal`: rotation-invariant
+    /// and diagonal; `general`: neither.
     pub mass_structure: MassStructure,
-    /// Part of the mass that the invariants take as approximate; `None`: they are those of the matrices.
+    /// Description of the part of the mass that the invariants approximate; `None` if they are exact for
+    /// the matrices.
     pub approximation: Option<String>,
     /// Settings of the run that can change the result, as JSON.
     pub settings: serde_json::Value,
@@ -34,15 +37,15 @@ pub enum MassStructure {
     RotationInvariant,
     /// Rotation invariant and diagonal: lumped by the FE program.
     Diagonal,
-    /// Neither.
+    /// Neither rotation invariant nor diagonal.
     General,
 }
 
 impl MassStructure {
-    /// Every structure, in the order of the documentation.
+    /// All structures, in the order of the documentation.
     pub const ALL: [Self; 3] = [Self::RotationInvariant, Self::Diagonal, Self::General];
 
-    /// Name in files and reports.
+    /// Returns the name used in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::RotationInvariant => "rotation-invariant",
@@ -51,40 +54,40 @@ impl MassStructure {
         }
     }
 
-    /// Returns the structure of this name.
+    /// Returns the structure with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
-/// Mode shapes and what is known of each mode.
+/// Mode shapes and the data of each mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Modes {
     /// lambda, ascending. Unit: 1/time^2.
     pub eigenvalue: Vec<f64>,
     /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), 2-norms.
     pub residual: Vec<f64>,
-    /// Where each mode comes from: `free mode`, `imported shape`, ...; empty when it is not known.
+    /// Origin of each mode: `free mode`, `imported shape`, ...; empty if unknown.
     pub provenance: Vec<String>,
-    /// Part of the static response that the modes lack, for each load of residual vectors and of the interfaces.
+    /// Truncation error of the static response to each load of residual vectors and of the interfaces.
     pub truncation: Vec<Truncation>,
-    /// Modal damping ratios, 0 when none was given.
+    /// Modal damping ratios; 0 if none was given.
     pub damping_ratio: Vec<f64>,
-    /// Psi' D Psi (nf x nf), where damping was given. Unit: 1/time.
+    /// Psi' D Psi (nf x nf), if damping was given. Unit: 1/time.
     pub modal_damping: Option<Mat<f64>>,
-    /// Shapes (3n x nf), row 3 i + k: component k of node i, body axes, mass-normalised.
+    /// Mass-normalised shapes (3n x nf), row 3 i + k: component k of node i along the body axes.
     pub shape: Mat<f64>,
-    /// Rotations of the nodes (3n x nf) in the same way, zero where the model has none; `None` for models of
-    /// displacements.
+    /// Rotations of the nodes (3n x nf) with the row order of `shape`, zero at nodes without rotations;
+    /// `None` for models that have displacements only.
     pub rotation: Option<Mat<f64>>,
-    /// Rows without a place.
+    /// Rows that belong to no node.
     pub internal: Option<InternalRows>,
 }
 
-/// Kinds of shapes that are no modes of the free body and do not claim to be.
+/// Origins of modes that are static shapes and not modes of the free body.
 const STATIC: [&str; 4] = ["residual vector", "attachment mode", "constraint mode", "fixed-interface mode"];
 
-/// Whether a mode of this origin ([`Modes::provenance`]) is a static shape.
+/// Returns true if a mode of this origin ([`Modes::provenance`]) is a static shape.
 pub fn is_static(origin: &str) -> bool {
     STATIC.contains(&origin.split_once(':').map_or(origin, |(kind, _)| kind))
 }
@@ -92,83 +95,84 @@ pub fn is_static(origin: &str) -> bool {
 /// Rows of the modes that belong to no node.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InternalRows {
-    /// Number and direction that the label of each row has (m).
+    /// Number and direction in the label of each row (m).
     pub dofs: Vec<[i64; 2]>,
-    /// Their values (m x nf); vectors, three rows each, in body axes.
+    /// Values of the rows (m x nf). Vectors take three rows each, along the body axes.
     pub shape: Mat<f64>,
 }
 
-/// What was proved about the modes.
+/// Evidence for the completeness and accuracy of the modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Certificate {
-    /// Number of flexible modes below `shift` that the inertia count proves; `None`: not proved.
+    /// Number of flexible modes below `shift`, proved by the inertia count; `None` if not proved.
     pub proved_modes: Option<usize>,
     /// Shift sigma of the count. Unit: 1/time^2.
     pub shift: f64,
-    /// Negative pivots of K - sigma M: rigid and flexible modes below sigma.
+    /// Number of negative pivots of K - sigma M: rigid and flexible modes below sigma.
     pub negative_pivots: Option<usize>,
     /// Number of rigid modes.
     pub rigid_modes: usize,
-    /// Why the proof is missing, or what limits it; empty when nothing does.
+    /// Reason for a missing or limited proof; empty for a full proof.
     pub remark: String,
-    /// Largest |lambda| of the exact rigid modes relative to the first flexible lambda: the input's noise
-    /// floor.
+    /// Largest |lambda| of the exact rigid modes relative to the first flexible lambda: the noise floor of
+    /// the input.
     pub rigid_noise: f64,
-    /// max |K R| / (|K| |R|) over the rows: digits of the stiffness matrix.
+    /// max |K R| / (|K| |R|) over the rows for the rigid modes R; measures the digits of the stiffness
+    /// matrix.
     pub rigid_residual: f64,
-    /// What rounding of products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p
-    /// lambda_q); 0 when not known.
+    /// Bound of the rounding errors of products with K in any entry of Psi' K Psi, relative to
+    /// sqrt(lambda_p lambda_q); 0 if unknown.
     pub eigenvalue_rounding: f64,
-    /// To what part of their Cauchy-Schwarz bounds the inertia data were known: the digits of a file of
-    /// another program; 0: to rounding.
+    /// Accuracy of the inertia data as part of their Cauchy-Schwarz bounds, given by the digits of a file
+    /// of another program; 0: accurate to rounding.
     pub inertia_rounding: f64,
-    /// What accuracy `certified` adds.
+    /// Guaranteed bounds of accuracy `certified`.
     pub guarantee: Option<Guarantee>,
-    /// Of a Craig-Bampton basis, whose modes are none of the free body: what it is made of and how far it
-    /// goes.
+    /// Composition and frequency limit of a Craig-Bampton basis, whose modes are not modes of the free
+    /// body.
     pub fixed_interface: Option<FixedInterface>,
 }
 
-/// Guaranteed bounds, about K, M, nodes and modes as they are stored (theory section 8, "Certified").
+/// Guaranteed bounds for K, M, nodes and modes exactly as stored (theory section 8, "Certified").
 #[derive(Debug, Clone, PartialEq)]
 pub struct Guarantee {
-    /// Shift between the rigid modes and the first flexible one. Unit: 1/time^2.
+    /// Shift between the rigid modes and the first flexible mode. Unit: 1/time^2.
     pub shift_below: f64,
-    /// Negative pivots of K - shift_below M: the number of rigid modes.
+    /// Number of negative pivots of K - shift_below M, equal to the number of rigid modes.
     pub pivots_below: usize,
     /// Lower bounds of the eigenvalues. Unit: 1/time^2.
     pub eigenvalue_lower: Vec<f64>,
     /// Upper bounds of the eigenvalues. Unit: 1/time^2.
     pub eigenvalue_upper: Vec<f64>,
-    /// Upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the norm of M.
+    /// Upper bounds of the distance of each mode to the exact eigenspace of its cluster, in the M-norm.
     pub shape_error: Vec<f64>,
-    /// Guaranteed digits of each invariant of [`DIGITS`], of its worst entry relative to its Cauchy-Schwarz
-    /// bound.
+    /// Guaranteed digits of each invariant of [`DIGITS`]: those of the worst entry relative to its
+    /// Cauchy-Schwarz bound.
     pub digits: [f64; DIGITS.len()],
 }
 
-/// Invariants that lumped masses would have given, with the same modes.
+/// Invariants of a lumped mass on the same modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LumpedBody {
-    /// `row-sum`, `diagonal-scaling`, `user`.
+    /// Lumping scheme: `row-sum`, `diagonal-scaling` or `user`.
     pub scheme: String,
-    /// The same data from the lumped mass.
+    /// Invariants computed with the lumped mass.
     pub invariants: Invariants,
     /// Number of negative nodal masses.
     pub negative_masses: usize,
-    /// Error norms against the exact invariants, by name (`I0_frobenius`, `W2_spectral`, ...), in table
-    /// order.
+    /// Error norms against the exact invariants, by name (`I0_frobenius`, `W2_spectral`, ...), in the order
+    /// of the table.
     pub comparison: Vec<(String, f64)>,
 }
 
-/// The parts of a [`FlexBody`](super::FlexBody), public so that makers (pipeline, reader) can fill them.
+/// Parts of a [`FlexBody`](super::FlexBody), public so that the pipeline and the reader can fill them.
 ///
-/// [`FlexBody::new`](super::FlexBody::new) says what must hold.
+/// [`FlexBody::new`](super::FlexBody::new) states the conditions that the parts must fulfil.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parts {
     /// Provenance.
     pub source: Source,
-    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    /// Dimension: 3, or 2 for a body that moves in its plane z = 0 only.
     pub dimension: usize,
     /// Units of all numbers.
     pub units: UnitSystem,
@@ -176,20 +180,20 @@ pub struct Parts {
     pub frame: Frame,
     /// Reference conditions that tie the body frame to the deformed body.
     pub conditions: ReferenceConditions,
-    /// Node numbers and positions in the BODY frame.
+    /// Node numbers and positions in the body frame.
     pub nodes: Nodes,
-    /// The surface to draw the body by, on some of the nodes; nothing is computed from it.
+    /// Surface on some of the nodes, for drawing only; nothing is computed from it.
     pub mesh: Option<SurfaceMesh>,
     /// Modes.
     pub modes: Modes,
     /// Exact invariants about the frame origin, body axes.
     pub invariants: Invariants,
-    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes: the stressed body has the stiffness K_ff plus
-    /// the sum of these times their loads. What is not here is zero or not known. Unit: 1/time^2 over that of
-    /// the load.
+    /// Psi' K_geo Psi (nf x nf) of unit loads along body axes. The stressed body has the stiffness K_ff
+    /// plus the sum of these matrices times their loads. Missing loads are zero or unknown. Unit: 1/time^2
+    /// over the unit of the load.
     pub geometric_stiffness: Vec<GeometricStiffness<Mat<f64>>>,
-    /// Stiffness of inertia of nodes whose rotations carry mass; `None` where none do, or where it is not known
-    /// (files of format versions before 1.6, files of other programs).
+    /// Stiffness of inertia of nodes whose rotations carry mass; `None` if no rotation carries mass, or if
+    /// the stiffness is unknown (files of format versions before 1.6, files of other programs).
     pub inertia_stiffness: Option<InertiaStiffness>,
     /// Lumped comparators.
     pub lumped: Vec<LumpedBody>,
@@ -197,10 +201,10 @@ pub struct Parts {
     pub certificate: Certificate,
     /// Interfaces.
     pub interfaces: Vec<Interface>,
-    /// K and M in interface coordinates, of a basis that has them (Craig-Bampton).
+    /// K and M in interface coordinates, for a basis that has them (Craig-Bampton).
     pub coordinates: Option<InterfaceCoordinates>,
-    /// What was decided about the groups of the kinetic energy; empty where nobody asked, and then all are
-    /// held.
+    /// Decisions about the groups of the kinetic energy; empty if no selection was made, and then all
+    /// groups are held.
     pub terms: Vec<TermDecision>,
     /// Precision of shapes and of the inertia of the modes.
     pub storage: Storage,

@@ -1,4 +1,4 @@
-//! A body with some of its modes, and some groups of its kinetic energy.
+//! Reduction of a body to some of its modes and some groups of its kinetic energy.
 
 use super::{
     Certificate, FixedInterface, FlexBody, Guarantee, InternalRows, LumpedBody, Modes, Parts, Storage,
@@ -11,17 +11,17 @@ use flexbody_base::error::Result;
 use flexbody_model::GeometricStiffness;
 
 impl FlexBody {
-    /// The same body with the modes `modes` (indices, ascending) and the groups of its kinetic energy that
-    /// are in `groups`.
+    /// Returns the body with the modes `modes` (indices, ascending) and the groups of its kinetic energy
+    /// that are in `groups`.
     ///
-    /// `terms` says why; about groups that it does not name, what was decided before stays. Without some of
-    /// the modes, what belongs to all of them is left out: interface coordinates, the records of residual
-    /// vectors and, unless the lowest are kept, the proof that no mode is missing, which the remark of the
-    /// certificate then says. Bounds and digits of what stays are as true as they were.
+    /// `terms` gives the reasons; for groups that it does not name, the earlier decisions stay. If modes
+    /// are dropped, data about all modes are dropped as well: interface coordinates, the truncation errors
+    /// of residual vectors and, unless the lowest modes are kept, the proof of completeness, which the
+    /// remark of the certificate then mentions. Bounds and digits of the remaining data stay valid.
     ///
     /// # Errors
-    /// [`Usage`](Code::Usage) when the indices do not ascend or are not below the number of modes; those of
-    /// [`FlexBody::new`] when `terms` contradict the groups.
+    /// [`Usage`](Code::Usage) if the indices do not ascend or are not below the number of modes; the errors
+    /// of [`FlexBody::new`] if `terms` contradict the groups.
     pub fn reduced(&self, modes: &[usize], groups: TermGroups, terms: Vec<TermDecision>) -> Result<Self> {
         let nf = self.n_modes();
         if modes.is_empty() || modes.windows(2).any(|w| w[0] >= w[1]) || modes[modes.len() - 1] >= nf {
@@ -35,7 +35,7 @@ impl FlexBody {
         let lumped = |lumped: &LumpedBody| {
             let own = lumped.invariants.with_modes(modes).with_groups(groups);
             LumpedBody {
-                // Another program may have other norms: they are evaluated anew where they change only.
+                // Another program may use other norms: recompute them only if the data changed.
                 comparison: if unchanged {
                     lumped.comparison.clone()
                 } else {
@@ -73,7 +73,7 @@ impl FlexBody {
             invariants,
             storage: parts.storage,
         })?;
-        // W3 without S is stored by itself: the difference of two rounded numbers.
+        // W3 without S is stored on its own, as the difference of two rounded numbers: round it again.
         if parts.storage == Storage::F32 { body.rounded_to_f32() } else { Ok(body) }
     }
 }
@@ -103,11 +103,11 @@ impl Modes {
 }
 
 impl Certificate {
-    /// The certificate of some modes of those that this one is about.
+    /// Returns the certificate for a subset of the modes of this one.
     fn of_some(&self, modes: &[usize], of: &Modes) -> Self {
         let nf = of.eigenvalue.len();
         let all = modes.len() == nf;
-        // The lowest of modes that are complete lack none below them.
+        // The lowest modes of a complete set are complete.
         let lowest = modes[modes.len() - 1] + 1 == modes.len();
         let below = of.eigenvalue.iter().filter(|l| **l < self.shift).count();
         let complete = all || lowest && self.proved_modes.is_some_and(|count| below == count.min(nf));

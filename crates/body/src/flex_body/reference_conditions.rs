@@ -1,16 +1,17 @@
-//! Reference conditions: what ties the body frame to the deformed body.
+//! Reference conditions, which tie the body frame to the deformed body.
 
-/// Reference conditions of the floating frame. The nodal motion of a body does not depend on them, its modal
-/// coordinates do: a joint that holds the frame holds what the conditions tie to it.
+/// Reference conditions of the floating frame. The nodal motion of a body does not depend on them, its
+/// modal coordinates do: a joint at the frame constrains the part of the body that the conditions tie to
+/// it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub enum ReferenceConditions {
     /// Mean axes (Buckens, Tisserand): the modes are M-orthogonal to rigid motion, C1 = C2 = 0.
     #[default]
     MeanAxes,
-    /// The frame stands on the reference point of the interface of this name, which rests in every mode. C1 and C2
-    /// are the participation of the modes in translation and rotation.
+    /// The frame is fixed to the reference point of the interface of this name, which is at rest in every
+    /// mode. C1 and C2 are the participation of the modes in translation and rotation.
     Interface(String),
-    /// The modes tie the frame to the body in a way that nothing states, as those of another program's file do.
+    /// The modes tie the frame to the body in an unstated way, as in files of other programs.
     Unstated,
 }
 
@@ -20,7 +21,7 @@ const MEAN_AXES: &str = "mean axes";
 const UNSTATED: &str = "not stated";
 
 impl ReferenceConditions {
-    /// The conditions by the text of a flex-body file; `None` if the text means nothing.
+    /// Parses the text of a flex-body file; returns `None` for unknown text.
     pub fn from_text(text: &str) -> Option<Self> {
         match text {
             MEAN_AXES => Some(Self::MeanAxes),
@@ -29,7 +30,7 @@ impl ReferenceConditions {
         }
     }
 
-    /// The text of a flex-body file: `mean axes`, `interface NAME` or `not stated`.
+    /// Returns the text for a flex-body file: `mean axes`, `interface NAME` or `not stated`.
     pub fn text(&self) -> String {
         match self {
             Self::MeanAxes => MEAN_AXES.to_owned(),
@@ -38,7 +39,7 @@ impl ReferenceConditions {
         }
     }
 
-    /// True if the frame follows the mean motion of the body.
+    /// Returns true if the frame follows the mean motion of the body.
     pub fn is_mean(&self) -> bool {
         *self == Self::MeanAxes
     }

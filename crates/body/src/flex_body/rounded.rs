@@ -1,16 +1,17 @@
-//! The body that a file of 32-bit floats holds.
+//! Rounding of a body to 32-bit floats, as a file holds it.
 
 use super::{Certificate, FlexBody, Modes, Storage};
 use faer::Mat;
 use flexbody_base::error::Result;
 
 impl FlexBody {
-    /// The body that a file of 32-bit floats holds: shapes, rotations, internal rows, Ibar, S, W0 and W3
-    /// rounded to the nearest, the lumped comparators too. C1, K_ff, eigenvalues and everything rigid stay.
-    /// The bounds of accuracy `certified`, which are about what was rounded, are left out.
+    /// Returns the body as a file of 32-bit floats holds it: shapes, rotations, internal rows, Ibar, S, W0
+    /// and W3 are rounded to the nearest value, also in the lumped comparators. C1, K_ff, eigenvalues and
+    /// all rigid-body data do not change. The bounds of accuracy `certified`, which hold for the unrounded
+    /// data, are dropped.
     ///
     /// # Errors
-    /// [`BodySchema`](flexbody_base::diagnostic::Code::BodySchema) when a number is too large for a 32-bit
+    /// [`BodySchema`](flexbody_base::diagnostic::Code::BodySchema) if a number is too large for a 32-bit
     /// float.
     pub fn rounded_to_f32(&self) -> Result<Self> {
         let mut parts = self.parts().clone();
@@ -25,9 +26,9 @@ impl FlexBody {
     }
 }
 
-/// The nearest 32-bit float.
+/// Returns the nearest 32-bit float.
 fn nearest_f32(value: f64) -> f64 {
-    #[allow(clippy::cast_possible_truncation)] // what it is for
+    #[allow(clippy::cast_possible_truncation)] // rounding is the purpose
     let rounded = value as f32;
     f64::from(rounded)
 }

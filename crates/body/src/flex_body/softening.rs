@@ -1,29 +1,29 @@
-//! The stiffness that the centrifugal terms of a body take where geometric stiffness does not make up for them (theory
-//! section 7).
+//! Loss of stiffness by centrifugal terms that geometric stiffness does not compensate (theory section 7).
 
 use super::FlexBody;
 use faer::{Mat, Scale};
 use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
 
-/// Part of the stiffness of a motion at which the centrifugal term counts.
+/// Part of the stiffness of a motion above which the centrifugal term is significant.
 pub const SOFTENING: f64 = 0.01;
 
-/// Steps of the search for the worst axis at the most, and the growth below which it ends.
+/// Limit of the steps of the search for the worst axis.
 const STEPS: usize = 40;
+/// Relative growth of the softened part below which the search ends.
 const GROWTH: f64 = 1e-9;
 
 impl FlexBody {
-    /// The largest part of its stiffness that any motion loses by the centrifugal terms at the angular velocity
-    /// `omega`, axes of the body, with the stiffness of inertia. `None` when K_ff is not positive definite, or when the
-    /// body does not hold W2.
+    /// Returns the largest part of the stiffness that any motion loses by the centrifugal terms at the
+    /// angular velocity `omega` (body axes), including the stiffness of inertia. Returns `None` if K_ff is
+    /// not positive definite, or if the body does not hold W2.
     pub fn softening(&self, omega: &Vector3<f64>) -> Option<f64> {
         Some(self.softest_motion(omega)?.0)
     }
 
-    /// Spin rate about axis `axis` of the model at which the centrifugal terms take 1 % of the stiffness of the motion
-    /// that they soften most: the root of 0.01 over the [part](FlexBody::softening) at unit spin. `None` where nothing
-    /// moves across the axis. Unit: 1/time.
+    /// Returns the spin rate about axis `axis` of the model at which the centrifugal terms take 1 % of the
+    /// stiffness of the most softened motion: the root of 0.01 over the [part](FlexBody::softening) at unit
+    /// spin. Returns `None` if nothing moves across the axis. Unit: 1/time.
     ///
     /// # Panics
     /// When `axis` is not below 3.
@@ -33,9 +33,10 @@ impl FlexBody {
         (part > 0.0).then(|| (SOFTENING / part).sqrt())
     }
 
-    /// The axis about which a spin softens most, in axes of the model, of unit length with its largest component
-    /// positive, and the part that a unit of spin takes: the motion that a spin softens most tells the axis that softens
-    /// it most, and so on, from each of the three axes. Of a plane body the normal.
+    /// Returns the spin axis with the largest softening (axes of the model, unit length, largest component
+    /// positive) and the part of the stiffness lost at unit spin. The search alternates: the motion most
+    /// softened by a spin gives the axis that softens this motion most. It starts from each of the three
+    /// axes. For a plane body the axis is the normal.
     pub fn worst_spin(&self) -> Option<(Vector3<f64>, f64)> {
         if self.dimension() == 2 {
             return Some((Vector3::z(), self.softening(&Vector3::z())?));
@@ -62,7 +63,7 @@ impl FlexBody {
         Some((if omega[omega.iamax()] < 0.0 { -omega } else { omega }, part))
     }
 
-    /// The part at `omega`, and the motion that is softened most, of unit stiffness.
+    /// Returns the softened part at `omega`, and the most softened motion, scaled to unit stiffness.
     fn softest_motion(&self, omega: &Vector3<f64>) -> Option<(f64, Vec<f64>)> {
         let own = self.inertia_stiffness().into_iter().flat_map(|own| &own.stiffness);
         let spins = own.filter(|one| one.load.kind == LoadKind::Spin);
@@ -77,7 +78,7 @@ impl FlexBody {
         self.invariants().softening(omega, of_inertia.as_ref())
     }
 
-    /// S with the part w'S w that a spin w takes of the stiffness of `motion`, of unit stiffness.
+    /// Returns S with w'S w the part of the stiffness of `motion` (of unit stiffness) lost at a spin w.
     fn softening_of(&self, motion: &[f64]) -> Option<Matrix3<f64>> {
         let (nf, w2) = (self.n_modes(), self.invariants().w2()?);
         let quadratic = |entry: &dyn Fn(usize, usize) -> f64| -> f64 {
@@ -94,10 +95,10 @@ impl FlexBody {
     }
 }
 
-/// Cosine of the angle to a coordinate axis up to which a direction is called by its name.
+/// Cosine of the angle to a coordinate axis above which a direction gets the name of that axis.
 const ALONG: f64 = 1.0 - 1e-9;
 
-/// `z`, or `(0.707, 0.707, 0)` of an axis that is none of the coordinate axes.
+/// Returns `z` for a coordinate axis, or `(0.707, 0.707, 0)` for another direction.
 pub fn axis_in_words(axis: &Vector3<f64>) -> String {
     let unit = axis.normalize();
     match (0..3).find(|&k| unit[k].abs() >= ALONG) {
@@ -109,7 +110,7 @@ pub fn axis_in_words(axis: &Vector3<f64>) -> String {
     }
 }
 
-/// The eigenvector of the largest eigenvalue.
+/// Returns the eigenvector of the largest eigenvalue.
 fn largest_direction(s: &Matrix3<f64>) -> Vector3<f64> {
     let eigen = s.symmetric_eigen();
     eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned()

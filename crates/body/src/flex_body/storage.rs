@@ -1,4 +1,4 @@
-//! How precisely a body keeps its large arrays.
+//! Storage precision of the large arrays of a body.
 
 /// Precision of the shapes and of the inertia of the modes, in memory and in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -11,10 +11,10 @@ pub enum Storage {
 }
 
 impl Storage {
-    /// Every choice, in the order of the documentation.
+    /// All choices, in the order of the documentation.
     pub const ALL: [Storage; 2] = [Self::F64, Self::F32];
 
-    /// Name in files, reports and on the command line.
+    /// Returns the name in files, reports and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::F64 => "f64",
@@ -22,13 +22,13 @@ impl Storage {
         }
     }
 
-    /// Returns the storage of this name.
+    /// Returns the storage with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 
-    /// What rounding of the arrays may add to sums of entries that are relative to their Cauchy-Schwarz
-    /// bounds; zero for 64-bit floats, whose rounding every limit knows.
+    /// Returns the additional rounding error of sums of array entries relative to their Cauchy-Schwarz
+    /// bounds; zero for 64-bit floats, whose rounding all limits include.
     pub fn rounding(self) -> f64 {
         match self {
             Self::F64 => 0.0,
@@ -36,7 +36,7 @@ impl Storage {
         }
     }
 
-    /// How many roundings of 64-bit floats one of these is.
+    /// Returns the rounding unit of this storage in units of the rounding unit of 64-bit floats.
     pub fn roundings(self) -> f64 {
         match self {
             Self::F64 => 1.0,

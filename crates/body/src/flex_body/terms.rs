@@ -1,21 +1,21 @@
-//! Why a body holds the groups of the kinetic energy that it holds.
+//! Decisions about the groups of the kinetic energy.
 
 use super::TermGroup;
 
-/// What was decided about one group of the kinetic energy.
+/// Decision about one group of the kinetic energy.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TermDecision {
-    /// The group.
+    /// Group of the decision.
     pub group: TermGroup,
-    /// Whether the body holds it.
+    /// True if the body holds the group.
     pub kept: bool,
-    /// What decided (theory section 7): 0 bounds from I0 and frequencies, 1 norms of the invariants, 2 a
-    /// motion that was integrated.
+    /// Tier of the decision (theory section 7): 0 for bounds from I0 and frequencies, 1 for norms of the
+    /// invariants, 2 for an integrated motion.
     pub tier: u8,
-    /// Largest error that dropping the group makes, in the quantity that `reason` names.
+    /// Largest error caused by dropping the group, in the quantity that `reason` names.
     pub bound: f64,
-    /// Largest error that is allowed in it.
+    /// Largest allowed error in this quantity.
     pub limit: f64,
-    /// Why, as a sentence without a full stop.
+    /// Reason, as a sentence without a full stop.
     pub reason: String,
 }

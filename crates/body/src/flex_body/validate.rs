@@ -1,4 +1,4 @@
-//! What must hold for the parts of a flexible body, checked once, all violations collected.
+//! Conditions on the parts of a flexible body, checked once; all violations are collected.
 
 use super::{MassStructure, Parts, ReferenceConditions, SurfaceMesh, TermGroup};
 use crate::invariants::{DIGITS, InertiaStiffness};
@@ -8,8 +8,9 @@ use flexbody_model::{Coupling, UnitLoad};
 use nalgebra::Matrix3;
 use std::collections::HashSet;
 
-/// Axes come out of an eigen-decomposition of a 3x3 matrix: 1e-15 is normal, a typed-in rotation may have 12
-/// digits; anything worse rotates the invariants by more than their own accuracy.
+/// Largest deviation of the axes from orthonormality. Axes from an eigen-decomposition of a 3x3 matrix
+/// reach 1e-15; a rotation typed in may have 12 digits. Larger deviations would rotate the invariants by
+/// more than their own accuracy.
 const AXES_TOLERANCE: f64 = 1e-10;
 
 pub(super) fn problems(parts: &Parts) -> Vec<Diagnostic> {
@@ -69,7 +70,7 @@ impl Problems {
         }
     }
 
-    /// A plane body has its frame in the plane, and neither nodes nor modes leave it.
+    /// Checks that a plane body has its frame in the plane, and that neither nodes nor modes leave it.
     fn plane(&mut self, parts: &Parts) {
         match parts.dimension {
             3 => return,
@@ -119,7 +120,7 @@ impl Problems {
         }
     }
 
-    /// The mesh itself is in order; here it is that of these nodes.
+    /// Checks that the mesh, valid in itself, refers to existing nodes.
     fn mesh(&mut self, parts: &Parts, n: usize) {
         let least = parts.mesh.as_ref().map_or(0, SurfaceMesh::least_nodes);
         if least > n {
@@ -169,7 +170,8 @@ impl Problems {
         }
     }
 
-    /// A body has the terms of a general mass when its mass is one, and lumped masses never have.
+    /// Checks that a body has general terms exactly if its mass is general, and that lumped masses have
+    /// none.
     fn structure(&mut self, parts: &Parts) {
         let general = parts.source.mass_structure == MassStructure::General;
         if general != parts.invariants.general().is_some() {
@@ -185,7 +187,7 @@ impl Problems {
         }
     }
 
-    /// Stiffness of inertia is complete, or not there.
+    /// Checks that the stiffness of inertia is complete or absent.
     fn inertia_stiffness(&mut self, parts: &Parts, n: usize, nf: usize) {
         let Some(own) = &parts.inertia_stiffness else { return };
         if parts.modes.rotation.is_none() {
@@ -211,7 +213,7 @@ impl Problems {
             self.text("geometric_stiffness", label);
             self.matrix(&format!("geometric_stiffness `{label}`"), &one.matrix, nf, nf);
             let load = &one.load;
-            // A file knows the load by this name only.
+            // A file identifies the load by this name only.
             if UnitLoad::from_label(label).as_ref() != Some(load) {
                 self.add(format!("geometric stiffness `{label}` has no component, interface or name"));
             } else if !load.kind.of_dimension(parts.dimension).contains(&load.component) {
@@ -295,7 +297,7 @@ impl Problems {
         }
     }
 
-    /// A group is dropped by a decision, or held.
+    /// Checks that each group is either held or dropped by a decision.
     fn terms(&mut self, parts: &Parts) {
         let held = parts.invariants.groups();
         for (at, term) in parts.terms.iter().enumerate() {
@@ -353,7 +355,7 @@ impl Problems {
         }
     }
 
-    /// The frame stands on an interface of the body that has a reference point.
+    /// Checks that the interface of the frame exists and has a reference point.
     fn reference_conditions(&mut self, parts: &Parts) {
         let ReferenceConditions::Interface(name) = &parts.conditions else { return };
         match parts.interfaces.iter().find(|interface| interface.name == *name) {

@@ -1,31 +1,31 @@
-//! Comparison of two sets of modes that differ in sign, or by a rotation inside repeated eigenvalues.
+//! Comparison of two sets of modes that differ in sign, or by a rotation within repeated eigenvalues.
 
 use super::{Invariants, primary_differences};
 use faer::{Mat, MatRef};
 use nalgebra::DMatrix;
 use std::ops::Range;
 
-/// Bound of the iterations of a small singular value decomposition: it needs a few per singular value.
+/// Limit of the iterations of a small singular value decomposition, which needs a few per singular value.
 const MAX_SVD_ITERATIONS: usize = 10_000;
 
-/// The basis change that carries the modes of one body to those of another.
+/// Basis change that maps the modes of one body to those of another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Alignment {
     /// T (nf x nf), orthogonal, block-diagonal over the groups: Psi_b T is closest to Psi_a.
     pub basis: Mat<f64>,
-    /// Smallest singular value of the blocks of the cross-Gram matrix: for mass-normalised modes and the M
-    /// inner product the smallest cosine between the subspaces of a group, 1 when all agree. NaN when an
+    /// Smallest singular value of the blocks of the cross-Gram matrix. For mass-normalised modes and the M
+    /// inner product it is the smallest cosine between the subspaces of a group, 1 if all agree. NaN if an
     /// entry of a block is not finite.
     pub agreement: f64,
 }
 
 /// Finds the orthogonal T, block-diagonal over `groups`, that minimises |Psi_a - Psi_b T|.
 ///
-/// `cross_gram` (nf x nf) = Psi_a' G Psi_b for an inner product G. Per group T is the orthogonal polar factor
-/// of the transposed block. When the modes of a group span the same space, Psi_b = Psi_a R, the block is P R
-/// with P positive definite for ANY such G, and T = R' exactly: without the mass matrix G = I, the plain
-/// product of the nodal components, serves as well. `groups` are the clusters of repeated eigenvalues,
-/// ascending and disjoint; a mode outside of them is a group of its own, and T is its sign.
+/// `cross_gram` (nf x nf) = Psi_a' G Psi_b for an inner product G. For each group T is the orthogonal polar
+/// factor of the transposed block. If the modes of a group span one space, Psi_b = Psi_a R, the block is P
+/// R with P positive definite for any such G, and T = R' exactly. Without the mass matrix, G = I (the plain
+/// product of the nodal components) serves as well. `groups` are the clusters of repeated eigenvalues,
+/// ascending and disjoint; a mode outside of them forms its own group, and T is its sign.
 ///
 /// # Panics
 /// When the matrix is not square, or the groups overlap or go beyond it.
@@ -76,8 +76,8 @@ impl Alignment {
     }
 }
 
-/// Compares the primary data of two bodies whose modes may differ in sign and inside repeated eigenvalues:
-/// aligns `b` to `a` ([`align`]) and gives the alignment and the differences of [`primary_differences`].
+/// Compares the primary data of two bodies whose modes may differ in sign and within repeated eigenvalues:
+/// aligns `b` to `a` ([`align`]) and returns the alignment and the differences of [`primary_differences`].
 ///
 /// # Panics
 /// When the sizes disagree.

@@ -1,4 +1,4 @@
-//! The size that each entry of the invariants can have at most: the scale of every comparison.
+//! Upper bounds of the entries of the invariants: the scales of all comparisons.
 
 use super::Invariants;
 use faer::Mat;
@@ -8,25 +8,25 @@ use nalgebra::Vector3;
 /// Cauchy-Schwarz bounds of the entries of a body's invariants, in the inner product of its mass.
 ///
 /// With |x_k| = sqrt(J_kk) and |psi_p| = sqrt(m_ff,pp): |Ibar_kl,p| <= |x_k| |psi_p|, |S_kl,pq| <= |psi_p|
-/// |psi_q| and so on. A rounding error or a lumping error divided by its bound has a meaning where the exact
-/// entry is zero by symmetry, and in any units.
+/// |psi_q| and so on. A rounding error or a lumping error divided by its bound is meaningful even if the
+/// exact entry is zero by symmetry, and in any units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CauchySchwarz {
     mass: f64,
     second_moment: Vector3<f64>,
-    /// I0_kk of a mass that has inertia about axes which no places give it; `None`: that of the places.
+    /// I0_kk of a mass whose inertia does not follow from positions; `None` if it does.
     inertia: Option<Vector3<f64>>,
     mode: Vec<f64>,
 }
 
 impl CauchySchwarz {
-    /// Bounds of a body's own entries. A direction in which the body has no extent counts with the rounding
-    /// of the others, J_kk >= 2.2e-16 tr J.
+    /// Returns the bounds of the entries of a body. A direction without extent gets the rounding of the
+    /// others, J_kk >= 2.2e-16 tr J.
     pub fn of(invariants: &Invariants) -> Self {
         let floor = f64::EPSILON * invariants.0.second_moment.trace();
         let norm = |p| {
             let moved = (0..3).map(|k| invariants.0.s[k][k][(p, p)]).sum::<f64>();
-            // Rotations of nodes carry mass that S does not have, and S mass that m_ff does not have.
+            // Nodal rotations carry mass that S does not contain, and S contains mass that m_ff does not.
             let whole = invariants.0.general.as_ref().map_or(moved, |general| general.modal_mass[(p, p)]);
             moved.max(whole).max(0.0).sqrt()
         };
@@ -42,14 +42,14 @@ impl CauchySchwarz {
         }
     }
 
-    /// |psi_p| = sqrt(m_ff,pp): 1 for a mass-normalised mode. The larger of this and of sqrt(tr S_pp) when M does not commute with
-    /// rotations.
+    /// Returns |psi_p| = sqrt(m_ff,pp): 1 for a mass-normalised mode. If M does not commute with rotations,
+    /// returns the larger of this and sqrt(tr S_pp).
     pub fn mode(&self, p: usize) -> f64 {
         self.mode[p]
     }
 
-    /// |c_k| <= sqrt(m) |x_k|; of a mass that does not commute with rotations, c_k couples a translation to the rotations about the other
-    /// axes: |c_k| <= sqrt(m I0_ll).
+    /// Returns the bound |c_k| <= sqrt(m) |x_k|. For a mass that does not commute with rotations, c_k
+    /// couples a translation to the rotations about the other axes: |c_k| <= sqrt(m I0_ll).
     pub fn first_moment(&self, k: usize) -> f64 {
         let size = match &self.inertia {
             Some(inertia) => inertia[(k + 1) % 3].max(inertia[(k + 2) % 3]),
@@ -58,7 +58,8 @@ impl CauchySchwarz {
         (self.mass * size).sqrt()
     }
 
-    /// |J_kl| <= |x_k| |x_l|; of a mass that does not commute with rotations J stands for I0, and has its bounds.
+    /// Returns the bound |J_kl| <= |x_k| |x_l|. For a mass that does not commute with rotations J
+    /// represents I0, and the bound is that of I0.
     pub fn second_moment(&self, k: usize, l: usize) -> f64 {
         match &self.inertia {
             Some(_) if k == l => self.largest_moment(),
@@ -67,38 +68,40 @@ impl CauchySchwarz {
         }
     }
 
-    /// |C1_k,p| <= sqrt(m) |psi_p|.
+    /// Returns the bound |C1_k,p| <= sqrt(m) |psi_p|.
     pub fn c1(&self, p: usize) -> f64 {
         self.mass.sqrt() * self.mode[p]
     }
 
-    /// |Ibar_kl,p| <= |x_k| |psi_p|; of a mass that does not commute with rotations Ibar stands for W1 and C2, and has bounds of their size.
+    /// Returns the bound |Ibar_kl,p| <= |x_k| |psi_p|. For a mass that does not commute with rotations Ibar
+    /// represents W1 and C2, and the bound is of their size.
     pub fn ibar(&self, k: usize, p: usize) -> f64 {
         let size = if self.inertia.is_some() { self.largest_moment() } else { self.second_moment[k] };
         size.sqrt() * self.mode[p]
     }
 
-    /// |S_kl,pq| <= |psi_p| |psi_q|; it bounds the entries of m_ff, W2 and W3 too.
+    /// Returns the bound |S_kl,pq| <= |psi_p| |psi_q|, which also bounds the entries of m_ff, W2 and W3.
     pub fn s(&self, p: usize, q: usize) -> f64 {
         self.mode[p] * self.mode[q]
     }
 
-    /// |I0_kl| <= sqrt(I0_kk I0_ll).
+    /// Returns the bound |I0_kl| <= sqrt(I0_kk I0_ll).
     pub fn inertia(&self, k: usize, l: usize) -> f64 {
         (self.moment(k) * self.moment(l)).sqrt()
     }
 
-    /// |C2_k,p| <= sqrt(I0_kk) |psi_p|.
+    /// Returns the bound |C2_k,p| <= sqrt(I0_kk) |psi_p|.
     pub fn c2(&self, k: usize, p: usize) -> f64 {
         self.moment(k).sqrt() * self.mode[p]
     }
 
-    /// |W1_kk,p| <= 2 sqrt(I0_kk) |psi_p|; |W1_kl,p| <= sqrt(I0_mm) |psi_p| with m the third axis.
+    /// Returns the bound |W1_kk,p| <= 2 sqrt(I0_kk) |psi_p|, or |W1_kl,p| <= sqrt(I0_mm) |psi_p| with m the
+    /// third axis.
     pub fn w1(&self, k: usize, l: usize, p: usize) -> f64 {
         if k == l { 2.0 * self.c2(k, p) } else { self.c2(3 - k - l, p) }
     }
 
-    /// I0_kk.
+    /// Returns I0_kk.
     fn moment(&self, k: usize) -> f64 {
         if let Some(inertia) = &self.inertia {
             return inertia[k];
@@ -106,26 +109,27 @@ impl CauchySchwarz {
         self.second_moment[(k + 1) % 3] + self.second_moment[(k + 2) % 3]
     }
 
-    /// The largest I0_kk: what entries of J and Ibar that are sums of several of I0, of W1 and C2, are
-    /// relative to.
+    /// Returns the largest I0_kk, the scale of entries of J and Ibar that are sums of several entries of
+    /// I0, W1 and C2.
     fn largest_moment(&self) -> f64 {
         (0..3).map(|k| self.moment(k)).fold(0.0, f64::max)
     }
 }
 
-/// |difference| relative to its bound; zero when nothing differs, infinite when a bound of zero is exceeded.
+/// Returns |difference| relative to its bound: zero without difference, infinite if a bound of zero is
+/// exceeded.
 pub(super) fn scaled(difference: f64, bound: f64) -> f64 {
     if difference == 0.0 { 0.0 } else { difference.abs() / bound }
 }
 
-/// Largest difference of each primary quantity of two bodies of the same nodes, frame and basis, relative to
-/// the Cauchy-Schwarz bounds of `a`: `mass`, `first_moment`, `second_moment`, `C1`, `Ibar`, `S`, and
-/// `modal_stiffness` relative to sqrt(K_pp K_qq); `W0`, `W3` and `modal_mass` where M does not commute with
-/// rotations. NaN when a number is. J and Ibar of such a body have the bounds of I0, and of W1 and C2, which
-/// they stand for.
+/// Returns the largest difference of each primary quantity of two bodies with equal nodes, frame and basis,
+/// relative to the Cauchy-Schwarz bounds of `a`: `mass`, `first_moment`, `second_moment`, `C1`, `Ibar`,
+/// `S`, and `modal_stiffness` relative to sqrt(K_pp K_qq); also `W0`, `W3` and `modal_mass` if M does not
+/// commute with rotations. NaN if any number is NaN. J and Ibar of such a body represent I0, W1 and C2 and
+/// have their bounds.
 ///
-/// What both hold is compared: C2 in place of Ibar where one does not hold W1, W3 and m_ff in place of S
-/// where one does not hold W2.
+/// Only data held by both bodies are compared: C2 in place of Ibar if one does not hold W1, W3 and m_ff in
+/// place of S if one does not hold W2.
 ///
 /// Two independent evaluations agree to 1e-12 in all of them.
 ///
@@ -164,12 +168,12 @@ pub fn primary_differences(a: &Invariants, b: &Invariants) -> Vec<(String, f64)>
     table.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
 }
 
-/// Pairs of axes.
+/// Returns all pairs of axes.
 fn axes() -> impl Iterator<Item = (usize, usize)> {
     (0..3).flat_map(|k| (0..3).map(move |l| (k, l)))
 }
 
-/// Largest difference of the entries of two matrices, relative to their bounds.
+/// Returns the largest difference of the entries of two matrices, relative to their bounds.
 fn entries(x: &Mat<f64>, y: &Mat<f64>, bound: impl Fn(usize, usize) -> f64) -> f64 {
     let all = (0..x.nrows()).flat_map(|i| (0..x.ncols()).map(move |j| (i, j)));
     largest(all.map(|(i, j)| scaled(x[(i, j)] - y[(i, j)], bound(i, j))))
@@ -180,8 +184,8 @@ struct Pair<'a> {
     a: &'a Invariants,
     b: &'a Invariants,
     bound: CauchySchwarz,
-    /// Whether one has a mass that does not commute with rotations: J and Ibar then stand for I0, W1 and C2,
-    /// and have the bounds of these.
+    /// True if one mass does not commute with rotations: J and Ibar then represent I0, W1 and C2 and have
+    /// their bounds.
     general: bool,
 }
 

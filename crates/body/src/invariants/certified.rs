@@ -1,7 +1,7 @@
 //! The condensation in double-double arithmetic, with a guaranteed bound of the rounding in every invariant.
 //!
-//! The guarantee is about the numbers that a flex-body file holds: nodes, modes and axes as stored, M and K
-//! as given. What separates these modes from the exact ones is another matter (`/modes/shape_error`).
+//! The guarantee covers the numbers in a flex-body file: nodes, modes and axes as stored, M and K as given.
+//! The distance of these modes from the exact ones is a separate bound (`/modes/shape_error`).
 
 use super::condense::{CHUNK, MAX_GROUPS, SolidColumns, fill_symmetric, from_gram, group_length};
 use super::derived::CYCLIC;
@@ -15,16 +15,16 @@ use nalgebra::Matrix3;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Columns per pass over the mass matrix: their sums fill half of the vector registers.
+/// Number of columns per pass over the mass matrix: their sums fill half of the vector registers.
 const WIDTH: usize = 16;
 
 /// Unit roundoff of f64.
 const U: f64 = f64::EPSILON / 2.0;
 
-/// Room for the rounding of the bounds themselves.
+/// Factor that covers the rounding of the bounds themselves.
 const ROOM: f64 = 1.0 + 1e-6;
 
-/// Invariants whose digits are counted, by their names in the file.
+/// Invariants with guaranteed digits, by their names in the file.
 pub const DIGITS: [&str; 13] = [
     "mass",
     "first_moment",
@@ -41,20 +41,21 @@ pub const DIGITS: [&str; 13] = [
     "modal_mass",
 ];
 
-/// Invariants with what is known of their rounding.
+/// Invariants with bounds of their rounding errors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CertifiedInvariants {
-    /// Every number is the nearest f64 to its double-double value.
+    /// Invariants, each number the f64 nearest to its double-double value.
     pub invariants: Invariants,
-    /// For each of [`DIGITS`], -log10 of the largest error of an entry relative to its Cauchy-Schwarz bound:
-    /// digits that are guaranteed of the worst entry, also where I0, W1, W2, W3, C2 and m_ff are formed in
-    /// f64 from the others.
+    /// Guaranteed digits of each of [`DIGITS`]: -log10 of the largest error of an entry relative to its
+    /// Cauchy-Schwarz bound. The digits include the rounding of I0, W1, W2, W3, C2 and m_ff, which are
+    /// formed in f64 from the others.
     pub digits: [f64; DIGITS.len()],
 }
 
-/// [`condense`](super::condense()) and K_ff = Psi' K Psi with compensated products and guaranteed digits.
+/// Condenses as [`condense`](super::condense()) and computes K_ff = Psi' K Psi, with compensated products
+/// and guaranteed digits.
 ///
-/// * `mass`, `positions`, `shapes`: as for [`condense`](super::condense()); body axes.
+/// * `mass`, `positions`, `shapes`: the arguments of [`condense`](super::condense()), in body axes.
 /// * `stiffness`: K (3n x 3n; of a plane body 2n x 2n), model axes.
 /// * `axes`: columns are the body axes in model axes.
 ///
@@ -80,7 +81,7 @@ pub fn condense_certified(
     CertifiedInvariants { invariants, digits }
 }
 
-/// X' Ms X and a bound of the error of each entry.
+/// Returns X' Ms X and an upper bound of the error of each entry.
 fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Mat<f64>) {
     let (n, count) = (mass.n(), columns.count());
     let mut gram = Mat::<f64>::zeros(count, count);
@@ -104,7 +105,7 @@ fn mass_gram(mass: &SymmetricMatrix, columns: SolidColumns<'_>) -> (Mat<f64>, Ma
     (gram, error)
 }
 
-/// Node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
+/// Returns a node-wise copy of a block of at most [`WIDTH`] columns, padded with zeros.
 fn by_node(columns: SolidColumns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> {
     let mut rows = vec![[0.0; WIDTH]; columns.rows()];
     rows.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, rows)| {
@@ -113,7 +114,7 @@ fn by_node(columns: SolidColumns<'_>, block: Range<usize>) -> Vec<[f64; WIDTH]> 
     rows
 }
 
-/// Column-wise copy of the rows `nodes` into the columns of `target`.
+/// Copies the rows `nodes` column-wise into `target`.
 fn by_column(columns: SolidColumns<'_>, nodes: Range<usize>, mut target: MatMut<'_, f64>) {
     for column in 0..target.ncols() {
         for (row, i) in nodes.clone().enumerate() {
@@ -122,7 +123,7 @@ fn by_column(columns: SolidColumns<'_>, nodes: Range<usize>, mut target: MatMut<
     }
 }
 
-/// Columns 0..block.end of X against Ms X[block]: block.end rows.
+/// Returns X[0..block.end]' Ms X[block]: block.end rows.
 fn gram_block(
     mass: &SymmetricMatrix,
     columns: SolidColumns<'_>,
@@ -141,10 +142,12 @@ fn gram_block(
             for first in nodes.clone().step_by(CHUNK) {
                 let chunk = first..(first + CHUNK).min(nodes.end);
                 let rows = chunk.len();
+                // Rows of the chunk of X, column-wise.
                 by_column(columns, chunk.clone(), left.subrows_mut(0, rows));
                 with_fma(
                     #[inline(always)]
                     || {
+                        // Ms X of the chunk in double-double arithmetic.
                         for (target, i) in product.iter_mut().zip(chunk) {
                             let (mut hi, mut lo) = ([0.0; WIDTH], [0.0; WIDTH]);
                             let (neighbours, values) = mass.row(i);
@@ -153,6 +156,7 @@ fn gram_block(
                             }
                             *target = [hi, lo];
                         }
+                        // Add the products X' (Ms X) of the chunk.
                         for (c, sum) in sums.iter_mut().enumerate() {
                             let [mut hi, mut lo] = *sum;
                             for (&a, [y, z]) in left.col_as_slice(c)[..rows].iter().zip(&product) {
@@ -166,6 +170,7 @@ fn gram_block(
             sums
         })
         .collect();
+    // Add the groups in a fixed order: the result does not depend on the number of threads.
     let mut total = vec![[DoubleDouble::default(); WIDTH]; n_left];
     for part in &partial {
         for (sum, [hi, lo]) in total.iter_mut().zip(part) {
@@ -177,16 +182,17 @@ fn gram_block(
     total
 }
 
-/// Psi' K Psi and a bound of the error of each entry, for shapes in body axes and K in model axes.
+/// Returns Psi' K Psi and an upper bound of the error of each entry, for shapes in body axes and K in model
+/// axes.
 fn modal_stiffness(
     stiffness: &SymmetricMatrix,
     axes: &Matrix3<f64>,
     shapes: MatRef<'_, f64>,
 ) -> (Mat<f64>, Mat<f64>) {
     let (n, nf) = (stiffness.n(), shapes.ncols());
-    // Rows of the stiffness per node: a plane body has none along z.
+    // Rows of the stiffness per node: two for a plane body.
     let d = n / (shapes.nrows() / 3).max(1);
-    // Turned shapes as sums of two blocks of f64.
+    // Represent the turned shapes as sums of two blocks of f64.
     let turned = |row: usize, p: usize| {
         (0..3).fold(DoubleDouble::default(), |sum, l| {
             sum + DoubleDouble::product(axes[(row % d, l)], shapes[(row / d * 3 + l, p)])
@@ -222,8 +228,8 @@ fn modal_stiffness(
     (value, error)
 }
 
-/// -log10 of the worst error of each of [`DIGITS`] relative to its scale; `errors` holds a bound for each
-/// entry.
+/// Returns -log10 of the worst error of each of [`DIGITS`] relative to its scale; `errors` holds an upper
+/// bound for each entry.
 fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
     let nf = value.n_modes();
     let entries = EntryErrors { value, errors, bound: CauchySchwarz::of(value), nf };
@@ -247,11 +253,12 @@ fn digits(value: &Invariants, errors: &Invariants) -> [f64; DIGITS.len()] {
         worst_ratio(3, nf, |k, p| entries.c2(k, p)),
         worst_ratio(nf, nf, |p, q| (entries.s(&[(0, 0), (1, 1), (2, 2)], p, q), bound.s(p, q))),
     ];
-    // No f64 carries more than sixteen digits, whatever the bound says of a zero.
+    // An f64 carries at most sixteen digits, also if the bound of a zero suggests more.
     ratios.map(|ratio| if ratio.is_nan() { 0.0 } else { (-ratio.log10()).clamp(0.0, 16.0) })
 }
 
-/// The largest error of the entries of a matrix relative to their scales; an error of zero needs none.
+/// Returns the largest error of the entries of a matrix relative to their scales; an error of zero counts
+/// as zero for any scale.
 fn worst_ratio(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> (f64, f64)) -> f64 {
     let mut largest = 0.0;
     for i in 0..rows {
@@ -263,7 +270,7 @@ fn worst_ratio(rows: usize, columns: usize, entry: impl Fn(usize, usize) -> (f64
     largest
 }
 
-/// Errors of entries that are formed in f64 from the primary data, each with its scale.
+/// Errors of entries formed in f64 from the primary data, with their scales.
 struct EntryErrors<'a> {
     value: &'a Invariants,
     errors: &'a Invariants,
@@ -271,20 +278,20 @@ struct EntryErrors<'a> {
     nf: usize,
 }
 
-/// What is formed in f64 from rounded data inherits their errors and adds the rounding of its own sums.
+/// Returns the error of a sum of rounded data: the sum of their errors plus the rounding of the sum itself.
 fn error_of_sum(errors: f64, magnitudes: f64) -> f64 {
     ROOM * (errors + 2.0 * U * magnitudes)
 }
 
 impl EntryErrors<'_> {
-    /// Of a sum or difference of two entries of Ibar.
+    /// Returns the error of a sum or difference of two entries of Ibar.
     fn ibar(&self, a: (usize, usize), b: (usize, usize), p: usize) -> f64 {
         let error = |(k, l): (usize, usize)| self.errors.0.ibar[k][l][p];
         let magnitude = |(k, l): (usize, usize)| self.value.0.ibar[k][l][p].abs();
         error_of_sum(error(a) + error(b), magnitude(a) + magnitude(b))
     }
 
-    /// Of a sum or difference of entries of blocks of S.
+    /// Returns the error of a sum or difference of entries of blocks of S.
     fn s(&self, terms: &[(usize, usize)], p: usize, q: usize) -> f64 {
         let total = |m: &Invariants| terms.iter().map(|&(k, l)| m.0.s[k][l][(p, q)].abs()).sum::<f64>();
         error_of_sum(total(self.errors), total(self.value))

@@ -1,4 +1,4 @@
-//! Error norms of invariants from lumped masses against the exact ones (theory section 9).
+//! Error norms of lumped invariants against the exact ones (theory section 9).
 
 use super::cauchy_schwarz::scaled;
 use super::dense::{frobenius_norm, spectral_norm};
@@ -7,15 +7,15 @@ use faer::{Mat, MatRef};
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
 
-/// Name and meaning of every number of [`error_norms`], in its order. X stands for the exact invariant, D for
-/// the lumped one minus X. Every number is dimensionless and zero when nothing differs.
+/// Name and meaning of every number of [`error_norms`], in its order. X stands for the exact invariant, D
+/// for the lumped one minus X. Every number is dimensionless, and zero without difference.
 ///
-/// Each invariant has one scale. `I0`, `W2` and the modal mass never vanish: their norms are relative to the
-/// same norm of X. `W1` and `W3` vanish for symmetric bodies, `C1` and `C2` for free-surface modes: their
-/// norms are relative to the same norm of X or, where that is smaller, to the bound of theory section 7 for a
-/// unit of modal coordinate, with mu^2 the largest eigenvalue of m_ff (1 for mass-normalised modes) and I_max
-/// that of I0. The `max` numbers are entry by entry relative to the Cauchy-Schwarz bound ([`CauchySchwarz`]),
-/// which shows an error about a slender axis that a norm hides.
+/// Each invariant has one scale. `I0`, `W2` and the modal mass never vanish: their norms are relative to
+/// the norm of X. `W1` and `W3` vanish for symmetric bodies, `C1` and `C2` for free-surface modes: their
+/// norms are relative to the norm of X or, if that is smaller, to the bound of theory section 7 for a unit
+/// of modal coordinate, with mu^2 the largest eigenvalue of m_ff (1 for mass-normalised modes) and I_max
+/// that of I0. The `max` numbers are relative to the Cauchy-Schwarz bound ([`CauchySchwarz`]) entry by
+/// entry, which shows an error about a slender axis that a norm hides.
 pub const ERROR_NORMS: [(&str, &str); 23] = [
     ("mass", "|m_l - m| / m"),
     ("com_shift", "distance of the centres of mass / radius of gyration sqrt(tr J_com / m)"),
@@ -42,9 +42,9 @@ pub const ERROR_NORMS: [(&str, &str); 23] = [
     ("C2_max", "largest |D_kp| / (sqrt(I0_kk) |psi_p|)"),
 ];
 
-/// Error norms of `other` against `exact`, by name, in the order of [`ERROR_NORMS`], without those of W1, W2
-/// and W3 that one of them does not hold. Both belong to the same modes and the same frame; a NaN in either
-/// shows as NaN.
+/// Returns the error norms of `other` against `exact`, by name, in the order of [`ERROR_NORMS`]. Norms of
+/// W1, W2 and W3 are omitted if one of the two does not hold them. Both must belong to the same modes and
+/// frame; NaN in either gives NaN.
 ///
 /// # Panics
 /// When the numbers of modes differ.
@@ -83,8 +83,8 @@ pub fn error_norms(exact: &Invariants, other: &Invariants) -> Vec<(String, f64)>
     named.filter_map(|((name, _), value)| Some(((*name).to_owned(), value?))).collect()
 }
 
-/// Frobenius, spectral and largest scaled entry of b - a, the first two relative to the norm of a but never
-/// to less than `least`.
+/// Returns the Frobenius norm, the spectral norm and the largest scaled entry of b - a. The first two are
+/// relative to the norm of a, but at least to `least`.
 fn norms(a: &Mat<f64>, b: &Mat<f64>, least: f64, bound: impl Fn(usize, usize) -> f64) -> [f64; 3] {
     let difference = Mat::from_fn(a.nrows(), a.ncols(), |p, q| b[(p, q)] - a[(p, q)]);
     let relative =
@@ -110,7 +110,7 @@ fn com_shift(exact: &Invariants, other: &Invariants) -> f64 {
     (centre_of_mass(other) - centre_of_mass(exact)).norm()
 }
 
-/// sqrt(tr J_com / m).
+/// Returns the radius of gyration sqrt(tr J_com / m).
 fn gyration_radius(body: &Invariants) -> f64 {
     (body.0.second_moment.trace() / body.0.mass - centre_of_mass(body).norm_squared()).max(0.0).sqrt()
 }

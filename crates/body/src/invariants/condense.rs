@@ -16,26 +16,28 @@ use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Rows per dense product: the longest plain sum. Shorter chunks cost time, longer ones digits.
+/// Number of rows per dense product, the longest plain sum. Shorter chunks cost time, longer chunks lose
+/// digits.
 pub(super) const CHUNK: usize = 128;
 /// Upper bound of the number of partial sums kept until they are added in order.
 pub(super) const MAX_GROUPS: usize = 64;
-/// Columns per pass over the mass matrix.
+/// Number of columns per pass over the mass matrix.
 const PANEL: usize = 64;
-/// The same of more than twice as many: a pass gathers the columns before its own once more.
+/// Number of columns per pass if there are more than twice as many. Each pass gathers all earlier columns
+/// once more, so wider panels save work on many columns.
 const WIDE_PANEL: usize = 192;
-/// Columns of a panel that are summed at a time, in registers.
+/// Number of columns of a panel summed at a time, in registers.
 pub(super) const LANE: usize = 16;
 
-/// A part of a row of a panel.
+/// One lane of a row of a panel.
 pub(super) type Lane = [f64; LANE];
 
-/// A symmetric mass on the nodes, the same for every direction.
+/// Symmetric mass on the nodes, equal for all directions.
 pub(super) trait NodalMass: Sync {
-    /// Number of rows.
+    /// Returns the number of rows.
     fn count(&self) -> usize;
 
-    /// Lane `lane` of row `i` of Ms X, for `x` with `lanes` lanes per node.
+    /// Returns lane `lane` of row `i` of Ms X, for `x` with `lanes` lanes per node.
     fn row_times(&self, i: usize, x: &[Lane], lanes: usize, lane: usize) -> Lane;
 }
 
@@ -58,7 +60,7 @@ impl NodalMass for SymmetricMatrix {
     }
 }
 
-/// A diagonal (lumped) mass: one number per node.
+/// Diagonal (lumped) mass: one number per node.
 impl NodalMass for [f64] {
     fn count(&self) -> usize {
         self.len()
@@ -76,11 +78,11 @@ impl NodalMass for [f64] {
 /// S_kl = Psi_k' Ms Psi_l, for M = Ms kron I3.
 ///
 /// * `mass`: Ms (n x n). Unit: mass.
-/// * `positions`: node positions in the frame that the result refers to. Unit: length. Any origin is right;
-///   digits are kept best with the origin at the centre of mass ([`super::choose_frame`]). Rows of Ms beyond
-///   them are vectors that rigid motion does not move (bubbles): their 1 and x are zero.
-/// * `shapes`: 3n x nf, row 3 i + k is component k of row i of Ms along the axes of the same frame; any
-///   basis.
+/// * `positions`: node positions in the frame of the result. Unit: length. Any origin is valid; an origin
+///   at the centre of mass ([`super::choose_frame`]) keeps most digits. Rows of Ms beyond the positions are
+///   vectors that rigid motion does not move (bubbles): their entries of 1 and x are zero.
+/// * `shapes`: any basis (3n x nf); row 3 i + k is component k of row i of Ms along the axes of the frame
+///   of `positions`.
 /// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
 ///
 /// J and the diagonal blocks S_kk are exactly symmetric and S_lk = S_kl' exactly. The result does not depend
@@ -111,7 +113,7 @@ pub fn condense(
     condense_with(mass, positions, shapes, modal_stiffness)
 }
 
-/// [`condense`] for any nodal mass.
+/// Condenses as [`condense`] does, for any nodal mass.
 pub(super) fn condense_with<M: NodalMass + ?Sized>(
     mass: &M,
     positions: &[[f64; 3]],
@@ -124,7 +126,7 @@ pub(super) fn condense_with<M: NodalMass + ?Sized>(
     from_gram(gram.as_ref(), modal_stiffness)
 }
 
-/// The primary data from the Gram matrix of [`SolidColumns`].
+/// Returns the primary data from the Gram matrix of [`SolidColumns`].
 pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Invariants {
     let nf = modal_stiffness.ncols();
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
@@ -142,7 +144,7 @@ pub(super) fn from_gram(gram: MatRef<'_, f64>, modal_stiffness: Mat<f64>) -> Inv
     })
 }
 
-/// m, c and J of rigid motion alone.
+/// Returns m, c and J of rigid motion alone.
 pub(super) fn condense_rigid<M: NodalMass + ?Sized>(
     mass: &M,
     positions: &[[f64; 3]],
@@ -156,7 +158,7 @@ pub(super) fn rigid_part(gram: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
     (gram[(0, 0)], first_moment, Matrix3::from_fn(|k, l| gram[(1 + k, 1 + l)]))
 }
 
-/// An array of three from its index.
+/// Returns an array of three values computed from the index.
 fn array<T>(f: impl FnMut(usize) -> T) -> [T; 3] {
     std::array::from_fn(f)
 }
@@ -183,7 +185,7 @@ impl SolidColumns<'_> {
         4 + 3 * self.shapes.ncols()
     }
 
-    /// Rows of X.
+    /// Returns the number of rows of X.
     pub(super) fn rows(&self) -> usize {
         self.shapes.nrows() / 3
     }
@@ -198,8 +200,8 @@ impl SolidColumns<'_> {
         }
     }
 
-    /// Copies some columns of the nodes `first`, `first + 1`, ... into rows of `width` values, as many as
-    /// there is room for.
+    /// Copies a range of columns of the nodes `first`, `first + 1`, ... into rows of `width` values, until
+    /// `rows` is full.
     pub(super) fn by_node(&self, first: usize, columns: Range<usize>, width: usize, rows: &mut [f64]) {
         for (slot, column) in columns.enumerate() {
             for (k, row) in rows.chunks_exact_mut(width).enumerate() {
@@ -209,7 +211,7 @@ impl SolidColumns<'_> {
     }
 }
 
-/// Zeros that begin at a cache line: the dense kernels meet the same alignment in every run.
+/// Zeros that begin at a cache line, so that the dense kernels meet the same alignment in every run.
 pub(super) struct Aligned {
     values: Vec<f64>,
     start: usize,
@@ -234,7 +236,7 @@ impl Aligned {
     }
 }
 
-/// X' Ms X, exactly symmetric.
+/// Returns X' Ms X, exactly symmetric.
 fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let n_columns = columns.count();
     let mut gram = Mat::<f64>::zeros(n_columns, n_columns);
@@ -248,7 +250,7 @@ fn weighted_gram<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> 
     gram
 }
 
-/// Some columns of a symmetric matrix down to the diagonal, and their mirror image.
+/// Fills a range of columns of a symmetric matrix down to the diagonal, and the mirrored entries.
 pub(super) fn fill_symmetric(
     matrix: &mut Mat<f64>,
     columns: Range<usize>,
@@ -262,12 +264,12 @@ pub(super) fn fill_symmetric(
     }
 }
 
-/// Nodes of a group: the partition depends on the number of nodes `n` only.
+/// Returns the number of nodes per group, which depends on the number of nodes `n` only.
 pub(super) fn group_length(n: usize) -> usize {
     CHUNK * n.div_ceil(CHUNK).div_ceil(MAX_GROUPS).max(1)
 }
 
-/// The sum of what each group of the `n` nodes contributes to a matrix of this size, in the order of the
+/// Sums the contributions of the groups of `n` nodes to a matrix of the given size, in the order of the
 /// groups.
 pub(super) fn sum_of_groups(
     n: usize,
@@ -286,8 +288,7 @@ pub(super) fn sum_of_groups(
     total
 }
 
-/// Columns 0..panel.end of X against Ms X[panel]: at least panel.end rows and a column per column of the
-/// panel.
+/// Returns X[0..panel.end]' Ms X[panel]: at least panel.end rows, and one column per column of the panel.
 fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel: Range<usize>) -> Mat<f64> {
     let n = columns.rows();
     let lanes = panel.len().div_ceil(LANE);
@@ -324,8 +325,8 @@ fn gram_panel<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>, panel:
     })
 }
 
-/// Rows `first`, `first + 1`, ... of Ms X, as many as `targets` has room for. (Not a closure, which may be
-/// compiled apart from the function that has the instruction set, without it.)
+/// Computes rows `first`, `first + 1`, ... of Ms X until `targets` is full. (A structure and not a closure:
+/// a closure may be compiled apart from the function that has the instruction set, and then without it.)
 pub(super) struct MassTimes<'a, M: ?Sized> {
     pub mass: &'a M,
     pub first: usize,

@@ -1,5 +1,5 @@
-//! The condensation without S: what a body has that holds neither W2 nor W3, from the products of M with
-//! rigid motion alone.
+//! Condensation without S, from the products of M with rigid motion alone, for a body that holds neither W2
+//! nor W3.
 
 use super::condense::{
     Aligned, CHUNK, LANE, Lane, MassTimes, NodalMass, SolidColumns, rigid_part, sum_of_groups,
@@ -11,9 +11,8 @@ use flexbody_linalg::{SymmetricMatrix, gram};
 use pulp::Arch;
 use rayon::prelude::*;
 
-/// [`condense`](super::condense()) for modes that are mass-normalised, without W2 and W3: four columns are
-/// multiplied by Ms, not 4 + 3 nf, and m_ff = I is taken for granted. m, c, J, C1, C2 and W1 are those of
-/// [`condense`](super::condense()) to rounding.
+/// Condenses mass-normalised modes without W2 and W3: multiplies four columns by Ms instead of 4 + 3 nf,
+/// and assumes m_ff = I. m, c, J, C1, C2 and W1 agree with [`condense`](super::condense()) to rounding.
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -27,8 +26,8 @@ pub fn condense_linear(
     of_rigid_products(mass, SolidColumns { positions, shapes }, modal_stiffness, &Mat::identity(nf, nf))
 }
 
-/// [`condense_lumped`](super::condense_lumped) without W2 and W3. m_ff, of which lumped masses make no
-/// identity, is there.
+/// Condenses lumped masses without W2 and W3 (see [`condense_lumped`](super::condense_lumped)). m_ff, which
+/// is no identity for lumped masses, is computed.
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -57,7 +56,7 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
     columns.assert_sizes(mass, modal_stiffness.as_ref());
     let products = rigid_products(mass, columns);
     let psi = |k: usize, p: usize| 4 + 3 * p + k;
-    // J is symmetric but for rounding: one half of it counts.
+    // J is symmetric except for rounding: use one half of it.
     let rigid = Mat::from_fn(4, 4, |i, j| products[(i.min(j), i.max(j))]);
     let (mass, first_moment, second_moment) = rigid_part(rigid.as_ref());
     Invariants(PrimaryData {
@@ -73,7 +72,8 @@ fn of_rigid_products<M: NodalMass + ?Sized>(
     })
 }
 
-/// X' Ms [1, x, y, z], in the partition of the whole condensation; columns beyond the fourth mean nothing.
+/// Returns X' Ms [1, x, y, z], in the partition of the full condensation; columns beyond the fourth have no
+/// meaning.
 fn rigid_products<M: NodalMass + ?Sized>(mass: &M, columns: SolidColumns<'_>) -> Mat<f64> {
     let (n, count) = (columns.rows(), columns.count());
     let mut x: Vec<Lane> = vec![[0.0; LANE]; n];
@@ -107,7 +107,7 @@ mod tests {
     use flexbody_linalg::CscMatrix;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// Counts the lanes of rows that are multiplied.
+    /// Mass that counts the lanes of rows that are multiplied.
     struct Counted(SymmetricMatrix, AtomicUsize);
 
     impl NodalMass for Counted {

@@ -6,24 +6,24 @@ use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatRef, Par};
 use flexbody_linalg::largest_entry;
 
-/// A B.
+/// Returns A B.
 pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     let mut c = Mat::zeros(a.nrows(), b.ncols());
     matmul(&mut c, Accum::Replace, a, b, 1.0, Par::Seq);
     c
 }
 
-/// A' B.
+/// Returns A' B.
 pub(super) fn transpose_product(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
     product(a.transpose(), b)
 }
 
-/// Every entry, column by column.
+/// Returns all entries, column by column.
 pub(super) fn entries<'a>(a: MatRef<'a, f64>) -> impl Iterator<Item = f64> + 'a {
     (0..a.ncols()).flat_map(move |q| (0..a.nrows()).map(move |p| a[(p, q)]))
 }
 
-/// Frobenius norm, safe against overflow.
+/// Returns the Frobenius norm, safe against overflow.
 pub(super) fn frobenius_norm(a: MatRef<'_, f64>) -> f64 {
     let scale = largest_entry(a);
     if scale == 0.0 || !scale.is_finite() {
@@ -32,8 +32,8 @@ pub(super) fn frobenius_norm(a: MatRef<'_, f64>) -> f64 {
     scale * entries(a).map(|v| (v / scale) * (v / scale)).sum::<f64>().sqrt()
 }
 
-/// Spectral norm: the square root of the largest eigenvalue of the smaller Gram matrix. NaN when an entry is
-/// not finite.
+/// Returns the spectral norm: the square root of the largest eigenvalue of the smaller Gram matrix. NaN if
+/// an entry is not finite.
 pub(super) fn spectral_norm(a: MatRef<'_, f64>) -> f64 {
     let scale = largest_entry(a);
     if scale == 0.0 {
@@ -46,8 +46,8 @@ pub(super) fn spectral_norm(a: MatRef<'_, f64>) -> f64 {
     largest.map_or(f64::NAN, |value| scale * value.max(0.0).sqrt())
 }
 
-/// Eigenvalues of a symmetric matrix (its lower triangle), ascending; `None` when an entry is not finite or
-/// the iteration fails.
+/// Returns the eigenvalues of a symmetric matrix (its lower triangle), ascending; `None` if an entry is not
+/// finite or the iteration fails.
 pub(super) fn symmetric_eigenvalues(a: MatRef<'_, f64>) -> Option<Vec<f64>> {
     let n = a.nrows();
     if !largest_entry(a).is_finite() {

@@ -1,34 +1,34 @@
-//! The invariants of the equations of motion, linear in the primary data (theory section 2).
+//! Invariants of the equations of motion, linear in the primary data (theory section 2).
 
 use super::Invariants;
 use faer::Mat;
 use nalgebra::Matrix3;
 
-/// The two other axes of axis k, in cyclic order: (k, l, m) is right-handed.
+/// Cyclic triples of axes: (k, l, m) is right-handed.
 pub(super) const CYCLIC: [(usize, usize, usize); 3] = [(0, 1, 2), (1, 2, 0), (2, 0, 1)];
 
-/// All invariants that follow from the primary data, as files and exports carry them.
+/// All invariants that follow from the primary data, as stored in files and exports.
 ///
-/// Component-blocked: column (or row) b nf + j belongs to axis b and mode j.
+/// Arrays are blocked by component: column (or row) b nf + j belongs to axis b and mode j.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Derived {
     /// I0 (3 x 3). Unit: mass length^2.
     pub inertia: Matrix3<f64>,
     /// C2 (3 x nf).
     pub c2: Mat<f64>,
-    /// W1 (3 x 3nf); `None` where the body does not hold it, as W2 and W3.
+    /// W1 (3 x 3nf); `None` if the body does not hold W1.
     pub w1: Option<Mat<f64>>,
-    /// W2 (3nf x 3nf).
+    /// W2 (3nf x 3nf); `None` if the body does not hold W2.
     pub w2: Option<Mat<f64>>,
-    /// W3 (3nf x nf).
+    /// W3 (3nf x nf); `None` if the body does not hold W3.
     pub w3: Option<Mat<f64>>,
     /// m_ff (nf x nf).
     pub modal_mass: Mat<f64>,
 }
 
-/// I0 = tr(J) I - J.
+/// Returns I0 = tr(J) I - J.
 pub(super) fn inertia_of(second_moment: &Matrix3<f64>) -> Matrix3<f64> {
-    // Sums of two diagonal entries: the trace minus the third would cancel for needles.
+    // Add two diagonal entries: the trace minus the third would cancel for needles.
     Matrix3::from_fn(|k, l| {
         let (_, a, b) = CYCLIC[k];
         if k == l { second_moment[(a, a)] + second_moment[(b, b)] } else { -second_moment[(k, l)] }
@@ -36,18 +36,18 @@ pub(super) fn inertia_of(second_moment: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 impl Invariants {
-    /// Number of modes nf.
+    /// Returns the number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.0.c1.ncols()
     }
 
-    /// I0 = tr(J) I - J: inertia of the undeformed body about the frame origin, frame axes. Unit: mass
-    /// length^2.
+    /// Returns I0 = tr(J) I - J, the inertia of the undeformed body about the frame origin, frame axes.
+    /// Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         inertia_of(&self.0.second_moment)
     }
 
-    /// C2 (3 x nf) = Phi_r' M Psi: rows Ibar23 - Ibar32, Ibar31 - Ibar13, Ibar12 - Ibar21.
+    /// Returns C2 (3 x nf) = Phi_r' M Psi: rows Ibar23 - Ibar32, Ibar31 - Ibar13, Ibar12 - Ibar21.
     pub fn c2(&self) -> Mat<f64> {
         Mat::from_fn(3, self.n_modes(), |k, p| {
             let (_, l, m) = CYCLIC[k];
@@ -55,8 +55,8 @@ impl Invariants {
         })
     }
 
-    /// W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk). `None` where
-    /// the body does not hold it: dropped is not zero.
+    /// Returns W1 (3 x 3nf): diagonal blocks 2 (Ibar_ll + Ibar_mm), block (k, l) = -(Ibar_kl + Ibar_lk).
+    /// Returns `None` if the body does not hold W1: a dropped group is not zero.
     pub fn w1(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
         let w1 = |k: usize, column: usize| {
@@ -71,8 +71,8 @@ impl Invariants {
         self.0.groups.w1.then(|| Mat::from_fn(3, 3 * nf, w1))
     }
 
-    /// W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk. `None` where the body does not hold
-    /// it.
+    /// Returns W2 (3nf x 3nf): diagonal blocks S_ll + S_mm, block (k, l) = -S_lk. Returns `None` if the
+    /// body does not hold W2.
     pub fn w2(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
         let w2 = |row: usize, column: usize| {
@@ -87,8 +87,9 @@ impl Invariants {
         self.0.groups.w2.then(|| Mat::from_fn(3 * nf, 3 * nf, w2))
     }
 
-    /// W0 (3 x 3nf): how modes move the coupling of translation and rotation, block b column j = -C1_j~ e_b
-    /// or, for a mass that does not commute with rotations, Phi_t' M B_j e_b. s~ = c~ - W0 Q.
+    /// Returns W0 (3 x 3nf), the change of the coupling of translation and rotation with the modal
+    /// amplitudes: block b, column j is -C1_j~ e_b or, for a mass that does not commute with rotations,
+    /// Phi_t' M B_j e_b. s~ = c~ - W0 Q.
     pub fn w0(&self) -> Mat<f64> {
         if let Some(general) = &self.0.general {
             return general.w0.clone();
@@ -106,8 +107,8 @@ impl Invariants {
         })
     }
 
-    /// W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew; B_i' M Psi for a mass that does not
-    /// commute with rotations. `None` where the body does not hold it.
+    /// Returns W3 (3nf x nf): blocks S23 - S32, S31 - S13, S12 - S21, each skew; B_i' M Psi for a mass that
+    /// does not commute with rotations. Returns `None` if the body does not hold W3.
     pub fn w3(&self) -> Option<Mat<f64>> {
         let nf = self.n_modes();
         let difference = |row: usize, q: usize| {
@@ -120,7 +121,7 @@ impl Invariants {
         })
     }
 
-    /// m_ff (nf x nf) = S11 + S22 + S33 = Psi' M Psi: the identity for mass-normalised modes.
+    /// Returns m_ff (nf x nf) = S11 + S22 + S33 = Psi' M Psi, the identity for mass-normalised modes.
     pub fn modal_mass(&self) -> Mat<f64> {
         if let Some(general) = &self.0.general {
             return general.modal_mass.clone();
@@ -129,7 +130,7 @@ impl Invariants {
         Mat::from_fn(nf, nf, |p, q| (0..3).map(|k| self.0.s[k][k][(p, q)]).sum())
     }
 
-    /// All of them.
+    /// Returns all derived invariants.
     pub fn derived(&self) -> Derived {
         Derived {
             inertia: self.inertia(),

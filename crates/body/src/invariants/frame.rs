@@ -1,5 +1,5 @@
-//! The body frame: its choice from the mass and the undeformed nodes, and the change of nodes and shapes to
-//! it.
+//! Body frame: its choice from the mass and the undeformed nodes, and the transformation of nodes and
+//! shapes to it.
 
 use super::condense::condense_rigid;
 use super::derived::inertia_of;
@@ -22,18 +22,18 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The model's own frame.
+    /// Returns the frame of the model.
     pub fn model() -> Self {
         Self { origin: Vector3::zeros(), axes: Matrix3::identity() }
     }
 
-    /// Body coordinates of points given in model coordinates: x_body = axes' (x_model - origin).
+    /// Returns body coordinates of points given in model coordinates: x_body = axes' (x_model - origin).
     pub fn to_body(self, positions: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let to_body = self.axes.transpose();
         positions.iter().map(|x| (to_body * (Vector3::from(*x) - self.origin)).into()).collect()
     }
 
-    /// A position in body coordinates, in model coordinates: x_model = r0 + A0 x.
+    /// Returns the model coordinates of a position given in body coordinates: x_model = r0 + A0 x.
     pub fn to_model(self, x: [f64; 3]) -> [f64; 3] {
         (self.origin + self.axes * Vector3::from(x)).into()
     }
@@ -53,13 +53,13 @@ impl Frame {
         });
     }
 
-    /// Turns rigid fields (six columns: unit translations along the model axes, unit rotations about them; in
-    /// the plane two and one) to those of the body axes, in place.
+    /// Turns rigid fields from the model axes to the body axes, in place. The fields are six columns: unit
+    /// translations along the axes, then unit rotations about them; in the plane two and one.
     ///
     /// # Panics
     /// When there are neither six columns nor three.
     pub fn rotate_rigid(&self, fields: &mut Mat<f64>) {
-        // About z in the plane: the one rotation stays what it is.
+        // In the plane the only rotation, about z, does not change.
         let (d, groups) = match fields.ncols() {
             3 => (2, 1),
             6 => (3, 2),
@@ -74,7 +74,7 @@ impl Frame {
     }
 }
 
-/// Which body frame to use.
+/// Choice of the body frame for mean axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum BodyFrame {
     /// Origin at the centre of mass, axes of the model.
@@ -87,10 +87,10 @@ pub enum BodyFrame {
 }
 
 impl BodyFrame {
-    /// Every choice, in the order of the documentation.
+    /// All choices, in the order of the documentation.
     pub const ALL: [BodyFrame; 3] = [Self::Com, Self::Principal, Self::Model];
 
-    /// Name in settings and on the command line.
+    /// Returns the name in settings and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::Principal => "principal",
@@ -99,24 +99,24 @@ impl BodyFrame {
         }
     }
 
-    /// Returns the frame of this name.
+    /// Returns the frame with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
-/// Which body frame to use, and what ties it to the deformed body.
+/// Choice of the body frame and of the conditions that tie it to the deformed body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum FrameChoice {
-    /// This frame, which follows the mean motion of the body (mean axes).
+    /// Frame that follows the mean motion of the body (mean axes).
     Mean(BodyFrame),
-    /// On the reference point of the interface of this name, along the axes of the model. The interface rests in every
-    /// mode: the modes are those of the body that is held there.
+    /// Frame at the reference point of the interface of this name, along the axes of the model. The
+    /// interface is at rest in every mode: the modes belong to the body held there.
     Interface(String),
 }
 
 impl FrameChoice {
-    /// Name in the settings of a file.
+    /// Returns the name in the settings of a file.
     pub fn text(&self) -> String {
         match self {
             Self::Mean(frame) => frame.name().to_owned(),
@@ -124,7 +124,7 @@ impl FrameChoice {
         }
     }
 
-    /// The interface that the frame stands on; `None` of a frame in mean axes.
+    /// Returns the interface that carries the frame; `None` for a frame in mean axes.
     pub fn interface(&self) -> Option<&str> {
         match self {
             Self::Mean(_) => None,
@@ -148,7 +148,7 @@ impl From<BodyFrame> for FrameChoice {
 impl std::str::FromStr for FrameChoice {
     type Err = String;
 
-    /// The name of a frame in mean axes, or `interface=NAME`.
+    /// Parses the name of a frame in mean axes, or `interface=NAME`.
     fn from_str(text: &str) -> std::result::Result<Self, String> {
         if let Some(name) = text.strip_prefix("interface=").filter(|name| !name.is_empty()) {
             return Ok(Self::Interface(name.to_owned()));
@@ -197,11 +197,11 @@ pub fn choose_frame(
     scalar_frame(mass, positions, choice, false)
 }
 
-/// The same for a body that stays in the plane z = 0: the third axis is z whatever the moments are, the first
-/// the axis of the smaller moment in the plane.
+/// Finds the frame of a body that stays in the plane z = 0. The third axis is z for any moments; the first
+/// axis belongs to the smaller moment in the plane. All else is as for [`choose_frame`].
 ///
 /// # Errors
-/// As [`choose_frame`].
+/// The errors of [`choose_frame`].
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -213,11 +213,11 @@ pub fn choose_plane_frame(
     scalar_frame(mass, positions, choice, true)
 }
 
-/// The same for any mass, given the matrix R'MR of its unit translations and unit rotations of a frame:
-/// 6x6, of a body in the plane (`dimension` 2) 3x3.
+/// Finds the frame for any mass matrix. `rigid_mass` takes a frame and returns R'MR of unit translations
+/// and unit rotations in it: 6x6, for a body in the plane (`dimension` 2) 3x3.
 ///
 /// # Errors
-/// As [`choose_frame`].
+/// The errors of [`choose_frame`].
 pub fn choose_general_frame(
     rigid_mass: impl Fn(Frame) -> Mat<f64>,
     positions: &[[f64; 3]],
@@ -238,13 +238,14 @@ fn scalar_frame(
     assert!(mass.n() >= positions.len(), "a row of Ms for every position");
     let about =
         |origin: Vector3<f64>, positions: &[[f64; 3]]| Frame { origin, ..Frame::model() }.to_body(positions);
-    // Twice: what is left of far coordinates is small, and so is its rounding.
+    // Subtract twice: the coordinates left after the first subtraction are small, and so is their rounding.
     frame_of(positions, choice, plane, |middle, offset| {
         condense_rigid(mass, &about(offset, &about(middle, positions)))
     })
 }
 
-/// Finds the frame from mass, first and second moment about a point, which is the sum of the two given.
+/// Finds the frame from `rigid`, which returns mass, first and second moment about the sum of the two given
+/// points.
 fn frame_of(
     positions: &[[f64; 3]],
     choice: BodyFrame,
@@ -286,6 +287,6 @@ fn bounding_box_middle(positions: &[[f64; 3]]) -> Vector3<f64> {
         low = low.inf(&Vector3::from(*x));
         high = high.sup(&Vector3::from(*x));
     }
-    // Halves first: the sum of two large coordinates could overflow.
+    // Halve first: the sum of two large coordinates could overflow.
     if positions.is_empty() { Vector3::zeros() } else { low * 0.5 + high * 0.5 }
 }

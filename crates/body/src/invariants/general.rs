@@ -1,5 +1,5 @@
-//! The condensation of mass matrices that do not commute with rotations (theory section 6): nodal rotations,
-//! eliminated constraints, vectors without a place that move with the body.
+//! Condensation of mass matrices that do not commute with rotations (theory section 6): models with nodal
+//! rotations, eliminated constraints, or vectors without a position that turn with the body.
 //!
 //! One Gram matrix X' M X of the columns X = [Phi_t, B_x, B_1, ..., B_nf, Psi] holds every product. With rows
 //! of -psi_j~ at the displacements and zeros at the rotations in B_j, the body-frame velocities of all rows
@@ -13,15 +13,15 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Columns of X that are multiplied by M at a time.
+/// Number of columns of X multiplied by M at a time. A larger block needs more memory.
 const BLOCK: usize = 32;
 
-/// A symmetric mass that columns are multiplied by.
+/// Product of a symmetric mass matrix with columns.
 pub trait MassProduct: Sync {
-    /// Number of its rows.
+    /// Returns the number of rows of M.
     fn n_rows(&self) -> usize;
 
-    /// y = M x.
+    /// Computes y = M x.
     fn times(&self, x: MatRef<'_, f64>, y: MatMut<'_, f64>);
 }
 
@@ -36,7 +36,7 @@ impl MassProduct for SymmetricMatrix {
     }
 }
 
-/// The mass of points and directors: of extended rows.
+/// The mass of points and directors acts on extended rows.
 impl MassProduct for DirectorMass {
     fn n_rows(&self) -> usize {
         self.rows()
@@ -47,15 +47,17 @@ impl MassProduct for DirectorMass {
     }
 }
 
-/// The motion of the rows of a mass, components along the model axes, with the body frame.
+/// Rigid motion of the rows of a mass matrix, components along the model axes, and the axes of the body
+/// frame.
 #[derive(Debug, Clone, Copy)]
 pub struct RigidMotion<'a> {
-    /// N x 6: unit translations along the body axes, then unit rotations about them; of a plane body N x 3.
-    /// Turned before they are multiplied ([`Frame::rotate_rigid`](super::Frame::rotate_rigid)), so that
-    /// slender bodies keep the digits of their small moments.
+    /// Rigid fields (N x 6): unit translations along the body axes, then unit rotations about them; N x 3
+    /// for a plane body. They are turned to the body axes before they are multiplied
+    /// ([`Frame::rotate_rigid`](super::Frame::rotate_rigid)), so that slender bodies keep the digits of
+    /// their small moments.
     pub fields: MatRef<'a, f64>,
-    /// Rows of vectors that turn with the body, d per vector, which come first; all others keep their values
-    /// when the body turns.
+    /// Number of leading rows that hold vectors turning with the body, d rows per vector. All other rows
+    /// keep their values when the body turns.
     pub displacements: usize,
     /// Columns are the body axes in model axes.
     pub axes: Matrix3<f64>,
@@ -67,14 +69,14 @@ pub struct RigidMotion<'a> {
 /// B_j e_b, W1 = (B_x' M B_j + B_j' M B_x) e_b; W2 = e_a' B_i' M B_j e_b at row a nf + i, column b nf + j; W3
 /// = e_a' B_i' M psi_j at row a nf + i.
 ///
-/// * `mass`: M (N x N), model axes; of a model with nodal rotations E of points and directors, with the extended
-///   rows of motion and shapes.
-/// * `motion`: of its rows.
-/// * `shapes`: N x nf, the modes, model axes.
+/// * `mass`: M (N x N), model axes. For a model with nodal rotations the matrix E of points and directors;
+///   then motion and shapes have extended rows.
+/// * `motion`: rigid motion of the rows of `mass`.
+/// * `shapes`: modes (N x nf), model axes.
 /// * `modal_stiffness`: Psi' K Psi (nf x nf), passed through.
 ///
-/// The result is in body axes about the origin of the body frame. Of a plane body only the rotation about z
-/// is known: the entries about the other axes are those of a lamina of the same inertia about z. The result
+/// The result is in body axes about the origin of the body frame. For a plane body only the rotation about
+/// z is known: the entries about the other axes are set to a lamina with equal inertia about z. The result
 /// does not depend on the number of threads.
 ///
 /// # Panics
@@ -89,8 +91,8 @@ pub fn condense_general<M: MassProduct + ?Sized>(
     columns.products(columns.gram(mass)).invariants(modal_stiffness)
 }
 
-/// The same for modes that are mass-normalised, without W2 and W3: the columns \[Phi_t, B_x\] alone are
-/// multiplied by M, and m_ff = I is taken for granted.
+/// Condenses mass-normalised modes without W2 and W3 (see [`condense_general`]): multiplies only the
+/// columns \[Phi_t, B_x\] by M and assumes m_ff = I.
 ///
 /// # Panics
 /// When the sizes disagree.
@@ -105,7 +107,7 @@ pub fn condense_general_linear<M: MassProduct + ?Sized>(
     whole.with_groups(TermGroups { w1: true, ..TermGroups::NONE })
 }
 
-/// X = [Phi_t, B_x, B_j e_b for each axis b and mode j, Psi].
+/// Columns X = [Phi_t, B_x, B_j e_b for each axis b and mode j, Psi].
 struct GeneralColumns<'a> {
     motion: &'a RigidMotion<'a>,
     shapes: MatRef<'a, f64>,
@@ -113,7 +115,7 @@ struct GeneralColumns<'a> {
 
 impl<'a> GeneralColumns<'a> {
     /// # Panics
-    /// When mass, motion and shapes have not the same rows.
+    /// When mass, motion and shapes differ in their numbers of rows.
     fn new(mass: &(impl MassProduct + ?Sized), motion: &'a RigidMotion<'a>, shapes: MatRef<'a, f64>) -> Self {
         let n = mass.n_rows();
         assert!(shapes.nrows() == n && motion.fields.nrows() == n, "one row per row of M");
@@ -128,7 +130,7 @@ impl<'a> GeneralColumns<'a> {
         self.motion.fields.ncols()
     }
 
-    /// The axes that the body turns about.
+    /// Returns the axes that the body turns about: all three, or z for a plane body.
     fn axes(&self) -> Range<usize> {
         if self.rigid() == 3 { 2..3 } else { 0..3 }
     }
@@ -137,7 +139,7 @@ impl<'a> GeneralColumns<'a> {
         self.rigid() + (self.axes().len() + 1) * self.shapes.ncols()
     }
 
-    /// Some of the columns, each filled by one thread.
+    /// Returns a range of columns of X, each filled by one thread.
     fn block(&self, columns: Range<usize>) -> Tall {
         let mut block = Tall::zeros(self.shapes.nrows(), columns.len());
         let targets: Vec<_> = columns.zip(block.as_mut().col_iter_mut()).collect();
@@ -145,7 +147,7 @@ impl<'a> GeneralColumns<'a> {
         block
     }
 
-    /// Fills zeros with a column of X.
+    /// Writes a column of X into `to`, which must hold zeros.
     fn fill(&self, column: usize, mut to: ColMut<'_, f64>) {
         let Some(after) = column.checked_sub(self.rigid()) else {
             return to.copy_from(self.motion.fields.col(column));
@@ -165,7 +167,8 @@ impl<'a> GeneralColumns<'a> {
         }
     }
 
-    /// The rows and columns of X' M X of rigid motion, and I for the modes; zero elsewhere.
+    /// Returns X' M X with the rows and columns of rigid motion, the identity for the modes, and zeros
+    /// elsewhere.
     fn rigid_gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let (count, r) = (self.count(), self.rigid());
         let mut y = Mat::zeros(self.shapes.nrows(), r);
@@ -185,7 +188,7 @@ impl<'a> GeneralColumns<'a> {
         all
     }
 
-    /// X' M X, exactly symmetric.
+    /// Returns X' M X, exactly symmetric.
     fn gram(&self, mass: &(impl MassProduct + ?Sized)) -> Mat<f64> {
         let count = self.count();
         let blocks: Vec<Range<usize>> =
@@ -213,7 +216,7 @@ impl<'a> GeneralColumns<'a> {
     }
 }
 
-/// The Gram matrix of [`GeneralColumns`], of [`condense_general_linear`] without what W2 and W3 are made of.
+/// Gram matrix of [`GeneralColumns`]; from [`condense_general_linear`] without the entries of W2 and W3.
 struct Products {
     gram: Mat<f64>,
     rigid: usize,
@@ -221,12 +224,12 @@ struct Products {
 }
 
 impl Products {
-    /// Column of B_j e_b; `b` counts the axes that the body turns about.
+    /// Returns the column of B_j e_b; `b` counts the axes that the body turns about.
     fn turned(&self, b: usize, j: usize) -> usize {
         self.rigid + b * self.nf + j
     }
 
-    /// Column of psi_j.
+    /// Returns the column of psi_j.
     fn mode(&self, j: usize) -> usize {
         self.gram.ncols() - self.nf + j
     }
@@ -242,7 +245,7 @@ impl Products {
         }
     }
 
-    /// m, c and J of rigid motion.
+    /// Returns m, c and J of rigid motion.
     fn rigid_inertia(&self) -> (f64, Vector3<f64>, Matrix3<f64>) {
         rigid_inertia(self.gram.as_ref().submatrix(0, 0, self.rigid, self.rigid))
     }
@@ -250,12 +253,14 @@ impl Products {
     fn in_space(&self, modal_stiffness: Mat<f64>) -> Invariants {
         let (g, nf) = (&self.gram, self.nf);
         let (mass, first_moment, second_moment) = self.rigid_inertia();
+        // Ibar from B_x' M B_j and B_x' M psi_j.
         let ibar: Vec<Matrix3<f64>> = (0..nf)
             .map(|j| {
                 let half = Matrix3::from_fn(|k, b| g[(3 + k, self.turned(b, j))]);
                 ibar_of(&half, &Vector3::from_fn(|k, _| g[(3 + k, self.mode(j))]))
             })
             .collect();
+        // S from W2 = B_i' M B_j.
         let mut s = [(); 3].map(|()| [(); 3].map(|()| Mat::zeros(nf, nf)));
         for i in 0..nf {
             for j in 0..nf {
@@ -318,20 +323,20 @@ impl Products {
         })
     }
 
-    /// Phi_t' M Psi; of a plane body none along z.
+    /// Returns Phi_t' M Psi; the row of z is zero for a plane body.
     fn c1(&self) -> Mat<f64> {
         let d = if self.rigid == 3 { 2 } else { 3 };
         Mat::from_fn(3, self.nf, |k, j| if k < d { self.gram[(k, self.mode(j))] } else { 0.0 })
     }
 }
 
-/// Ibar of all modes, axis by axis.
+/// Returns Ibar of all modes, sorted by its two axes.
 fn by_axes(ibar: &[Matrix3<f64>]) -> [[Vec<f64>; 3]; 3] {
     [0, 1, 2].map(|k| [0, 1, 2].map(|l| ibar.iter().map(|ibar| ibar[(k, l)]).collect()))
 }
 
-/// m, c and J of R'MR = \[m I, -c~; c~, I0\] for unit translations and unit rotations R; of a plane body
-/// \[m I, (-c_y, c_x)'; ., I0_zz\] and J that of a lamina.
+/// Returns m, c and J from R'MR = \[m I, -c~; c~, I0\] for unit translations and unit rotations R. For a
+/// plane body R'MR is \[m I, (-c_y, c_x)'; ., I0_zz\], and J is the tensor of a lamina.
 pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f64>) {
     if g.ncols() == 3 {
         let (mass, c) = (0.5 * (g[(0, 0)] + g[(1, 1)]), Vector3::new(g[(1, 2)], -g[(0, 2)], 0.0));
@@ -346,14 +351,14 @@ pub(super) fn rigid_inertia(g: MatRef<'_, f64>) -> (f64, Vector3<f64>, Matrix3<f
     (mass, Vector3::from_fn(|k, _| moment(k)), second_moment_of(&inertia))
 }
 
-/// m and c of the same matrix.
+/// Returns m and c from the matrix R'MR of unit translations and unit rotations R.
 pub fn rigid_first_moment(g: MatRef<'_, f64>) -> (f64, Vector3<f64>) {
     let (mass, first_moment, _) = rigid_inertia(g);
     (mass, first_moment)
 }
 
-/// J that gives I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small
-/// where the third moment is, and a needle keeps the digits of its small moment, J_ll + J_mm.
+/// Returns J with I0 = tr(J) I - J. The two largest moments are subtracted first: their difference is small
+/// if the third moment is small, so that a needle keeps the digits of its small moment J_ll + J_mm.
 pub(super) fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     Matrix3::from_fn(|k, l| {
         let (a, b) = (inertia[((k + 1) % 3, (k + 1) % 3)], inertia[((k + 2) % 3, (k + 2) % 3)]);
@@ -361,29 +366,29 @@ pub(super) fn second_moment_of(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     })
 }
 
-/// J of a plane body of which the moment about z is known alone: the same in all directions about its centre
-/// of mass, so that it changes with the origin as J does.
+/// Returns J of a plane body from its moment about z alone: isotropic in the plane about the centre of
+/// mass, so that the tensor changes with the origin as J does.
 fn plane_second_moment(about_z: f64, mass: f64, c: &Vector3<f64>) -> Matrix3<f64> {
     lamina(about_z - c.norm_squared() / mass) + c * c.transpose() / mass
 }
 
-/// Ibar of a mode of a plane body from W1_zz = 2 (Ibar_xx + Ibar_yy), half of which is given, and C2_z =
-/// Ibar_xy - Ibar_yx.
+/// Returns Ibar of a mode of a plane body from W1_zz = 2 (Ibar_xx + Ibar_yy), half of which is given, and
+/// C2_z = Ibar_xy - Ibar_yx.
 pub(super) fn plane_ibar(half_w1: f64, c2: f64) -> Matrix3<f64> {
     let mut ibar = lamina(half_w1);
     (ibar[(0, 1)], ibar[(1, 0)]) = (0.5 * c2, -0.5 * c2);
     ibar
 }
 
-/// The tensor in the plane, the same in all directions there, with J_xx + J_yy = `about_z`.
+/// Returns the isotropic tensor in the plane with J_xx + J_yy = `about_z`.
 fn lamina(about_z: f64) -> Matrix3<f64> {
     Matrix3::from_diagonal(&Vector3::new(0.5, 0.5, 0.0)) * about_z
 }
 
 impl Invariants {
-    /// These invariants with another modal mass m_ff (nf x nf), everything else as it is: what a program
-    /// computes with that takes the modal mass of the FE program and sums the couplings over nodal masses. S
-    /// no longer tells m_ff, so that the mass is a general one.
+    /// Returns these invariants with another modal mass m_ff (nf x nf) and all other data unchanged: the
+    /// data of a program that takes the modal mass from the FE program and sums the couplings over nodal
+    /// masses. S no longer determines m_ff, so the result stores general terms.
     ///
     /// # Panics
     /// When the modal mass has another number of modes.
@@ -399,8 +404,9 @@ impl Invariants {
         self
     }
 
-    /// The same body with nothing but its rotation about z: J, Ibar and S of a lamina that has the same I0,
-    /// W1, W2, C2 about z. What a plane body is compared with whose mass does not commute with rotations.
+    /// Returns the body reduced to its rotation about z: J, Ibar and S of a lamina with equal I0, W1, W2
+    /// and C2 about z. The result is the reference for a plane body whose mass does not commute with
+    /// rotations.
     pub fn about_z(mut self) -> Self {
         let half = |a: f64, b: f64| 0.5 * (a + b);
         let j = &self.0.second_moment;
@@ -422,8 +428,8 @@ impl Invariants {
     }
 }
 
-/// Ibar of a mode that gives W1_j = G + G' for G = B_x' M B_j and C2_j by the formulas of theory section 2:
-/// W1_kk = 2 (Ibar_ll + Ibar_mm), W1_kl = -(Ibar_kl + Ibar_lk), C2_k = Ibar_lm - Ibar_ml.
+/// Returns Ibar of a mode from W1_j = G + G' with G = B_x' M B_j and from C2_j, by the formulas of theory
+/// section 2: W1_kk = 2 (Ibar_ll + Ibar_mm), W1_kl = -(Ibar_kl + Ibar_lk), C2_k = Ibar_lm - Ibar_ml.
 pub(super) fn ibar_of(half: &Matrix3<f64>, c2: &Vector3<f64>) -> Matrix3<f64> {
     let w1 = half + half.transpose();
     let trace = 0.25 * w1.trace();
@@ -436,13 +442,13 @@ pub(super) fn ibar_of(half: &Matrix3<f64>, c2: &Vector3<f64>) -> Matrix3<f64> {
     })
 }
 
-/// S of two modes that gives W2 = B_i' M B_j by W2_kk = S_ll + S_mm, W2_kl = -S_lk.
+/// Returns S of two modes from W2 = B_i' M B_j, with W2_kk = S_ll + S_mm and W2_kl = -S_lk.
 pub(super) fn s_of(w2: &Matrix3<f64>) -> Matrix3<f64> {
     let half_trace = 0.5 * w2.trace();
     Matrix3::from_fn(|k, l| if k == l { half_trace - w2[(k, k)] } else { -w2[(l, k)] })
 }
 
-/// Makes S_lk = S_kl' exact again after a transformation that rounds.
+/// Restores S_lk = S_kl' exactly after a transformation with rounding errors.
 pub(crate) fn symmetrise(s: &mut [[Mat<f64>; 3]; 3]) {
     let mean =
         |a: &Mat<f64>, b: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + b[(j, i)]));

@@ -1,6 +1,6 @@
 //! Groups of the kinetic energy that a body holds (theory section 7).
 
-/// A group of the kinetic energy: the terms that one invariant makes, in every place where they act.
+/// Group of the kinetic energy: all terms that one invariant causes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum TermGroup {
     /// Inertia linear in q, and the constant centrifugal load of the modes.
@@ -12,10 +12,10 @@ pub enum TermGroup {
 }
 
 impl TermGroup {
-    /// Every group, in the order of the documentation.
+    /// All groups, in the order of the documentation.
     pub const ALL: [TermGroup; 3] = [Self::W1, Self::W2, Self::W3];
 
-    /// Name in files and reports.
+    /// Returns the name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::W1 => "W1",
@@ -25,7 +25,8 @@ impl TermGroup {
     }
 }
 
-/// Which groups of the kinetic energy there are. What does not depend on q, and W0, always is.
+/// Set of groups of the kinetic energy. Terms independent of q, and W0, always belong to the kinetic
+/// energy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct TermGroups {
     /// [`TermGroup::W1`].
@@ -37,12 +38,12 @@ pub struct TermGroups {
 }
 
 impl TermGroups {
-    /// The exact kinetic energy.
+    /// All groups: the exact kinetic energy.
     pub const ALL: Self = Self { w1: true, w2: true, w3: true };
-    /// That of a body whose inertia does not depend on its deformation.
+    /// No group: the kinetic energy of a body whose inertia does not depend on its deformation.
     pub const NONE: Self = Self { w1: false, w2: false, w3: false };
 
-    /// Whether `group` is there.
+    /// Returns true if `group` is in the set.
     pub fn has(self, group: TermGroup) -> bool {
         match group {
             TermGroup::W1 => self.w1,
@@ -51,7 +52,7 @@ impl TermGroups {
         }
     }
 
-    /// These and `group`.
+    /// Returns the set with `group` added.
     pub fn with(mut self, group: TermGroup) -> Self {
         match group {
             TermGroup::W1 => self.w1 = true,
@@ -61,34 +62,34 @@ impl TermGroups {
         self
     }
 
-    /// Those that are not in these.
+    /// Returns the groups that are not in this set.
     pub fn complement(self) -> Self {
         Self { w1: !self.w1, w2: !self.w2, w3: !self.w3 }
     }
 
-    /// All but one.
+    /// Returns all groups but one.
     pub fn without(group: TermGroup) -> Self {
         Self { w1: group != TermGroup::W1, w2: group != TermGroup::W2, w3: group != TermGroup::W3 }
     }
 
-    /// Those that are in both.
+    /// Returns the groups that are in both sets.
     pub fn and(self, other: Self) -> Self {
         Self { w1: self.w1 && other.w1, w2: self.w2 && other.w2, w3: self.w3 && other.w3 }
     }
 
-    /// Those that are in one of them.
+    /// Returns the groups that are in at least one of the sets.
     pub fn or(self, other: Self) -> Self {
         Self { w1: self.w1 || other.w1, w2: self.w2 || other.w2, w3: self.w3 || other.w3 }
     }
 
-    /// Those that are not there.
+    /// Returns the groups that are missing from this set.
     pub fn dropped(self) -> impl Iterator<Item = TermGroup> {
         TermGroup::ALL.into_iter().filter(move |group| !self.has(*group))
     }
 }
 
 impl Default for TermGroups {
-    /// [`TermGroups::ALL`]: nothing is dropped unless asked for.
+    /// Returns [`TermGroups::ALL`]: groups are dropped only on request.
     fn default() -> Self {
         Self::ALL
     }

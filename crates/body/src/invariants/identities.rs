@@ -6,84 +6,86 @@ use super::{BodyFrame, CauchySchwarz, Derived, Invariants};
 use faer::Mat;
 use nalgebra::Vector3;
 
-/// Limit of what holds for the Gram matrix of any vectors: rounding of its sums, 1e-15 relative to the
-/// Cauchy-Schwarz bounds, with room for data that were rotated or shifted after they were condensed.
+/// Limit of identities that hold for the Gram matrix of any vectors: rounding of its sums, 1e-15 relative
+/// to the Cauchy-Schwarz bounds, with a margin for data that were rotated or shifted after condensation.
 const ROUNDING: f64 = 1e-12;
-/// Limit of the same where M does not commute with rotations. Such matrices often come condensed: their
-/// entries are larger than the mass that they add up to, which directions then agree on to fewer digits
-/// (6.5e-12 of the mass in an external superelement of NX Nastran with entries of 1e4 times the mass; its
-/// body was 1.3e-12 to 3.5e-12 from this identity).
+/// Limit of these identities if M does not commute with rotations. Such matrices often come condensed:
+/// their entries are larger than the mass they add up to, and the sums for different directions agree to
+/// fewer digits (6.5e-12 of the mass in an external superelement of NX Nastran with entries of 1e4 times
+/// the mass; its body missed this identity by 1.3e-12 to 3.5e-12).
 const CONDENSED: f64 = 1e-10;
-/// Limit of what holds for modes: the solver separates them from each other and from rigid motion to 1e-13, a
-/// residual of 1e-10 leaves 1e-10 in close pairs; worse modes are not modes.
+/// Limit of identities that hold for modes. The solver separates modes from each other and from rigid
+/// motion to 1e-13; a residual of 1e-10 leaves 1e-10 in close pairs. Larger deviations mean that the
+/// columns are not modes.
 const MODAL: f64 = 1e-9;
 /// Limit of the products of inertia about principal axes: moments within 1e-9 of each other count as equal
 /// and keep the model axes.
 const PRINCIPAL: f64 = 2e-9;
 
-/// One identity: what it says, how far the body is from it, and whether that is near enough.
+/// One identity with its formula, the deviation of the body from it, and the result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IdentityCheck {
-    /// Name, stable.
+    /// Stable name.
     pub name: &'static str,
-    /// What must hold.
+    /// Formula of the identity.
     pub formula: &'static str,
-    /// How far it is missed, dimensionless, scaled by the Cauchy-Schwarz bound of its terms; 0 is perfect.
+    /// Deviation, dimensionless, scaled by the Cauchy-Schwarz bound of its terms; 0 is perfect.
     pub value: f64,
     /// Largest value that passes.
     pub limit: f64,
-    /// Whether `value <= limit`; a NaN never passes.
+    /// True if `value <= limit`; a NaN never passes.
     pub passed: bool,
 }
 
 impl IdentityCheck {
-    /// Passed where `value` is at most `limit`.
+    /// Creates a check that passes if `value` is at most `limit`.
     pub fn new(name: &'static str, formula: &'static str, value: f64, limit: f64) -> Self {
         Self { name, formula, value, limit, passed: value <= limit }
     }
 }
 
-/// What a body claims to be: decides which identities apply.
+/// Claims of a body, which decide the identities that apply.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Expected<'a> {
-    /// Psi' M Psi = I.
+    /// True if Psi' M Psi = I is claimed.
     pub mass_normalised: bool,
-    /// Modes are M-orthogonal to rigid motion.
+    /// True if the modes are claimed to be M-orthogonal to rigid motion.
     pub free_surface: bool,
     /// Body frame.
     pub frame: BodyFrame,
-    /// Origin of the body frame in model coordinates: about a distant origin the centre of mass is known to
-    /// the spacing of numbers there.
+    /// Origin of the body frame in model coordinates. About a distant origin the centre of mass is known
+    /// only to the spacing of floating-point numbers there.
     pub origin: Vector3<f64>,
-    /// lambda, when Psi' K Psi is to be diag(lambda).
+    /// Eigenvalues lambda, if Psi' K Psi = diag(lambda) is claimed.
     pub eigenvalues: Option<&'a [f64]>,
-    /// Relative noise of the lowest eigenvalue that the digits of the input leave (the certificate's
-    /// `rigid_noise`); 0 when unknown.
+    /// Relative noise of the lowest eigenvalue due to the digits of the input (`rigid_noise` of the
+    /// certificate); 0 if unknown.
     pub eigenvalue_noise: f64,
-    /// The part of the mass that turns with its nodes.
+    /// Part of the mass that turns with its nodes.
     pub turning: Turning,
-    /// What rounding of the products with K may leave in any entry of Psi' K Psi, relative to sqrt(lambda_p
-    /// lambda_q); 0 when unknown.
+    /// Bound of the rounding errors of products with K in any entry of Psi' K Psi, relative to
+    /// sqrt(lambda_p lambda_q); 0 if unknown.
     pub eigenvalue_rounding: f64,
 }
 
-/// The part of the mass of a body that turns with its nodes, as far as identities know it.
+/// Part of the mass of a body that turns with its nodes, as far as it decides identities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Turning {
-    /// No rotation carries mass, or the mass is kept along the axes of the body (files before format 1.6).
+    /// No rotation carries mass, or the mass keeps its directions along the axes of the body (files before
+    /// format 1.6).
     #[default]
     None,
-    /// Points and directors, and a part that does not turn: W0 = -C1~.
+    /// Points and directors, and a part of the mass that does not turn: W0 = -C1~.
     InPart,
-    /// Points and directors alone: every formula of M = Ms kron I3 holds, but for signs of products, since the mass of
-    /// directors may be one of no places.
+    /// Points and directors only: every formula of M = Ms kron I3 holds, except for signs of products,
+    /// since the mass of directors may belong to no position.
     Whole,
 }
 
 /// Evaluates every identity that the primary data of a body must fulfil, in a fixed order.
 ///
-/// None depends on the units, the origin or the axes, nor on the basis except where [`Expected`] says more of
-/// it. What is about groups of the kinetic energy that the body does not hold is not among them.
+/// No identity depends on the units, the origin or the axes, and none on the basis unless [`Expected`]
+/// claims more. Identities about groups of the kinetic energy that the body does not hold are omitted.
 pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityCheck> {
     let bound = CauchySchwarz::of(body);
     let check = IdentityCheck::new;
@@ -99,7 +101,7 @@ pub fn identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityChe
     checks
 }
 
-/// What products of rigid motion and modes must be, whatever the modes are.
+/// Returns the identities of products of rigid motion and modes that hold for any modes.
 fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
     let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
@@ -132,7 +134,7 @@ fn gram_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -
     checks
 }
 
-/// Identities of a mass of points and directors.
+/// Returns the identities of a mass of points and directors.
 fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning) -> Vec<IdentityCheck> {
     let (check, nf, solid) = (IdentityCheck::new, body.n_modes(), body.as_solid());
     let difference = terms::difference(&solid.w0(), &body.w0(), &|_, column| bound.c1(column % nf));
@@ -150,7 +152,7 @@ fn turning_identities(body: &Invariants, bound: &CauchySchwarz, turning: Turning
     checks
 }
 
-/// What holds for modes that are mass-normalised, orthogonal to rigid motion, or eigenvectors.
+/// Returns the identities of modes that are mass-normalised, orthogonal to rigid motion, or eigenvectors.
 fn mode_identities(body: &Invariants, expected: &Expected<'_>, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
     let check = IdentityCheck::new;
     let mut checks = Vec::new();
@@ -168,14 +170,14 @@ fn mode_identities(body: &Invariants, expected: &Expected<'_>, bound: &CauchySch
     }
     if let Some(eigenvalues) = expected.eigenvalues {
         let value = terms::stiffness_deviation(body, eigenvalues);
-        // Of rigid motion: that of the modes is of its size, not the same.
+        // `eigenvalue_noise` was measured on rigid motion; the noise of the modes is of similar size.
         let limit = MODAL + 10.0 * expected.eigenvalue_noise + expected.eigenvalue_rounding;
         checks.push(check("modal_stiffness_diagonal", "Psi' K Psi = diag(lambda)", value, limit));
     }
     checks
 }
 
-/// What the choice of the body frame promises.
+/// Returns the identities that follow from the choice of the body frame.
 fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityCheck> {
     let check = IdentityCheck::new;
     let mut checks = Vec::new();
@@ -192,9 +194,9 @@ fn frame_identities(body: &Invariants, expected: &Expected<'_>) -> Vec<IdentityC
     checks
 }
 
-/// What the inertia of the rigid body must be. J is the sum of products of places where M = Ms kron I3;
-/// masses with inertia of their own, as of a wheel on a beam, have I0 that is positive semidefinite, and no J
-/// of any places.
+/// Returns the identities of the rigid-body inertia. For M = Ms kron I3, J is a sum of products of
+/// positions. Masses with inertia of their own, such as a wheel on a beam, have a positive semidefinite I0
+/// but no such J.
 fn rigid_identities(body: &Invariants) -> Vec<IdentityCheck> {
     let check = IdentityCheck::new;
     if body.0.general.is_some() {
@@ -218,7 +220,8 @@ fn rigid_identities(body: &Invariants) -> Vec<IdentityCheck> {
     ]
 }
 
-/// What holds where M = Ms kron I3: Ibar and S are products of the same vectors then, direction by direction.
+/// Returns the identities for M = Ms kron I3: Ibar and S are then products of one set of vectors in all
+/// directions.
 fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCheck> {
     let (check, groups) = (IdentityCheck::new, body.0.groups);
     let mut checks = Vec::new();
@@ -252,11 +255,11 @@ fn scalar_identities(body: &Invariants, bound: &CauchySchwarz) -> Vec<IdentityCh
     checks
 }
 
-/// Evaluates that stored invariants follow from the primary data, and W3 from the stored W2.
+/// Checks that stored invariants follow from the primary data, and W3 from the stored W2.
 ///
-/// The blocks of W3 are W2(2,3) - W2(3,2), W2(3,1) - W2(1,3), W2(1,2) - W2(2,1) (theory section 2), unless M
-/// does not commute with rotations. A stored array of the wrong shape, one that is missing, and one that the
-/// body does not hold miss their identity infinitely.
+/// The blocks of W3 are W2(2,3) - W2(3,2), W2(3,1) - W2(1,3), W2(1,2) - W2(2,1) (theory section 2), unless
+/// M does not commute with rotations. A missing array, an array of wrong shape, and an array of a group
+/// that the body does not hold have an infinite deviation.
 pub fn derived_identities(body: &Invariants, stored: &Derived) -> Vec<IdentityCheck> {
     let nf = body.n_modes();
     let bound = CauchySchwarz::of(body);

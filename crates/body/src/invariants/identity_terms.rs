@@ -1,4 +1,4 @@
-//! How far a body is from each identity: dimensionless numbers, NaN when a number of the body is.
+//! Deviations of a body from each identity: dimensionless numbers, NaN if a number of the body is NaN.
 
 use super::cauchy_schwarz::scaled;
 use super::dense::{entries, spectral_norm, symmetric_eigenvalues};
@@ -8,7 +8,7 @@ use faer::Mat;
 use flexbody_linalg::{dense_cholesky, larger};
 use nalgebra::Matrix3;
 
-/// The worst of f over a rectangle, at least 0.
+/// Returns the largest f over a rectangle of indices, at least 0.
 fn over(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
     let mut largest = 0.0;
     for q in 0..columns {
@@ -19,7 +19,7 @@ fn over(rows: usize, columns: usize, f: impl Fn(usize, usize) -> f64) -> f64 {
     largest
 }
 
-/// Count of numbers that are not finite.
+/// Returns the number of entries that are not finite.
 pub(super) fn not_finite(body: &Invariants) -> f64 {
     let rigid = [body.0.mass]
         .into_iter()
@@ -38,22 +38,24 @@ pub(super) fn second_moment_asymmetry(body: &Invariants, bound: &CauchySchwarz) 
     over(3, 3, |k, l| scaled(j[(k, l)] - j[(l, k)], bound.second_moment(k, l)))
 }
 
-/// J about the centre of mass.
+/// Returns J about the centre of mass.
 fn central(body: &Invariants) -> Matrix3<f64> {
     body.0.second_moment - body.0.first_moment * body.0.first_moment.transpose() / body.0.mass
 }
 
 pub(super) fn second_moment_negative(body: &Invariants) -> f64 {
-    // Not the trace, which may be negative too.
+    // The scale is not the trace, which may be negative too.
     negative(&matrix(&central(body)), body.0.second_moment.diagonal().abs().sum())
 }
 
-/// How negative the smallest principal moment about the centre of mass is, relative to the sum of all.
+/// Returns the magnitude of a negative smallest principal moment about the centre of mass, relative to the
+/// sum of all moments.
 pub(super) fn inertia_negative(body: &Invariants) -> f64 {
     negative(&matrix(&inertia_of(&central(body))), body.inertia().diagonal().abs().sum())
 }
 
-/// By how much the largest principal moment about the centre of mass exceeds the sum of the others.
+/// Returns the excess of the largest principal moment about the centre of mass over the sum of the other
+/// two.
 pub(super) fn triangle_excess(body: &Invariants) -> f64 {
     let moments = symmetric_eigenvalues(matrix(&inertia_of(&central(body))).as_ref());
     moments.map_or(f64::NAN, |i| {
@@ -85,7 +87,7 @@ pub(super) fn ibar_excess(body: &Invariants, bound: &CauchySchwarz) -> f64 {
 pub(super) fn ibar_asymmetry(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     over(3, 3, |k, l| {
         let size = |p| match body.0.general {
-            // Ibar then stands for W1 and C2: the difference is C2 about the third axis.
+            // Ibar represents W1 and C2: the difference is C2 about the third axis.
             Some(_) if k != l => bound.c2(3 - k - l, p),
             _ => bound.ibar(k, p).hypot(bound.ibar(l, p)),
         };
@@ -113,7 +115,8 @@ pub(super) fn w3_excess(w3: &Mat<f64>, modal_mass: &Mat<f64>) -> f64 {
     over(3, 1, |k, _| scaled(spectral_norm(w3.as_ref().subrows(k * nf, nf)), scale) - 1.0)
 }
 
-/// Gram matrix of [1, x, y, z, Psi_1, Psi_2, Psi_3], the columns of unit size.
+/// Returns the negative part of the Gram matrix of [1, x, y, z, Psi_1, Psi_2, Psi_3] with columns of unit
+/// size.
 pub(super) fn scalar_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let nf = body.n_modes();
     let size = |i: usize| match i {
@@ -131,7 +134,8 @@ pub(super) fn scalar_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> 
     })
 }
 
-/// Gram matrix of the rigid motions and the modes, [Phi_t, Phi_r, Psi]' M [...], the columns of unit size.
+/// Returns the negative part of the Gram matrix of rigid motions and modes, [Phi_t, Phi_r, Psi]' M [...],
+/// with columns of unit size.
 pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> f64 {
     let (i0, c2, modal_mass) = (body.inertia(), body.c2(), body.modal_mass());
     let coupling = -body.0.first_moment.cross_matrix();
@@ -150,8 +154,8 @@ pub(super) fn motion_gram_negative(body: &Invariants, bound: &CauchySchwarz) -> 
     })
 }
 
-/// Gram matrix of [Phi_t, B, Psi], the columns in units of their modes: kinetic energy is never negative,
-/// whatever the modes do.
+/// Returns the negative part of the Gram matrix of [Phi_t, B, Psi], with columns in units of their modes:
+/// kinetic energy is never negative for any modes.
 pub(super) fn velocity_gram_negative(
     body: &Invariants,
     w2: &Mat<f64>,
@@ -160,7 +164,8 @@ pub(super) fn velocity_gram_negative(
 ) -> f64 {
     let nf = body.n_modes();
     let (w0, modal_mass) = (body.w0(), body.modal_mass());
-    // Not of its own size: a rotation about the direction in which a mode moves all nodes has none.
+    // The size is that of the mode: a rotation about the direction in which a mode moves all nodes has size
+    // zero.
     let size = |i: usize| match i {
         0..3 => body.0.mass.sqrt(),
         _ => bound.mode((i - 3) % nf),
@@ -175,12 +180,13 @@ pub(super) fn velocity_gram_negative(
     })
 }
 
-/// Negative part of a Gram matrix given by its upper triangle, its vectors divided by their size.
+/// Returns the negative part of a Gram matrix given by its upper triangle, with its vectors divided by
+/// their size.
 fn unit_gram_negative(n: usize, size: impl Fn(usize) -> f64, upper: impl Fn(usize, usize) -> f64) -> f64 {
     let sizes: Vec<f64> = (0..n).map(size).collect();
     let unit = Mat::from_fn(n, n, |i, j| {
         let value = upper(i.min(j), i.max(j));
-        // A mode of size zero has no mass at all: its row must vanish, and then it may stay.
+        // A mode of size zero has no mass: its row must vanish.
         if value == 0.0 { 0.0 } else { value / sizes[i] / sizes[j] }
     });
     negative(&unit, 1.0)
@@ -191,7 +197,7 @@ pub(super) fn modal_mass_deviation(body: &Invariants) -> f64 {
     over(body.n_modes(), body.n_modes(), |p, q| (modal_mass[(p, q)] - f64::from(u8::from(p == q))).abs())
 }
 
-/// Psi' K Psi against diag(lambda), entries relative to sqrt(lambda_p lambda_q).
+/// Returns the deviation of Psi' K Psi from diag(lambda), entries relative to sqrt(lambda_p lambda_q).
 pub(super) fn stiffness_deviation(body: &Invariants, eigenvalues: &[f64]) -> f64 {
     let nf = body.n_modes();
     if eigenvalues.len() != nf {
@@ -205,13 +211,13 @@ pub(super) fn stiffness_deviation(body: &Invariants, eigenvalues: &[f64]) -> f64
     })
 }
 
-/// Largest product of inertia about the frame origin, relative to the largest moment.
+/// Returns the largest product of inertia about the frame origin, relative to the largest moment.
 pub(super) fn products_of_inertia(body: &Invariants) -> f64 {
     let i0 = body.inertia();
     over(3, 3, |k, l| if k == l { 0.0 } else { scaled(i0[(k, l)], i0.amax()) })
 }
 
-/// W3 by its identity with W2; empty when W2 has the wrong shape.
+/// Returns W3 by its identity with W2; empty if W2 has the wrong shape.
 pub(super) fn w3_of_w2(w2: &Mat<f64>, nf: usize) -> Mat<f64> {
     if (w2.nrows(), w2.ncols()) != (3 * nf, 3 * nf) {
         return Mat::new();
@@ -222,7 +228,8 @@ pub(super) fn w3_of_w2(w2: &Mat<f64>, nf: usize) -> Mat<f64> {
     })
 }
 
-/// Largest difference of two matrices entry by entry relative to a bound; infinite when the shapes differ.
+/// Returns the largest difference of two matrices, entry by entry relative to a bound; infinite if the
+/// shapes differ.
 pub(super) fn difference(a: &Mat<f64>, b: &Mat<f64>, bound: &dyn Fn(usize, usize) -> f64) -> f64 {
     if (a.nrows(), a.ncols()) != (b.nrows(), b.ncols()) {
         return f64::INFINITY;
@@ -234,16 +241,16 @@ pub(super) fn matrix(a: &Matrix3<f64>) -> Mat<f64> {
     Mat::from_fn(3, 3, |k, l| a[(k, l)])
 }
 
-/// Matrices of more rows than this are held to a Cholesky factorisation: eigenvalues take a hundred times as
-/// long.
+/// Number of rows above which definiteness is tested by a Cholesky factorisation: eigenvalues take a
+/// hundred times as long.
 const MANY_ROWS: usize = 400;
 
-/// What a large matrix is shifted by to be factored, relative to its scale: a part of what rounding may
-/// leave.
+/// Diagonal shift of a large matrix before its factorisation, relative to its scale: a part of the rounding
+/// error that is allowed.
 const SHIFT: f64 = 2e-13;
 
-/// How negative the smallest eigenvalue of a symmetric matrix is, relative to `scale`; of a large matrix, at
-/// most.
+/// Returns the magnitude of a negative smallest eigenvalue of a symmetric matrix, relative to `scale`; for
+/// a large matrix an upper bound.
 fn negative(a: &Mat<f64>, scale: f64) -> f64 {
     let shifted = || {
         let entry = |i: usize, j: usize| a[(i, j)] + if i == j { SHIFT * scale } else { 0.0 };

@@ -6,7 +6,8 @@
 //! of the whole body, the stiffness of that motion is
 //!
 //! ```text
-//! K_jk = sum over the directors g_a . u_jk = sum over the nodes theta' H phi,   H = sym(G) - tr(G) I,   G = sum_a e_a g_a'
+//! K_jk = sum over the directors g_a . u_jk = sum over the nodes theta' H phi,
+//! H    = sym(G) - tr(G) I,   G = sum_a e_a g_a'
 //! ```
 //!
 //! with g_a = h_a e_k for the acceleration along e_k, e_k x z_a for the angular acceleration about e_k and
@@ -18,8 +19,8 @@ use flexbody_linalg::{gram, zeros};
 use flexbody_model::{GeometricStiffness, LoadKind, NodeMoments, RigidAcceleration, UnitLoad};
 use nalgebra::{Matrix3, Vector3};
 
-/// The stiffnesses of inertia of a body, and what they follow from. They belong to the kinetic energy: to
-/// sections 6 and (7.4) of the theory, not to a stress.
+/// Stiffness of inertia of a body and the moments of the nodes that determine it. It belongs to the kinetic
+/// energy (theory sections 6 and 7.4), not to a stress state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InertiaStiffness {
     /// Moments of every node of the body about the origin of its frame, body axes; zero for nodes whose
@@ -30,13 +31,13 @@ pub struct InertiaStiffness {
 }
 
 impl InertiaStiffness {
-    /// The stiffnesses that follow from the moments of the nodes.
+    /// Computes the stiffnesses from the moments of the nodes.
     ///
-    /// * `rotation`: 3n x nf, rotations of the nodes in the modes, along the axes of the moments.
+    /// * `rotation`: rotations of the nodes in the modes (3n x nf), along the axes of the moments.
     /// * `dimension`: 3, or 2 for a body in the plane.
     ///
     /// # Panics
-    /// When there are not three rows for each of the moments.
+    /// When `rotation` does not have three rows for each of the moments.
     pub fn new(moments: Vec<NodeMoments>, rotation: MatRef<'_, f64>, dimension: usize) -> Self {
         assert_eq!(rotation.nrows(), 3 * moments.len(), "three rotations for every node");
         let turning = TurningNodes::new(&moments, rotation);
@@ -48,8 +49,8 @@ impl InertiaStiffness {
         Self { moments, stiffness }
     }
 
-    /// The loads that there is a stiffness for: acceleration of the origin less gravity, angular acceleration
-    /// and products of spin, along the axes of the frame.
+    /// Returns the unit loads with a stiffness of inertia: acceleration of the origin minus gravity,
+    /// angular acceleration and products of spin, along the axes of the frame.
     pub fn loads(dimension: usize) -> impl Iterator<Item = UnitLoad> {
         [LoadKind::Acceleration, LoadKind::AngularAcceleration, LoadKind::Spin].into_iter().flat_map(
             move |kind| {
@@ -59,13 +60,14 @@ impl InertiaStiffness {
         )
     }
 
-    /// The stiffnesses about the origin `d` and along the columns of `axes`, both in the present frame.
+    /// Returns the stiffnesses about the origin `d` and along the columns of `axes`, both given in the
+    /// present frame.
     ///
-    /// z_a' = z_a - h_a d, then every index that stands for a direction is turned; `rotation` (3n x nf) is along
-    /// the new axes.
+    /// z_a' = z_a - h_a d, then every directional index is turned. `rotation` (3n x nf) is along the new
+    /// axes.
     ///
     /// # Panics
-    /// When there are not three rows for each of the moments.
+    /// When `rotation` does not have three rows for each of the moments.
     pub fn in_frame(
         &self,
         d: &Vector3<f64>,
@@ -80,21 +82,21 @@ impl InertiaStiffness {
         Self::new(self.moments.iter().map(moved).collect(), rotation, dimension)
     }
 
-    /// The stiffnesses with other rotations of the nodes (3n x nf): of other modes, or relative to another frame whose
-    /// origin and axes are the same before deformation.
+    /// Returns the stiffnesses for other rotations of the nodes (3n x nf): for other modes, or relative to
+    /// another frame with the undeformed origin and axes of the present one.
     ///
     /// # Panics
-    /// When there are not three rows for each of the moments.
+    /// When `rotation` does not have three rows for each of the moments.
     pub fn with_rotations(&self, rotation: MatRef<'_, f64>, dimension: usize) -> Self {
         Self::new(self.moments.clone(), rotation, dimension)
     }
 
-    /// Largest difference of the stiffnesses from those that the moments and the rotations of the nodes give,
-    /// relative to the largest sum of magnitudes for their kind of load: what nodes that turn against each other
-    /// leave of it may be small.
+    /// Returns the largest difference between the stored stiffnesses and those recomputed from the moments
+    /// and rotations of the nodes. The difference is relative to the largest sum of magnitudes for that
+    /// kind of load, since contributions of nodes that turn in opposite directions may cancel.
     ///
     /// # Panics
-    /// When there are not three rows for each of the moments.
+    /// When `rotation` does not have three rows for each of the moments.
     pub fn deviation(&self, rotation: MatRef<'_, f64>, dimension: usize) -> f64 {
         let own = self.with_rotations(rotation, dimension);
         let magnitudes = Mat::from_fn(rotation.nrows(), rotation.ncols(), |i, j| rotation[(i, j)].abs());
@@ -107,8 +109,8 @@ impl InertiaStiffness {
         self.difference_of_stiffness(&own, &largest)
     }
 
-    /// Largest difference of moments and stiffnesses from those of `other`, relative to the largest of their kind;
-    /// infinite when they have other sizes.
+    /// Returns the largest difference of moments and stiffnesses from `other`, relative to the largest
+    /// entry of that kind; infinite if the sizes differ.
     pub fn largest_difference(&self, other: &Self) -> f64 {
         if self.moments.len() != other.moments.len() || self.stiffness.len() != other.stiffness.len() {
             return f64::INFINITY;
@@ -129,7 +131,7 @@ impl InertiaStiffness {
         first.max(second).max(self.difference_of_stiffness(other, &size))
     }
 
-    /// Largest difference of the stiffnesses, relative to the `size` of their kind.
+    /// Returns the largest difference of the stiffnesses, relative to the `size` of their kind of load.
     fn difference_of_stiffness(&self, other: &Self, size: &dyn Fn(&LoadKind) -> f64) -> f64 {
         let differences = self.stiffness.iter().zip(&other.stiffness).map(|(own, other)| {
             if own.matrix.nrows() != other.matrix.nrows() {
@@ -142,24 +144,25 @@ impl InertiaStiffness {
     }
 }
 
-/// Largest parts of the stiffness of a motion that the stiffness of inertia has, over all directions.
+/// Largest ratios of the stiffness of inertia to the stiffness K_ff, over all deformations and load
+/// directions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InertiaShares {
-    /// For a unit acceleration of the origin. Unit: time^2/length.
+    /// Ratio for a unit acceleration of the origin. Unit: time^2/length.
     pub acceleration: f64,
-    /// For a unit angular acceleration. Unit: time^2.
+    /// Ratio for a unit angular acceleration. Unit: time^2.
     pub angular_acceleration: f64,
-    /// For the square of a unit spin. Unit: time^2.
+    /// Ratio for the square of a unit spin. Unit: time^2.
     pub spin_squared: f64,
 }
 
 impl InertiaStiffness {
-    /// Upper bounds, over all directions of the load, of the part that a unit of it changes of the stiffness K_ff
-    /// of any motion; `None` where K_ff is not positive definite.
+    /// Returns upper bounds, over all directions of a unit load, of the ratio of the stiffness of inertia
+    /// to the stiffness K_ff of any deformation. Returns `None` if K_ff is not positive definite.
     pub fn shares(&self, modal_stiffness: MatRef<'_, f64>) -> Option<InertiaShares> {
         let of_kind = |kind: LoadKind| {
             let own = self.stiffness.iter().filter(|one| one.load.kind == kind);
-            // w'K w has both orders of a pair of axes: half of its matrix each.
+            // w'K w contains both orders of a pair of axes, and the stored matrix is their sum.
             let matrices: Vec<Mat<f64>> = own
                 .map(|one| match (&kind, one.load.component) {
                     (LoadKind::Spin, 3..) => &one.matrix * faer::Scale(0.5f64.sqrt()),
@@ -177,10 +180,10 @@ impl InertiaStiffness {
     }
 }
 
-/// The nodes that have moments, and their rotations in the modes.
+/// Nodes with moments, and their rotations in the modes.
 struct TurningNodes<'m> {
     moments: Vec<&'m NodeMoments>,
-    /// Three rows for each of them.
+    /// Rotations, three rows per node.
     theta: Mat<f64>,
 }
 
@@ -193,7 +196,7 @@ impl<'m> TurningNodes<'m> {
         Self { moments: turning.iter().map(|&node| &moments[node]).collect(), theta }
     }
 
-    /// The sum over the nodes of theta' H theta, symmetric.
+    /// Returns the sum over the nodes of theta' H theta, symmetric.
     fn sum(&self, h: impl Fn(&NodeMoments) -> Matrix3<f64>) -> Mat<f64> {
         let theta = &self.theta;
         let mut turned = zeros(theta.nrows(), theta.ncols());
@@ -213,7 +216,7 @@ fn is_zero(moments: &NodeMoments) -> bool {
     moments.first == Vector3::zeros() && moments.second == Matrix3::zeros()
 }
 
-/// The rigid motion that a unit load stands for.
+/// Returns the rigid motion of a unit load.
 fn motion_of(load: &UnitLoad) -> RigidAcceleration {
     let unit = |axis: usize| Vector3::ith(axis, 1.0);
     let (zero, none) = (Vector3::zeros(), Matrix3::zeros());

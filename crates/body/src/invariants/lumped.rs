@@ -1,4 +1,5 @@
-//! Lumped comparators: what nodal masses, as multibody programs import them, make of the same modes.
+//! Lumped comparators: invariants from nodal masses, as multibody programs import them, on the modes of the
+//! body.
 
 use super::Invariants;
 use super::condense::condense_with;
@@ -7,25 +8,26 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_linalg::SymmetricMatrix;
 
-/// Masses below this part of the largest count as zero: row sums that cancel leave rounding of either sign.
+/// Masses below this part of the largest mass count as zero: cancelling row sums leave rounding of either
+/// sign.
 const ZERO_MASS: f64 = 1e-14;
 
-/// How nodal masses come from the consistent mass matrix.
+/// Scheme that derives nodal masses from the consistent mass matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LumpedScheme {
-    /// Row sums of Ms: keeps mass and centre of mass; negative at the corners of quadratic elements.
+    /// Row sums of Ms: preserve mass and centre of mass; negative at the corners of quadratic elements.
     RowSum,
-    /// The diagonal of Ms scaled to the mass: the form of HRZ lumping that the matrix alone allows.
+    /// Diagonal of Ms scaled to the total mass: HRZ lumping as far as the assembled matrix allows.
     DiagonalScaling,
     /// Nodal masses given by the user.
     User,
 }
 
 impl LumpedScheme {
-    /// Every scheme, in the order of the documentation.
+    /// All schemes, in the order of the documentation.
     pub const ALL: [LumpedScheme; 3] = [Self::RowSum, Self::DiagonalScaling, Self::User];
 
-    /// Name in files, reports and on the command line.
+    /// Returns the name in files, reports and on the command line.
     pub fn name(self) -> &'static str {
         match self {
             Self::RowSum => "row-sum",
@@ -34,13 +36,13 @@ impl LumpedScheme {
         }
     }
 
-    /// Returns the scheme of this name.
+    /// Returns the scheme with the given name.
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|known| known.name() == name)
     }
 }
 
-/// Nodal masses of one scheme, in node order.
+/// Nodal masses of one lumping scheme, in node order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LumpedMasses {
     scheme: LumpedScheme,
@@ -48,16 +50,16 @@ pub struct LumpedMasses {
 }
 
 impl LumpedMasses {
-    /// m_i = sum_j Ms_ij.
+    /// Computes the row sums m_i = sum_j Ms_ij.
     pub fn row_sum(mass: &SymmetricMatrix) -> Self {
         let masses = (0..mass.n()).map(|i| mass.row(i).1.iter().sum()).collect();
         Self { scheme: LumpedScheme::RowSum, masses }
     }
 
-    /// m_i = Ms_ii m / sum_j Ms_jj, with m the sum of all entries.
+    /// Scales the diagonal: m_i = Ms_ii m / sum_j Ms_jj, with m the sum of all entries.
     ///
     /// # Errors
-    /// `MassNotPositive` when the diagonal has no positive finite sum.
+    /// `MassNotPositive` if the diagonal has no positive finite sum.
     pub fn diagonal_scaling(mass: &SymmetricMatrix) -> Result<Self> {
         let diagonal = mass.diagonal();
         let total: f64 = Self::row_sum(mass).masses.iter().sum();
@@ -71,10 +73,10 @@ impl LumpedMasses {
         Ok(Self { scheme: LumpedScheme::DiagonalScaling, masses })
     }
 
-    /// Masses given by the user, one per node in node order. Unit: mass.
+    /// Takes masses given by the user, one per node in node order. Unit: mass.
     ///
     /// # Errors
-    /// `LumpedMassTable` when their number is not `n_nodes`, one is not finite, or their sum is not positive.
+    /// `LumpedMassTable` if their number is not `n_nodes`, one is not finite, or their sum is not positive.
     pub fn user(masses: Vec<f64>, n_nodes: usize) -> Result<Self> {
         let refuse = |message: String| Err(Diagnostic::new(Code::LumpedMassTable, message).into());
         if masses.len() != n_nodes {
@@ -90,24 +92,24 @@ impl LumpedMasses {
         Ok(Self { scheme: LumpedScheme::User, masses })
     }
 
-    /// The scheme.
+    /// Returns the lumping scheme.
     pub fn scheme(&self) -> LumpedScheme {
         self.scheme
     }
 
-    /// The masses by node. Unit: mass.
+    /// Returns the masses by node. Unit: mass.
     pub fn masses(&self) -> &[f64] {
         &self.masses
     }
 
-    /// Number of nodes with a negative mass.
+    /// Returns the number of nodes with a negative mass.
     pub fn negative(&self) -> usize {
         let zero = self.zero_bound();
         self.masses.iter().filter(|&&m| m < -zero).count()
     }
 
-    /// Number of nodes without mass: magnitude below 1e-14 of the largest, the rounding of a sum that
-    /// cancels.
+    /// Returns the number of nodes without mass: magnitude below 1e-14 of the largest mass, the rounding of
+    /// cancelling sums.
     pub fn zero(&self) -> usize {
         let zero = self.zero_bound();
         self.masses.iter().filter(|m| m.abs() <= zero).count()
@@ -118,8 +120,8 @@ impl LumpedMasses {
     }
 }
 
-/// The primary data that lumped masses give with the same modes, about the SAME frame: [`super::condense`]
-/// with Ms = diag(masses). A centre of mass that moved shows as first moment.
+/// Condenses lumped masses with the given modes in the given frame: [`super::condense`] with Ms =
+/// diag(masses). A shifted centre of mass appears as first moment.
 ///
 /// # Panics
 /// When the sizes disagree.

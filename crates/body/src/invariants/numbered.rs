@@ -1,5 +1,5 @@
-//! The invariants as other programs number them: I1 to I9 of Adams and MBDyn, from which every other set of
-//! names follows.
+//! Invariants in the numbering of other programs: I1 to I9 of Adams and MBDyn, from which all other sets of
+//! names follow.
 
 use super::general::{s_of, second_moment_of};
 use super::{CauchySchwarz, GeneralTerms, Invariants, PrimaryData, TermGroups, s_of_modal_mass};
@@ -7,8 +7,8 @@ use faer::Mat;
 use flexbody_linalg::larger;
 use nalgebra::{Matrix3, Vector3};
 
-/// The nine inertia invariants (MBDyn manual, technical appendix; Adams/Flex), with the signs of the code of
-/// MBDyn.
+/// Nine inertia invariants (MBDyn manual, technical appendix; Adams/Flex), with the signs of the MBDyn
+/// code.
 ///
 /// With S_j the shape of mode j: I1 = m, I2 = c, I3_j = int S_j, I4_j = int x~ S_j, I5_jk = int S_j x S_k,
 /// I6_jk = int S_j . S_k, I7 = I0, I8_j = int x~ S_j~', I9_jk = int S_j~ S_k~. Inertia about the origin: I7 +
@@ -23,23 +23,23 @@ pub struct Numbered {
     pub i3: Mat<f64>,
     /// C2 (3 x nf).
     pub i4: Mat<f64>,
-    /// I5_jk in row a nf + j, column k (3nf x nf), component a: W3. `None` where the body does not hold it.
+    /// I5_jk in row a nf + j, column k (3nf x nf), component a: W3. `None` if the body does not hold W3.
     pub i5: Option<Mat<f64>>,
     /// m_ff (nf x nf).
     pub i6: Mat<f64>,
     /// I0, about the origin. Unit: mass length^2.
     pub i7: Matrix3<f64>,
-    /// I8_j (nf of 3 x 3): `I8_j(a,b) = d_ab sum_c Ibar_cc,j - Ibar_ba,j`. Its symmetric part is W1 / 2, its
-    /// skew part C2; antisymmetric where the body does not hold W1.
+    /// I8_j (nf of 3 x 3): `I8_j(a,b) = d_ab sum_c Ibar_cc,j - Ibar_ba,j`. The symmetric part is W1 / 2,
+    /// the skew part C2; antisymmetric if the body does not hold W1.
     pub i8: Vec<Matrix3<f64>>,
-    /// I9_jk(a,b) in row a nf + j, column b nf + k (3nf x 3nf): -W2. `None` where the body does not hold it.
+    /// I9_jk(a,b) in row a nf + j, column b nf + k (3nf x 3nf): -W2. `None` if the body does not hold W2.
     pub i9: Option<Mat<f64>>,
-    /// The groups of the kinetic energy that are there.
+    /// Groups of the kinetic energy that are held.
     pub groups: TermGroups,
 }
 
 impl Invariants {
-    /// The nine invariants.
+    /// Returns the nine invariants.
     pub fn numbered(&self) -> Numbered {
         let i8 = |j: usize| {
             let ibar = Matrix3::from_fn(|k, l| self.0.ibar[k][l][j]);
@@ -59,10 +59,10 @@ impl Invariants {
         }
     }
 
-    /// The body with these invariants: the inverse of [`Invariants::numbered`], to rounding. C2 is that of
-    /// I8. Where I5 or I6 differ by more than `rounding` from what I9 says of them, relative to their
-    /// Cauchy-Schwarz bounds, the mass does not commute with rotations, and W0 = -C1~ is taken, which none of
-    /// the nine tells.
+    /// Returns the body with these invariants: the inverse of [`Invariants::numbered`], up to rounding. C2
+    /// is taken from I8. If I5 or I6 differ from the values that follow from I9 by more than `rounding`,
+    /// relative to their Cauchy-Schwarz bounds, the mass does not commute with rotations. W0, which none of
+    /// the nine invariants determines, is then set to -C1~.
     ///
     /// # Panics
     /// When the sizes disagree.
@@ -70,6 +70,7 @@ impl Invariants {
         let nf = numbered.i8.len();
         let Numbered { i5, i6, i8, i9, .. } = numbered;
         let groups = TermGroups { w2: i9.is_some(), w3: i5.is_some(), ..numbered.groups };
+        // Invert the formulas of I8 (Ibar) and I9 (S).
         let ibar = |k: usize, l: usize| {
             let entry = |i8: &Matrix3<f64>| if k == l { 0.5 * i8.trace() } else { 0.0 } - i8[(l, k)];
             i8.iter().map(entry).collect()
@@ -92,6 +93,7 @@ impl Invariants {
             general: None,
             groups,
         });
+        // Compare I6 and I5 with the values that follow from S.
         let solid = (body.modal_mass(), body.w3());
         let bound = CauchySchwarz::of(&body);
         let apart = |own: &Mat<f64>, told: &Mat<f64>| {
@@ -104,6 +106,7 @@ impl Invariants {
         };
         let differs =
             apart(&solid.0, i6) || solid.1.zip(i5.as_ref()).is_some_and(|(own, told)| apart(&own, told));
+        // The mass does not commute with rotations: store I5 and I6 themselves.
         if differs {
             body.0.general = Some(GeneralTerms {
                 w0: body.w0(),

@@ -1,16 +1,17 @@
-//! Principal axes of inertia, canonical: the same for every numbering, thread count and starting orientation
-//! of a symmetric body.
+//! Canonical principal axes of inertia: independent of numbering, thread count and initial orientation of a
+//! symmetric body.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// Moments closer than this, relative to the largest, count as equal: rounding of the moments is some 1e-15,
-/// so that the axes of moments this close are known to six digits; closer ones would show noise as a
+/// Relative difference below which moments count as equal. Rounding of the moments is about 1e-15, so that
+/// axes of moments this close are known to six digits; axes of closer moments would turn noise into a
 /// rotation.
 const EQUAL_MOMENTS: f64 = 1e-9;
-/// Components this close count as equal when the largest is looked for, so that rounding does not decide.
+/// Relative difference below which components count as equal in the search for the largest one, so that
+/// rounding does not decide.
 const EQUAL_COMPONENTS: f64 = 1e-6;
 
-/// Principal axes (columns, right-handed, moments ascending) of an inertia in model axes.
+/// Returns the principal axes (columns, right-handed, moments ascending) of an inertia in model axes.
 ///
 /// An axis of a distinct moment is positive along its largest component (the first such). Within a plane of
 /// equal moments the first axis is the projection of the model axis closest to the plane (the first such);
@@ -37,7 +38,7 @@ pub fn principal_axes(inertia: &Matrix3<f64>) -> Matrix3<f64> {
     }
 }
 
-/// The first index whose value is the largest up to rounding.
+/// Returns the first index whose value is the largest up to rounding.
 fn first_largest(values: [f64; 3]) -> usize {
     let largest = values.iter().copied().fold(0.0, f64::max);
     values.iter().position(|&v| v >= largest * (1.0 - EQUAL_COMPONENTS)).unwrap_or(0)
@@ -48,7 +49,7 @@ fn positive(v: &Vector3<f64>) -> Vector3<f64> {
     if v[largest] < 0.0 { -v } else { *v }
 }
 
-/// The direction in the plane normal to `normal` that is closest to a model axis.
+/// Returns the direction in the plane normal to `normal` that is closest to a model axis.
 fn in_plane(normal: &Vector3<f64>) -> Vector3<f64> {
     let length = |k: usize| (1.0 - normal[k] * normal[k]).max(0.0);
     let k = first_largest([length(0), length(1), length(2)]);
@@ -57,14 +58,16 @@ fn in_plane(normal: &Vector3<f64>) -> Vector3<f64> {
     direction.normalize()
 }
 
-/// Eigenvalues, ascending, and eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi rotations.
+/// Returns the eigenvalues, ascending, and the eigenvectors of a symmetric 3x3 matrix by cyclic Jacobi
+/// rotations.
 ///
-/// Jacobi, not QR: an off-diagonal entry at rounding level is left alone, so that a body whose principal axes
-/// are the model axes keeps its coordinates to the last bit, and small moments of needles keep their digits.
+/// Jacobi and not QR: off-diagonal entries at rounding level are not touched, so that a body whose
+/// principal axes are the model axes keeps its coordinates exactly, and small moments of needles keep their
+/// digits.
 fn jacobi(matrix: &Matrix3<f64>) -> ([f64; 3], [Vector3<f64>; 3]) {
     let mut a = *matrix;
     let mut v = Matrix3::<f64>::identity();
-    // Convergence is quadratic: five sweeps suffice, the bound only ends a loop over NaN.
+    // Convergence is quadratic: five sweeps suffice. The limit only ends a loop over NaN.
     for _sweep in 0..32 {
         let mut rotated = false;
         for (p, q) in [(0, 1), (0, 2), (1, 2)] {

@@ -1,4 +1,4 @@
-//! The same body with fewer groups, modes or digits.
+//! Restriction of a body to fewer groups, modes or digits.
 
 use super::derived::CYCLIC;
 use super::general::symmetrise;
@@ -6,8 +6,8 @@ use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::Mat;
 
 impl Invariants {
-    /// The same body with those of its groups only that are in `groups`: a kinetic energy of its own, which
-    /// keeps itself and both momenta. m, c, J, C1, C2, W0, m_ff and K_ff stay what they are.
+    /// Drops all groups that are not in `groups`. The result is a consistent kinetic energy of its own,
+    /// which conserves energy and both momenta. m, c, J, C1, C2, W0, m_ff and K_ff do not change.
     pub fn with_groups(mut self, groups: TermGroups) -> Self {
         let groups = self.0.groups.and(groups);
         let nf = self.n_modes();
@@ -26,14 +26,14 @@ impl Invariants {
         self
     }
 
-    /// The same body with some of its modes, in the order of `modes`.
+    /// Returns the invariants of a subset of the modes, in the order of `modes`.
     ///
     /// # Panics
     /// When an index is not below the number of modes.
     pub fn with_modes(&self, modes: &[usize]) -> Self {
         let (nf, kept) = (self.n_modes(), modes.len());
         let square = |a: &Mat<f64>| Mat::from_fn(kept, kept, |i, j| a[(modes[i], modes[j])]);
-        // Index among blocks of all modes of one among blocks of those that are kept.
+        // Maps an index in blocks of kept modes to the index in blocks of all modes.
         let at = |index: usize| index / kept * nf + modes[index % kept];
         Self(PrimaryData {
             mass: self.0.mass,
@@ -57,8 +57,8 @@ impl Invariants {
         })
     }
 
-    /// The same with `round` of every entry of Ibar, S, W0 and W3 that the body holds for its groups. What
-    /// gives C2 and m_ff where W1 and W2 are not held stays.
+    /// Returns the invariants with `round` applied to every entry of Ibar, S, W0 and W3 of held groups. The
+    /// arrays that give C2 and m_ff in place of W1 and W2 are not rounded.
     pub(crate) fn rounded(&self, round: impl Fn(f64) -> f64) -> Self {
         let matrix = |a: &Mat<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| round(a[(i, j)]));
         let mut rounded = self.clone();
@@ -76,18 +76,18 @@ impl Invariants {
         rounded
     }
 
-    /// What J, C1, Ibar and S alone tell, as if the mass commuted with rotations.
+    /// Returns the invariants given by J, C1, Ibar and S alone, as if the mass commuted with rotations.
     pub fn as_solid(&self) -> Self {
         Self(PrimaryData { general: None, ..self.0.clone() })
     }
 
-    /// The same for a mass that does not commute with rotations, which has `terms` beside them.
+    /// Returns the invariants with `terms` added, for a mass that does not commute with rotations.
     pub(crate) fn with_general(self, terms: GeneralTerms) -> Self {
         Self(PrimaryData { general: Some(terms), ..self.0 })
     }
 
-    /// The same with exactly symmetric J, S_kk and m_ff and with S_lk = S_kl', as every body has them and
-    /// files of few digits do not.
+    /// Returns the invariants with exactly symmetric J, S_kk and m_ff and with S_lk = S_kl'. Every body has
+    /// these symmetries; files with few digits do not.
     pub fn with_symmetries(mut self) -> Self {
         let data = &mut self.0;
         data.second_moment = (data.second_moment + data.second_moment.transpose()) * 0.5;
@@ -98,7 +98,7 @@ impl Invariants {
         self
     }
 
-    /// The same with every array multiplied by its factor: numbers in other units.
+    /// Returns the invariants with every array multiplied by its factor, for other units.
     pub(crate) fn scaled(&self, factors: &UnitFactors) -> Self {
         let given = &self.0;
         let times = |a: &Mat<f64>, factor: f64| Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)] * factor);
@@ -121,13 +121,13 @@ impl Invariants {
         })
     }
 
-    /// Whether nothing is there of the groups that are not held.
+    /// Returns true if the arrays contain no data of groups that are not held.
     pub(crate) fn holds_its_groups_only(&self) -> bool {
         *self == self.clone().with_groups(self.0.groups)
     }
 }
 
-/// What each array is multiplied by when units change; S has none.
+/// Factors of the arrays for a change of units; S needs none.
 pub struct UnitFactors {
     /// Factor of the mass.
     pub mass: f64,
@@ -143,12 +143,12 @@ pub struct UnitFactors {
     pub modal_stiffness: f64,
 }
 
-/// (A + A') / 2.
+/// Returns (A + A') / 2.
 pub fn symmetric_part(a: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| 0.5 * (a[(i, j)] + a[(j, i)]))
 }
 
-/// Ibar of a body that lacks W1: what gives C2 (3 x nf), to the last bit.
+/// Returns Ibar of a body without W1: antisymmetric arrays that give C2 (3 x nf) exactly.
 pub fn ibar_of_c2(c2: &Mat<f64>) -> [[Vec<f64>; 3]; 3] {
     let half = |k: usize, sign: f64| (0..c2.ncols()).map(|p| sign * 0.5 * c2[(k, p)]).collect();
     let mut ibar = [(); 3].map(|()| [(); 3].map(|()| vec![0.0; c2.ncols()]));
@@ -158,8 +158,8 @@ pub fn ibar_of_c2(c2: &Mat<f64>) -> [[Vec<f64>; 3]; 3] {
     ibar
 }
 
-/// S of a body that lacks W2: what gives m_ff and W3 by their formulas, halves so that sums restore them to
-/// the last bit; zero where these are information of their own, or not held.
+/// Returns S of a body without W2: arrays that give m_ff and W3 by their formulas, stored as halves so that
+/// sums restore them exactly. Zero where m_ff and W3 are stored separately or not held.
 pub fn s_of_modal_mass(
     nf: usize,
     modal_mass: Option<&Mat<f64>>,

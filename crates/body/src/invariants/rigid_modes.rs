@@ -1,11 +1,12 @@
-//! Rigid motion as modes: M in rigid motions and modes, and the same body with other amounts of rigid motion
-//! in its modes.
+//! Rigid motion as modes: M in rigid motions and modes, and a change of the rigid motion contained in the
+//! modes.
 
 use super::{GeneralTerms, Invariants, PrimaryData, TermGroups};
 use faer::{Mat, MatRef};
 
 impl Invariants {
-    /// \[m I, -c~, C1; ., I0, C2; ., ., m_ff\]: M in the six rigid motions and the modes.
+    /// Returns \[m I, -c~, C1; ., I0, C2; ., ., m_ff\], the matrix M in the six rigid motions and the
+    /// modes.
     pub fn mass_matrix(&self) -> Mat<f64> {
         let (c1, c2, modal) = (&self.0.c1, self.c2(), self.modal_mass());
         let (lever, inertia) = (self.0.first_moment.cross_matrix(), self.inertia());
@@ -20,8 +21,8 @@ impl Invariants {
         })
     }
 
-    /// The invariants of a body of M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six modes
-    /// before the others.
+    /// Returns the invariants of a body with M = Ms kron I3 with its rigid motions, e_c and e_c x x, as six
+    /// modes before the others.
     fn with_rigid_modes(&self) -> Self {
         let old = self;
         let nf = old.n_modes();
@@ -40,7 +41,7 @@ impl Invariants {
             3..6 => axes().map(|i| permutation(l, p - 3, i) * j[(k, i)]).sum(),
             _ => old.0.ibar[k][l][p - 6],
         };
-        // u_k' Ms v_l of motions in this order: translations, rotations, modes.
+        // u_k' Ms v_l of motions in the order translations, rotations, modes.
         let product = |k: usize, l: usize, p: usize, q: usize| match (p, q) {
             (0..3, 0..3) => delta(k, p) * delta(l, q) * m,
             (0..3, 3..6) => delta(k, p) * turned(l, q - 3),
@@ -74,21 +75,21 @@ impl Invariants {
         })
     }
 
-    /// W3 by its formula from S.
+    /// Returns W3 by its formula from S.
     fn w3_of_s(&self) -> Mat<f64> {
         let solid = Self(PrimaryData { general: None, groups: TermGroups::ALL, ..self.0.clone() });
         solid.w3().expect("held")
     }
 
-    /// The same body with the modes psi_j - t_j - theta_j x x: `taken` has the translation t_j and the
-    /// rotation theta_j of every mode (6 x nf). Rigid motion takes no elastic energy, so that K_ff stays.
+    /// Returns the body with the modes psi_j - t_j - theta_j x x: `taken` holds the translation t_j and the
+    /// rotation theta_j of every mode (6 x nf). Rigid motion has no strain energy, so K_ff does not change.
     ///
-    /// What is linear in the modes, C1, C2 and m_ff, is exact for every mass matrix, and everything is where
-    /// M commutes with rotations. Where it does not, W0 to W3 of the rigid motion that is taken are those of
-    /// a body that does and has the same J.
+    /// The quantities linear in the modes, C1 and C2, and m_ff are exact for every mass matrix, and all
+    /// quantities are exact if M commutes with rotations. Otherwise W0 to W3 of the removed rigid motion
+    /// are those of a body with equal J whose mass commutes with rotations.
     ///
     /// # Panics
-    /// When the sizes disagree, or a group is not held: of what is not there nothing can be taken.
+    /// When the sizes disagree, or when a group is not held.
     pub fn without_rigid_motion(&self, taken: MatRef<'_, f64>) -> Self {
         let nf = self.n_modes();
         assert!((taken.nrows(), taken.ncols()) == (6, nf), "six rigid motions of every mode");
@@ -116,7 +117,7 @@ impl Invariants {
     }
 }
 
-/// The sign of the permutation (a, b, c) of (0, 1, 2); 0 where an index repeats.
+/// Returns the sign of the permutation (a, b, c) of (0, 1, 2); 0 if an index repeats.
 fn permutation(a: usize, b: usize, c: usize) -> f64 {
     match (3 + b - a) % 3 {
         0 => 0.0,

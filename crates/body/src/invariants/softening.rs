@@ -1,21 +1,21 @@
-//! When the centrifugal term needs geometric stiffness beside it (theory section 7).
+//! Softening by the centrifugal term, which tells if geometric stiffness is needed (theory section 7).
 
 use super::Invariants;
 use faer::{Mat, MatRef};
 use flexbody_linalg::{combine, gram, symmetric_eigen};
 use nalgebra::Vector3;
 
-/// Largest |kappa| of A v = kappa K v for symmetric A and K (nf x nf), K positive definite: by which part of
-/// its own a unit of A changes the stiffness of any motion at the most. `None` when K is not positive
-/// definite or entries are not finite.
+/// Returns the largest |kappa| of A v = kappa K v for symmetric A and K (nf x nf), K positive definite: the
+/// largest relative change of the stiffness of any motion by a unit of A. Returns `None` if K is not
+/// positive definite or entries are not finite.
 pub fn relative_norm(a: MatRef<'_, f64>, k: MatRef<'_, f64>) -> Option<f64> {
     let projected = relative_to(&[a], k)?.pop()?;
     symmetric_eigen(projected.as_ref())?.values.into_iter().map(f64::abs).reduce(f64::max)
 }
 
-/// Bound of |kappa| in A v = kappa K v for A = sum_i a_i A_i and every a of unit length: the root of the largest
-/// eigenvalue of the sum of the squares of the A_i relative to K. The same in all axes. `None` as
-/// [`relative_norm`].
+/// Returns an upper bound of |kappa| in A v = kappa K v for A = sum_i a_i A_i and every a of unit length:
+/// the root of the largest eigenvalue of the sum of the squares of the A_i relative to K. The bound is
+/// equal in all axes. Returns `None` in the cases of [`relative_norm`].
 pub(super) fn largest_relative_norm(all: &[MatRef<'_, f64>], k: MatRef<'_, f64>) -> Option<f64> {
     let n = k.nrows();
     let squares = relative_to(all, k)?;
@@ -23,17 +23,17 @@ pub(super) fn largest_relative_norm(all: &[MatRef<'_, f64>], k: MatRef<'_, f64>)
     Some(symmetric_eigen(sum.as_ref())?.values.into_iter().fold(0.0, f64::max).sqrt())
 }
 
-/// K^-1/2 A K^-1/2 of every A, up to a rotation that is the same for all.
+/// Returns K^-1/2 A K^-1/2 of every A, up to one common rotation.
 fn relative_to(all: &[MatRef<'_, f64>], k: MatRef<'_, f64>) -> Option<Vec<Mat<f64>>> {
     let root = inverse_root(k)?;
     let projected = |a: &MatRef<'_, f64>| gram(root.as_ref(), combine(*a, root.as_ref()).as_ref());
     Some(all.iter().map(projected).collect())
 }
 
-/// X with X'K X = 1; `None` when K is not positive definite.
+/// Returns X with X'K X = 1; `None` if K is not positive definite.
 fn inverse_root(k: MatRef<'_, f64>) -> Option<Mat<f64>> {
     let n = k.nrows();
-    // To a unit diagonal first: stiffnesses of modes spread over many orders of magnitude.
+    // Scale to a unit diagonal first: stiffnesses of modes spread over many orders of magnitude.
     let size: Vec<f64> = (0..n).map(|i| k[(i, i)].sqrt().recip()).collect();
     let scaled = Mat::from_fn(n, n, |i, j| k[(i, j)] * size[i] * size[j]);
     let eigen = symmetric_eigen(scaled.as_ref())?;
@@ -44,12 +44,12 @@ fn inverse_root(k: MatRef<'_, f64>) -> Option<Mat<f64>> {
 }
 
 impl Invariants {
-    /// The largest part mu that the centrifugal term takes of the stiffness of any motion at the angular velocity
-    /// w, the largest eigenvalue of (sum_ab w_a w_b (W2)_ab) v = mu K_ff v, and v with v'K_ff v = 1. `None` when K_ff is
-    /// not positive definite, or when the body does not hold W2.
+    /// Returns the largest part mu of the stiffness of any motion lost to the centrifugal term at the
+    /// angular velocity w, the largest eigenvalue of (sum_ab w_a w_b (W2)_ab) v = mu K_ff v, and v with
+    /// v'K_ff v = 1. Returns `None` if K_ff is not positive definite, or if the body does not hold W2.
     ///
-    /// * `of_inertia`: the stiffness of inertia at this angular velocity, where the body has it: a part of the same
-    ///   term.
+    /// * `of_inertia`: stiffness of inertia at this angular velocity, if the body has it; it belongs to the
+    ///   same term.
     ///
     /// # Panics
     /// When a matrix has another size.

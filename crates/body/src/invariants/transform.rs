@@ -1,4 +1,4 @@
-//! How the primary data change with the frame and with the basis (theory section 5).
+//! Change of the primary data with the frame and with the basis (theory section 5).
 
 use super::dense::{product, transpose_product};
 use super::general::{ibar_of, plane_ibar, symmetrise};
@@ -7,12 +7,12 @@ use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 
 impl Invariants {
-    /// The same body about the origin `d` (frame coordinates): x' = x - d.
+    /// Returns the body about the origin `d` (frame coordinates): x' = x - d.
     ///
     /// c' = c - m d; J' = J - c d' - d c' + m d d'; Ibar'_kl = Ibar_kl - d_k C1_l; S unchanged. For a mass
-    /// that does not commute with rotations, B_x' = B_x + Phi_t d~ gives W1' = W1 - d~ W0 - (d~ W0)' block by
-    /// block and C2' = C2 - d~ C1. Cancels when d is far compared with the body: to get data about the centre
-    /// of mass, shift the coordinates and condense.
+    /// that does not commute with rotations, B_x' = B_x + Phi_t d~ gives W1' = W1 - d~ W0 - (d~ W0)' block
+    /// by block and C2' = C2 - d~ C1. Digits cancel if d is large compared with the body: for data about
+    /// the centre of mass, shift the coordinates and condense.
     pub fn shifted(&self, d: Vector3<f64>) -> Self {
         let c = &self.0.first_moment;
         let mixed = c * d.transpose();
@@ -37,12 +37,14 @@ impl Invariants {
                 }
             }
         }
-        // Of W1, C1 and the shift would make some: it is not held about the new origin either.
+        // The shift would create a W1 from C1: drop groups that are not held.
         shifted.with_groups(self.0.groups)
     }
 
-    /// The invariants with W0 = -C1~, so that a constant velocity of flight does not change how the body moves. Of a mass of points and directors W0 is this anyway; what does not turn with the nodes
-    /// has other products Phi_t' M B_j, errors of its order (theory section 6).
+    /// Returns the invariants with W0 = -C1~, so that a constant translational velocity does not influence
+    /// the motion of the body. For a mass of points and directors W0 has this value already. A mass that
+    /// does not turn with the nodes has other products Phi_t' M B_j, which are errors of the order of its
+    /// approximation (theory section 6).
     pub(crate) fn without_feeling_of_flight(mut self) -> Self {
         let w0 = self.as_solid().w0();
         if let Some(general) = &mut self.0.general {
@@ -54,8 +56,8 @@ impl Invariants {
         self
     }
 
-    /// The same body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the same
-    /// origin.
+    /// Returns the body in other axes, the columns of `axes` in the present ones: x' = axes' x, about the
+    /// same origin.
     pub fn rotated(&self, axes: &Matrix3<f64>) -> Self {
         let nf = self.n_modes();
         let second_moment = axes.transpose() * self.0.second_moment * axes;
@@ -95,11 +97,11 @@ impl Invariants {
         rotated.with_groups(self.0.groups)
     }
 
-    /// The same body in the basis Psi' = Psi T, with `t` (nf x nf'): S' = T' S T, Ibar' = Ibar T, C1' = C1 T,
-    /// K' = T' K T.
+    /// Returns the body in the basis Psi' = Psi T, with `t` (nf x nf'): S' = T' S T, Ibar' = Ibar T, C1' =
+    /// C1 T, K' = T' K T.
     ///
     /// # Panics
-    /// When `t` has not one row per mode.
+    /// When `t` does not have one row per mode.
     pub fn with_basis(&self, t: MatRef<'_, f64>) -> Self {
         let nf = self.n_modes();
         assert_eq!(t.nrows(), nf, "one row per mode");

@@ -1,4 +1,4 @@
-//! What must hold for the arrays of the invariants.
+//! Conditions on the arrays of the invariants.
 
 use super::{Invariants, TermGroups};
 use crate::problems::Problems;
@@ -6,7 +6,7 @@ use faer::Mat;
 use flexbody_base::diagnostic::Diagnostic;
 
 impl Invariants {
-    /// Whether every array has the shape that nf, the number of columns of C1, asks for.
+    /// Returns true if every array has the shape that follows from nf, the number of columns of C1.
     pub(super) fn has_its_shapes(&self) -> bool {
         let (data, nf) = (&self.0, self.n_modes());
         let is = |m: &Mat<f64>, rows: usize, columns: usize| (m.nrows(), m.ncols()) == (rows, columns);
@@ -19,7 +19,7 @@ impl Invariants {
             })
     }
 
-    /// What is wrong with the arrays of invariants that are called `name`, of a body with `nf` modes.
+    /// Returns the errors in the arrays of the invariants called `name`, of a body with `nf` modes.
     pub(crate) fn problems(&self, name: &str, nf: usize) -> Vec<Diagnostic> {
         let data = &self.0;
         let mut problems = Problems::default();
@@ -41,7 +41,7 @@ impl Invariants {
             problems.matrix(&format!("{name}.w3"), &general.w3, 3 * nf, nf);
             problems.matrix(&format!("{name}.modal_mass"), &general.modal_mass, nf, nf);
         }
-        // What follows takes the shapes of all arrays for granted.
+        // The next check assumes that all arrays have valid shapes.
         if problems.is_empty() && data.groups != TermGroups::ALL && !self.holds_its_groups_only() {
             problems.add(format!("`{name}` has entries of groups that it does not hold"));
         }

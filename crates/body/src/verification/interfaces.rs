@@ -1,4 +1,4 @@
-//! Interfaces of a body against those of its model.
+//! Comparison of the interfaces of a body with those of its model.
 
 use crate::convert::interfaces_in_frame;
 use crate::flex_body::{FlexBody, Interface};
@@ -6,12 +6,13 @@ use crate::invariants::IdentityCheck;
 use flexbody_model::{FeModel, centre_and_length};
 use std::collections::BTreeSet;
 
-/// Reference points agree to rounding of the change of frame, relative to the coordinates of the nodes.
+/// Allowed difference of reference points, relative to the coordinates of the nodes: the rounding of the
+/// change of frame.
 const PLACE: f64 = 1e-12;
 
-/// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies of files before
-/// reference points were stored have none. A body of an earlier version has the mean of the nodes where the model
-/// states no point, which is accepted.
+/// Compares names, nodes, couplings and reference points; empty if neither has interfaces. Bodies from
+/// files of versions without reference points have none. A body of an earlier version has the mean of the
+/// nodes as reference point if the model states none; this is accepted.
 pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<IdentityCheck> {
     let (stored, own) = (body.interfaces(), interfaces_in_frame(model, body.frame(), false));
     if stored.is_empty() && own.is_empty() {
@@ -51,8 +52,8 @@ pub(super) fn interface_checks(body: &FlexBody, model: &FeModel) -> Vec<Identity
     ]
 }
 
-/// True if `stored` has the nodes, the coupling and the kind of reference point of `own`. A basis that needs a coupling
-/// takes `averaging` where the model states none.
+/// Returns true if `stored` has the nodes, the coupling and the kind of reference point of `own`. A basis
+/// that needs a coupling uses `averaging` if the model states none.
 fn is_same(stored: &Interface, own: &Interface, model: &FeModel) -> bool {
     let set = model.interfaces().iter().find(|set| set.name == own.name);
     let taken = set.map(|set| set.coupling());

@@ -1,5 +1,5 @@
-//! Statements of a file that its own numbers can be held to: counts of the certificate, interfaces that are coupled
-//! rigidly, interface coordinates, errors of lumped comparators.
+//! Checks of the statements of a file against its own numbers: counts of the certificate, rigid interfaces,
+//! interface coordinates, and errors of lumped comparators.
 
 use crate::flex_body::{FixedInterface, FlexBody, Interface, InterfaceCoordinates, LumpedBody};
 use crate::invariants::{IdentityCheck, error_norms};
@@ -7,11 +7,11 @@ use faer::Mat;
 use flexbody_linalg::{combine, gram, larger, largest};
 use flexbody_model::{Coupling, rigid_count};
 
-/// Rounding of a rigid motion of the nodes of an interface, relative to its largest motion.
+/// Allowed rounding error of a rigid motion of the nodes of an interface, relative to its largest motion.
 const RIGID: f64 = 1e-8;
-/// Rounding of error norms, which are differences of nearly equal numbers relative to one of them.
+/// Allowed rounding error of error norms, which are relative differences of nearly equal numbers.
 const NORMS: f64 = 1e-9;
-/// Rounding of coordinates that follow from shapes by two ways.
+/// Allowed rounding error between coordinates computed from the shapes in two ways.
 const COORDINATES: f64 = 1e-9;
 
 /// Returns the checks of all statements that the body makes.
@@ -21,13 +21,13 @@ pub(super) fn recounts(body: &FlexBody) -> Vec<IdentityCheck> {
     one_each.into_iter().flatten().chain(coordinates_of_modes(body)).collect()
 }
 
-/// Difference of two counts as a number.
+/// Returns the difference of two counts as a number.
 fn apart(a: usize, b: usize) -> f64 {
     a.abs_diff(b) as f64
 }
 
-/// Compares the proof with the inertia count, and with the eigenvalues below its shift. A body of the lowest modes has
-/// fewer than were counted.
+/// Compares the proof with the inertia count and with the eigenvalues below its shift. A body of only the
+/// lowest modes has fewer than were counted.
 fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let certificate = body.certificate();
     let proved = certificate.proved_modes?;
@@ -40,7 +40,7 @@ fn counted_modes(body: &FlexBody) -> Option<IdentityCheck> {
     Some(IdentityCheck::new("counted_modes", formula, value, 0.0))
 }
 
-/// Compares what a Craig-Bampton body states of its basis with its interface coordinates.
+/// Compares the statements of a Craig-Bampton body about its basis with its interface coordinates.
 fn fixed_interface_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let fixed = body.certificate().fixed_interface.as_ref()?;
     let coordinates = body.coordinates()?;
@@ -68,8 +68,8 @@ fn fixed_eigenvalues(coordinates: &InterfaceCoordinates) -> Vec<f64> {
     amplitudes.map(|(j, _)| coordinates.stiffness[(j, j)] / coordinates.mass[(j, j)]).collect()
 }
 
-/// Measures by how much interfaces that the basis couples rigidly deform. Free modes know nothing of couplings: for
-/// these a warning says it.
+/// Measures the deformation of interfaces that the basis couples rigidly. Free modes do not consider
+/// couplings; a warning reports their deformation.
 fn rigid_interfaces(body: &FlexBody) -> Option<IdentityCheck> {
     let coupled = body.certificate().fixed_interface.is_some() || body.coordinates().is_some();
     if !coupled || !body.has_rigid_interfaces() {
@@ -82,8 +82,8 @@ fn rigid_interfaces(body: &FlexBody) -> Option<IdentityCheck> {
     Some(IdentityCheck::new("rigid_interfaces", formula, value, limit))
 }
 
-/// Returns what the nodes of an interface leave of the rigid motion of its reference point, displacements and
-/// rotations, each relative to the largest in any mode.
+/// Returns the deviation of the nodes of an interface from the rigid motion of its reference point;
+/// displacements and rotations are each relative to the largest in any mode.
 fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     let modes = body.modes();
     let rotation = modes.rotation.as_ref();
@@ -97,7 +97,7 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
         for k in 0..3 {
             let row = rotation.as_ref().subrows(3 * node + k, 1);
             let own = row.norm_max();
-            // Nodes may have some of the rotations, or none.
+            // Nodes may have some rotations, or none.
             if own > 0.0 {
                 size = larger(size, own);
                 left = larger(left, (row.to_owned() - turns.as_ref().subrows(k, 1)).norm_max());
@@ -107,8 +107,8 @@ fn deformation(body: &FlexBody, interface: &Interface) -> f64 {
     larger(displaced, if left == 0.0 { 0.0 } else { left / size })
 }
 
-/// Compares interface coordinates of the modes with the motion of the reference points in them, and holds the mass in
-/// interface coordinates to the momentum of the modes, which is zero.
+/// Compares the interface coordinates of the modes with the motion of the reference points in the modes,
+/// and checks that the momentum of the modes, computed with the mass in interface coordinates, is zero.
 fn coordinates_of_modes(body: &FlexBody) -> Option<IdentityCheck> {
     let coordinates = body.coordinates()?;
     let rigid = body.parts().rigid_coordinates()?;
@@ -129,8 +129,8 @@ fn coordinates_of_modes(body: &FlexBody) -> Option<IdentityCheck> {
     Some(IdentityCheck::new("interface_modes", formula, value, limit))
 }
 
-/// Largest difference of the coordinates of reference points from their motion in the modes, translations and
-/// rotations each relative to their largest.
+/// Returns the largest difference of the coordinates of reference points from their motion in the modes;
+/// translations and rotations are each relative to their largest.
 fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
     let (modes, d) = (body.modes(), body.dimension());
     let (mut first, mut worst) = (0, 0.0);
@@ -159,8 +159,8 @@ fn reference_difference(body: &FlexBody, b: &Mat<f64>) -> f64 {
     worst
 }
 
-/// Compares the error norms of lumped comparators with those of their invariants; norms of other programs are left
-/// alone.
+/// Compares the error norms of lumped comparators with norms recomputed from their invariants; norms of
+/// other programs are not checked.
 fn lumped_errors(body: &FlexBody) -> Option<IdentityCheck> {
     let own = |lumped: &LumpedBody| {
         let norms = error_norms(body.invariants(), &lumped.invariants);

@@ -1,4 +1,4 @@
-//! The verdict on each given geometric stiffness.
+//! Check of each given geometric stiffness.
 
 use super::loads::UnitLoads;
 use super::relations::Relations;
@@ -7,19 +7,20 @@ use crate::{FeModel, GeometricStiffness, RawMatrix, UnitLoad};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
-/// Largest error of a relation that is taken: reduced integration leaves some tenths of a percent. A greater value
-/// takes more of the stiffness of initial displacements, of which a straight bar under tension has 30 % in the
-/// relation of rotation.
+/// Largest accepted error of a relation: reduced integration leaves some tenths of a percent. A larger
+/// value would accept parts of the stiffness of initial displacements, which for a straight bar under
+/// tension breaks the relation of rotation by 30 %.
 const ALLOWED: f64 = 1e-2;
 
-/// Errors up to this are not told: matrices written with ten digits leave 1e-8.
+/// Errors up to this value are not reported: matrices written with ten digits leave 1e-8.
 const UNTOLD: f64 = 1e-6;
 
-/// Complains about each geometric stiffness that breaks a relation with rigid motion, or is that of another load.
+/// Adds an error for each geometric stiffness that breaks a relation with rigid motion, or that belongs to
+/// another load.
 ///
-/// * `files`: where the matrices were read.
-/// * `solid`: true if the elements of the body are known to be solids, so that K_geo is a multiple of I for every
-///   pair of nodes.
+/// * `files`: matrices as read, with their files.
+/// * `solid`: true if all elements of the body are known to be solids, so that K_geo is a multiple of I for
+///   every pair of nodes.
 pub(crate) fn check_stress(
     model: &FeModel,
     files: &[GeometricStiffness<RawMatrix>],
@@ -42,7 +43,7 @@ pub(crate) fn check_stress(
     }
 }
 
-/// A geometric stiffness with what was found of it.
+/// Geometric stiffness with the results of its check.
 struct Judged<'m> {
     model: &'m FeModel,
     load: &'m UnitLoad,
@@ -50,7 +51,7 @@ struct Judged<'m> {
 }
 
 impl Judged<'_> {
-    /// Complaint about the worst relation with rigid motion that holds for every load.
+    /// Returns an error about the worst relation with rigid motion that holds for every load.
     fn motion(&self) -> Option<Diagnostic> {
         let Relations { translation, rotation, blocks, .. } = &self.relations;
         let (name, per_cent) = (self.load, |share: f64| format!("{:.2} %", 100.0 * share));
@@ -81,7 +82,7 @@ impl Judged<'_> {
         None
     }
 
-    /// Complaint about a load that is another one, or a warning about errors below what is refused.
+    /// Returns an error if the load is another one, or a warning about smaller errors.
     fn load(&self, loads: &UnitLoads<'_>) -> Option<Diagnostic> {
         let (name, relations) = (self.load, &self.relations);
         let other = loads.error(self.load, &relations.forces).unwrap_or(0.0);

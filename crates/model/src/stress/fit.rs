@@ -1,23 +1,25 @@
-//! Inertia relief that explains forces at nodes, whatever acts at the few nodes that are supported.
+//! Fit of inertia relief to forces at nodes, robust against arbitrary forces at a few supported nodes.
 
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-/// Reweightings; each reduces the share of the supported nodes in the fit, and forty leave 1e-6 of it.
+/// Number of reweightings. Each reduces the share of the supported nodes in the fit; forty leave 1e-6 of
+/// it.
 const REWEIGHTINGS: usize = 40;
 
-/// Forces below this part of the mean one have the same weight.
+/// Force relative to the mean below which all forces have equal weight.
 const SMALL: f64 = 1e-7;
 
 /// Forces of the six unit rigid accelerations at one node; those out of the plane are zero.
 pub(super) type Relief = [Vector3<f64>; 6];
 
-/// Sum of the forces of the accelerations `by`.
+/// Returns the sum of the forces of the accelerations `by`.
 pub(super) fn force(relief: &Relief, by: &Vector6<f64>) -> Vector3<f64> {
     relief.iter().zip(by.iter()).fold(Vector3::zeros(), |sum, (unit, &c)| sum + unit * c)
 }
 
-/// Rigid accelerations for which the sum of the lengths of `forces` - relief is least: of a sum of lengths, few
-/// nodes with any forces turn away nothing (iteratively reweighted least squares).
+/// Returns the rigid accelerations that minimise the sum of the lengths of `forces` - relief. In a sum of
+/// lengths a few nodes with arbitrary forces do not change the result (iteratively reweighted least
+/// squares).
 pub(super) fn least_lengths(forces: &[Vector3<f64>], relief: &[Relief]) -> Vector6<f64> {
     let mean = forces.iter().map(Vector3::norm).sum::<f64>() / forces.len().max(1) as f64;
     let mut by = Vector6::zeros();
@@ -38,11 +40,11 @@ pub(super) fn least_lengths(forces: &[Vector3<f64>], relief: &[Relief]) -> Vecto
     by
 }
 
-/// Least-squares solution of normal equations; motions that do nothing get no acceleration.
+/// Returns the least-squares solution of normal equations; motions without effect get no acceleration.
 pub(super) fn solve(normal: Matrix6<f64>, right: &Vector6<f64>) -> Vector6<f64> {
-    /// Squared size of a motion relative to the largest below which it does nothing.
+    /// Squared size of a motion, relative to the largest, below which it has no effect.
     const NOTHING: f64 = 1e-12;
-    // Scaled to a unit diagonal: rotations and translations have different units.
+    // Scale to a unit diagonal: rotations and translations have different units.
     let scale =
         Vector6::from_fn(|k, _| if normal[(k, k)] > 0.0 { normal[(k, k)].sqrt().recip() } else { 0.0 });
     let scaled = Matrix6::from_fn(|a, b| scale[a] * normal[(a, b)] * scale[b]);

@@ -1,4 +1,4 @@
-//! The loads that geometric stiffness is given for, as forces at nodes, and how far others are from them.
+//! Loads of geometric stiffness as forces at nodes, and the difference of other forces from them.
 
 use super::fit::{Relief, force, least_lengths, solve};
 use crate::rigid::centre_and_length;
@@ -7,39 +7,42 @@ use faer::Mat;
 use flexbody_linalg::{gram, larger};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-/// Part of the acceleration that balances a load by which inertia relief may differ from it.
+/// Largest difference between partial and full inertia relief, relative to the partial one, for a
+/// load that counts as balanced.
 const NEARLY_BALANCED: f64 = 1e-3;
 
-/// Nodes with the least differences that have to carry a load: the others may be supported.
+/// Part of the nodes, those with the smallest differences, that must carry the load: the others may be
+/// supported.
 const FREE_NODES: f64 = 0.5;
 
-/// A node is supported where its difference, relative to its force, is more than so many times the usual one.
+/// Ratio of the difference of a node, relative to its force, to the usual one, above which the node counts
+/// as supported.
 const SUPPORTED: f64 = 10.0;
 
-/// Part of the load that these nodes carry at the least.
+/// Smallest part of the load that the unsupported nodes must carry.
 const FREE_LOAD: f64 = 0.25;
 
-/// Forces below this part of the inertia of the body are rounding.
+/// Force, relative to the inertia of the body, below which it counts as rounding.
 const SMALL_LOAD: f64 = 1e-6;
 
-/// Unit loads of a model.
+/// Unit loads of a model as nodal forces.
 pub(super) struct UnitLoads<'m> {
     model: &'m FeModel,
     rows: InertialRows<'m>,
     /// M times the rigid motions about the centre of [`InertialRows`], on its rows.
     momenta: Mat<f64>,
-    /// Forces -M of the rigid motions at every node.
+    /// Inertia forces -M of the rigid motions at every node.
     relief: Vec<Relief>,
-    /// Mass of the rigid motions; zero for those out of the plane.
+    /// Mass matrix of the rigid motions; zero for motions out of the plane.
     mass: Matrix6<f64>,
     /// Largest distance of a node from the middle.
     length: f64,
 }
 
-/// One explanation of the forces that a stress turns: those of the load and of rigid accelerations.
+/// Hypothesis about the forces that a stress turns: the load plus inertia forces of a rigid acceleration.
 struct Explained {
     acceleration: Vector6<f64>,
-    /// Error of the accelerations themselves.
+    /// Error of the acceleration itself.
     error: f64,
 }
 
@@ -67,8 +70,9 @@ impl<'m> UnitLoads<'m> {
         Self { model, rows, momenta, relief, mass, length }
     }
 
-    /// Difference of `forces`, one at each node, from those of a unit of `load`, relative to them; supports at some
-    /// nodes and inertia relief may carry the load. `None` of a load that is known by its name only.
+    /// Returns the difference of `forces`, one per node, from those of a unit of `load`, relative to the
+    /// latter. Supports at some nodes and inertia relief may balance the load. Returns `None` for a load
+    /// known by its name only.
     pub(super) fn error(&self, load: &UnitLoad, forces: &[Vector3<f64>]) -> Option<f64> {
         let axis = load.component;
         match &load.kind {
@@ -85,13 +89,13 @@ impl<'m> UnitLoads<'m> {
         }
     }
 
-    /// Inertia forces of a unit acceleration.
+    /// Returns the error for the inertia forces of a unit acceleration.
     fn of_acceleration(&self, forces: &[Vector3<f64>], axis: usize) -> f64 {
         let none = vec![Vector3::zeros(); forces.len()];
         self.of_inertia(forces, &none, &Vector6::ith(axis, 1.0))
     }
 
-    /// Inertia forces of a unit angular acceleration about the origin of a frame.
+    /// Returns the error for the inertia forces of a unit angular acceleration about the origin of a frame.
     fn of_angular_acceleration(&self, forces: &[Vector3<f64>], axis: usize) -> f64 {
         let none = vec![Vector3::zeros(); forces.len()];
         let about_centre = Vector6::ith(3 + axis, 1.0);
@@ -101,7 +105,7 @@ impl<'m> UnitLoads<'m> {
         error(&about_centre).min(error(&about_origin))
     }
 
-    /// Centrifugal forces about the origin of a frame.
+    /// Returns the error for centrifugal forces about the origin of a frame.
     fn of_spin(&self, forces: &[Vector3<f64>], component: usize) -> f64 {
         let load = self.centrifugal(component);
         let (k, l) = LoadKind::SPIN[component];
@@ -112,18 +116,20 @@ impl<'m> UnitLoads<'m> {
         error(&Vector6::zeros()).min(error(&translation(&shift)))
     }
 
-    /// Least error of what may carry the `load` with the inertia forces of a rigid acceleration: supports, the inertia
-    /// relief of a free body, or both.
+    /// Returns the smallest error over the ways to balance the `load` and the inertia forces of a rigid
+    /// acceleration: supports, inertia relief of a free body, or both.
     fn of_inertia(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], motion: &Vector6<f64>) -> f64 {
         let load: Vec<_> =
             load.iter().zip(&self.relief).map(|(f, relief)| f + force(relief, motion)).collect();
         let whole = self.balance(&load);
         let partly = least_lengths(&differences(forces, &load), &self.relief);
-        // Supports do no work on the motion that they leave: it is M-orthogonal to what they take of the load.
+        // Supports do no work on the motion that they leave free: it is M-orthogonal to the part that they
+        // carry.
         let taken = whole - partly;
         let product = |a: &Vector6<f64>, b: &Vector6<f64>| a.dot(&(self.mass * b));
         let size = product(&taken, &taken).min(product(&partly, &partly));
-        // Moments at rotations of nodes are not among the forces: relief that nearly balances the load is all of it.
+        // Moments at nodal rotations are not among the forces: relief that nearly balances the load counts
+        // as full relief.
         let is_balanced = self.rows.have_directors()
             && product(&taken, &taken) <= NEARLY_BALANCED.powi(2) * product(&partly, &partly);
         let error = if is_balanced || size == 0.0 { 0.0 } else { product(&taken, &partly).abs() / size };
@@ -135,7 +141,7 @@ impl<'m> UnitLoads<'m> {
         self.least(forces, &load, &all)
     }
 
-    /// Rigid acceleration whose inertia forces balance forces at the nodes.
+    /// Returns the rigid acceleration whose inertia forces balance forces at the nodes.
     fn balance(&self, load: &[Vector3<f64>]) -> Vector6<f64> {
         let mut normal = Matrix6::zeros();
         let mut right = Vector6::zeros();
@@ -149,7 +155,7 @@ impl<'m> UnitLoads<'m> {
         solve(0.5 * (normal + normal.transpose()), &right)
     }
 
-    /// Displacements of a place under the six unit rigid motions.
+    /// Returns the displacements of a position under the six unit rigid motions.
     fn motions_of(&self, place: &[f64; 3]) -> Relief {
         let arm = Vector3::from(*place) - self.rows.centre();
         std::array::from_fn(|motion| match motion {
@@ -158,7 +164,7 @@ impl<'m> UnitLoads<'m> {
         })
     }
 
-    /// Forces at the nodes of an interface with a unit resultant.
+    /// Returns the error for forces at the nodes of an interface with a unit resultant.
     fn of_interface(&self, forces: &[Vector3<f64>], set: &NodeSet, wanted: &Vector6<f64>) -> f64 {
         let ids = &self.model.nodes().ids;
         let is_member: Vec<bool> = ids.iter().map(|id| set.nodes.contains(id)).collect();
@@ -184,8 +190,9 @@ impl<'m> UnitLoads<'m> {
         candidates.iter().map(error).fold(f64::INFINITY, f64::min)
     }
 
-    /// Difference of the resultant of the forces at the nodes of an interface from `wanted` about its reference
-    /// point, in units of the larger of the wanted force and moment. Moments are not known where nodes turn.
+    /// Returns the difference of the resultant of the forces at the nodes of an interface from `wanted`,
+    /// about its reference point, in units of the larger of the wanted force and moment. Moments are not
+    /// compared if nodes have rotations.
     fn resultant_error(
         &self,
         own: &[(usize, Vector3<f64>)],
@@ -209,7 +216,7 @@ impl<'m> UnitLoads<'m> {
         if known { larger(force_error, moment_error) } else { force_error }
     }
 
-    /// The reference point of an interface, or the mean of its nodes.
+    /// Returns the reference point of an interface, or the mean of its nodes.
     fn reference(&self, set: &NodeSet, is_member: &[bool]) -> Vector3<f64> {
         if let Some(point) = set.reference.point() {
             return Vector3::from(point);
@@ -218,7 +225,7 @@ impl<'m> UnitLoads<'m> {
         own.iter().map(|(x, _)| Vector3::from(**x)).sum::<Vector3<f64>>() / own.len().max(1) as f64
     }
 
-    /// Work of a force and moment at a point on the unit rigid motions.
+    /// Returns the work of a force and moment at a point on the unit rigid motions.
     fn resultant_of(&self, wanted: &Vector6<f64>, point: Vector3<f64>) -> Vector6<f64> {
         let f = wanted.fixed_rows::<3>(0).into_owned();
         let moment = wanted.fixed_rows::<3>(3) + (point - self.rows.centre()).cross(&f);
@@ -228,14 +235,14 @@ impl<'m> UnitLoads<'m> {
         resultant
     }
 
-    /// Least error of the explanations of `forces`.
+    /// Returns the smallest error of the hypotheses about `forces`.
     fn least(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], all: &[Explained]) -> f64 {
         let error = |one: &Explained| larger(one.error, self.unexplained(forces, load, &one.acceleration));
         all.iter().map(error).fold(f64::INFINITY, f64::min)
     }
 
-    /// Difference of `forces` from `load` with the relief by an acceleration, at the nodes where it is least, relative to
-    /// the forces there.
+    /// Returns the difference of `forces` from `load` plus the relief by an acceleration, at the nodes with
+    /// the smallest differences, relative to the forces there.
     fn unexplained(&self, forces: &[Vector3<f64>], load: &[Vector3<f64>], by: &Vector6<f64>) -> f64 {
         let net: Vec<_> = load.iter().zip(&self.relief).map(|(f, relief)| f + force(relief, by)).collect();
         let mut nodes: Vec<(f64, usize)> =
@@ -263,13 +270,14 @@ impl<'m> UnitLoads<'m> {
         difference / larger(size, floor)
     }
 
-    /// Sum of the inertia forces of unit motions over the nodes, rotations by their lengths.
+    /// Returns the sum of the inertia forces of unit motions over the nodes, with rotations scaled by their
+    /// lengths.
     fn inertia(&self) -> f64 {
         let of_node = |relief: &Relief| relief.iter().map(Vector3::norm).fold(0.0, larger);
         self.relief.iter().map(of_node).sum::<f64>()
     }
 
-    /// Centrifugal forces at the nodes for one product of spin rates, about the centre.
+    /// Returns the centrifugal forces at the nodes for one product of spin rates, about the centre.
     fn centrifugal(&self, component: usize) -> Vec<Vector3<f64>> {
         let (d, (k, l)) = (self.model.dimension(), LoadKind::SPIN[component]);
         let mut load = Mat::zeros(self.momenta.nrows(), 1);
@@ -283,12 +291,12 @@ impl<'m> UnitLoads<'m> {
     }
 }
 
-/// The rigid motions of a body with so many dimensions, among the six.
+/// Returns the rigid motions of a body of the given dimension, as indices among the six.
 fn motions(dimension: usize) -> &'static [usize] {
     if dimension == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] }
 }
 
-/// The rigid motion of a translation.
+/// Returns the rigid motion of a translation.
 fn translation(by: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(by.x, by.y, by.z, 0.0, 0.0, 0.0)
 }

@@ -1,4 +1,4 @@
-//! Geometric stiffness against what the stress of its load makes it do under rigid motion (theory section 7).
+//! Check of geometric stiffness by its behaviour under rigid motion (theory section 7).
 
 mod check;
 mod fit;

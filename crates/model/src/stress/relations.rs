@@ -1,4 +1,4 @@
-//! Relations of a geometric stiffness with rigid motion of the body.
+//! Relations between a geometric stiffness and rigid motion of the body.
 
 use crate::FeModel;
 use crate::rigid::centre_and_length;
@@ -7,33 +7,34 @@ use flexbody_linalg::{SymmetricMatrix, larger};
 use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
-/// Least size of a row relative to the largest one: forces of smaller rows are measured by this.
+/// Smallest size of a row relative to the largest one: forces of smaller rows are compared with this size.
 const SMALL_ROW: f64 = 1e-3;
 
-/// Least size of the turned forces relative to the entries times the distances of their nodes: those of a stress
-/// without load (self-stress) are rounding.
+/// Smallest size of the turned forces relative to the entries times the distances of their nodes: the
+/// forces of a stress without load (self-stress) are rounding.
 const SMALL_FORCE: f64 = 1e-3;
 
-/// Relations of a geometric stiffness with rigid motion: the forces that it turns, and relative errors.
+/// Relations between a geometric stiffness and rigid motion: the forces that it turns, and relative errors.
 pub(super) struct Relations {
     /// Force f at every node, from K_geo (phi x x) = phi x f. Axes of the model.
     pub forces: Vec<Vector3<f64>>,
     /// Forces of translations.
     pub translation: Translation,
-    /// Part of the forces under rotation that is no phi x f; zero in the plane, where every force is one.
+    /// Part of the forces under rotation that is not of the form phi x f; zero in the plane, where every
+    /// force has this form.
     pub rotation: f64,
-    /// Part of the entries between nodes that has a direction; zero where nodes have rotations or internal rows, or
-    /// where M depends on directions.
+    /// Part of the entries between nodes that depends on direction; zero if nodes have rotations or
+    /// internal rows, or if M depends on direction.
     pub blocks: f64,
-    /// Error that the digits of the file explain.
+    /// Error explained by the digits of the file.
     pub rounding: f64,
 }
 
 /// Forces of translations, relative to the sums of the entries of the rows.
 pub(super) struct Translation {
-    /// The largest.
+    /// Largest force.
     pub share: f64,
-    /// Rows with more than half of it.
+    /// Rows with more than half of the largest force.
     pub rows: Vec<usize>,
 }
 
@@ -60,7 +61,7 @@ impl Relations {
     }
 }
 
-/// The force f of G e_k = e_k x f; in the plane only G e_z is known.
+/// Returns the force f with G e_k = e_k x f; in the plane only G e_z is known.
 fn turned_force(turned: &Matrix3<f64>, plane: bool) -> Vector3<f64> {
     let g = turned;
     if plane {
@@ -71,22 +72,24 @@ fn turned_force(turned: &Matrix3<f64>, plane: bool) -> Vector3<f64> {
 
 /// Forces of K_geo at one node under rigid motions.
 struct NodeMotion {
-    /// Force along each axis under each translation, the largest.
+    /// Largest force along each axis under the translations.
     moved: [f64; 3],
-    /// Sum of the entries of each of its rows at what translates.
+    /// Sum of the magnitudes of the entries of each row of the node at rows that translate.
     rows: [f64; 3],
-    /// Column k: force under the rotation e_k about the node itself.
+    /// Column k: force under the rotation e_k about the node.
     turned: Matrix3<f64>,
-    /// Sum of |entries| times what a rotation about the node displaces at most.
+    /// Sum of |entries| times the largest displacement by a rotation about the node.
     entries: f64,
 }
 
-/// Rigid motion of every row: translations, then rotations about the centre, zero where there is none.
+/// Rigid motion of every row: translations, then rotations about the centre, zero for motions that do not
+/// exist.
 struct RigidFields<'m> {
     model: &'m FeModel,
     centre: [f64; 3],
     rows: Vec<[f64; 6]>,
-    /// Reciprocal of the largest entry of K_geo, by which its entries are multiplied: squares of them stay in range.
+    /// Reciprocal of the largest entry of K_geo, a factor of all entries that keeps their squares in the
+    /// range of numbers.
     scale: f64,
 }
 
@@ -116,7 +119,7 @@ impl<'m> RigidFields<'m> {
                 let value = value * self.scale;
                 let [tx, ty, tz, rx, ry, rz] = self.rows[column as usize];
                 let along = Vector3::new(tx, ty, tz);
-                // (e_k x (x_j - x_i)) . t = R_jk - (e_k x arm) . t, and e_k . (arm x t) is the last.
+                // (e_k x (x_j - x_i)) . t = R_jk - (e_k x arm) . t, and the last term is e_k . (arm x t).
                 let turn = Vector3::new(rx, ry, rz) - arm.cross(&along);
                 moved += value * along;
                 motion.rows[axis] += value.abs() * along.norm();
@@ -145,8 +148,9 @@ impl Translation {
     }
 }
 
-/// Part of the entries between different nodes that is outside of multiples of I, of bodies of other elements than
-/// solids outside of those and of multiples of d d' with d along the line between the nodes, as bars have them.
+/// Returns the part of the entries between different nodes outside of multiples of I. For bodies with
+/// elements other than solids, multiples of d d' with d along the line between the nodes, as for bars, are
+/// excluded as well.
 fn directed_share(model: &FeModel, matrix: &SymmetricMatrix, solid: bool) -> f64 {
     let d = model.dimension();
     let positions = &model.nodes().positions;
@@ -169,7 +173,7 @@ fn directed_share(model: &FeModel, matrix: &SymmetricMatrix, solid: bool) -> f64
     if all > 0.0 { directed / all } else { 0.0 }
 }
 
-/// Blocks of K_geo between node `i` and the others, zero outside of the plane.
+/// Returns the blocks of K_geo between node `i` and the others, zero out of the plane.
 fn blocks_of(matrix: &SymmetricMatrix, d: usize, i: usize) -> Vec<(usize, Matrix3<f64>)> {
     let mut entries: Vec<(usize, usize, usize, f64)> = Vec::new();
     for axis in 0..d {
@@ -186,7 +190,8 @@ fn blocks_of(matrix: &SymmetricMatrix, d: usize, i: usize) -> Vec<(usize, Matrix
     entries.chunk_by(|a, b| a.0 == b.0).map(block).collect()
 }
 
-/// The part of a block outside of multiples of I in d dimensions and, with a unit vector `line`, of its square.
+/// Returns the part of a block outside of multiples of I in d dimensions and, with a unit vector `line`, of
+/// multiples of line line'.
 fn outside(block: &Matrix3<f64>, d: usize, line: Option<Vector3<f64>>) -> Matrix3<f64> {
     let part = 1.0 / d as f64;
     let unit = Matrix3::from_diagonal(&Vector3::from_fn(|k, _| if k < d { 1.0 } else { 0.0 }));

@@ -1,9 +1,9 @@
-//! Fewer triangles for the same surface.
+//! Decimation: fewer triangles for a given surface.
 //!
-//! One node after the other moves onto a neighbour, the one first whose move changes the surface least, after
-//! Garland and Heckbert, "Surface simplification using quadric error metrics" (1997), with one addition: the
-//! error also counts the way that a node moves. On a flat plate planes alone would leave two triangles, which
-//! cannot show how it bends; with the way, triangles keep about the same size.
+//! One node after the other moves onto a neighbour, first the node whose move changes the surface least,
+//! after Garland and Heckbert, "Surface simplification using quadric error metrics" (1997), with one
+//! addition: the error also counts the distance that a node moves. On a flat plate the planes alone would
+//! leave two triangles, which cannot show its bending; with the distance, triangles keep about equal sizes.
 
 use super::SurfaceMesh;
 use super::features::normal;
@@ -12,19 +12,19 @@ use nalgebra::Vector3;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashMap};
 
-/// Squared way of a node beside its squared distance from the planes of its triangles. Up to triangles of
-/// eight tenths of the radius of curvature the way decides.
+/// Weight of the squared distance that a node moves, relative to its squared distance from the planes of
+/// its triangles. Up to triangles of eight tenths of the radius of curvature the moved distance dominates.
 const WAY: f64 = 0.01;
 
 /// Weight of the planes that hold feature edges in place.
 const FEATURE: f64 = 10.0;
 
-/// A triangle may turn up to this cosine in one move.
+/// Cosine of the largest rotation of a triangle in one move.
 const TURNED: f64 = 0.2;
 
 impl SurfaceMesh {
-    /// The mesh with `most` triangles at the most, on some of its nodes, whose positions are `positions`.
-    /// Edges follow the nodes that they end at. The same input gives the same mesh.
+    /// Returns the mesh with at most `most` triangles, on some of its nodes, whose positions are
+    /// `positions`. Edges follow the nodes at their ends. Equal input gives equal meshes.
     ///
     /// # Panics
     /// When there are fewer positions than [`least_nodes`](Self::least_nodes).
@@ -34,34 +34,34 @@ impl SurfaceMesh {
         }
         let mut decimation = Decimation::new(self, positions);
         decimation.run(most, true);
-        // Small parts and rims stand in the way of the last moves: then the form is given up.
+        // Small parts and rims may block the last moves: then allow moves that change the form.
         decimation.run(most, false);
         decimation.mesh(self)
     }
 }
 
-/// A mesh that loses nodes. Nodes are numbered among themselves here.
+/// Mesh under decimation, with its own numbering of nodes.
 struct Decimation {
     /// Index of each node in the body.
     nodes: Vec<u32>,
     index: HashMap<u32, u32>,
     positions: Vec<[f64; 3]>,
-    /// Corners of each triangle; equal ones where it is gone.
+    /// Corners of each triangle; two equal corners mark a removed one.
     triangles: Vec<[u32; 3]>,
     alive: usize,
-    /// Triangles at each node, gone ones among them.
+    /// Triangles at each node, including removed ones.
     at_node: Vec<Vec<u32>>,
     /// Neighbours of each node along feature edges.
     features: Vec<Vec<u32>>,
     error: Vec<Quadric>,
-    /// How often the error of each node has changed.
+    /// Number of changes of the error of each node.
     changes: Vec<u32>,
-    /// Where each node has gone: itself while it is there.
+    /// Node that each node moved onto; itself if it did not move.
     gone_to: Vec<u32>,
 }
 
-/// A move of the first node onto the second, by its error (the bits of a number that is not negative are in
-/// its order) and the changes that the error knows of.
+/// Move of the first node onto the second, ordered by its error (the bits of a non-negative number sort
+/// like the number), with the numbers of changes that the error includes.
 type Move = Reverse<(u64, [u32; 2], [u32; 2])>;
 
 impl Decimation {
@@ -100,8 +100,8 @@ impl Decimation {
         self.positions[node as usize].into()
     }
 
-    /// The errors of all nodes: distances from the planes of their triangles, from planes across those at
-    /// feature edges, and from their places, by the areas around them.
+    /// Measures the errors of all nodes: distances from the planes of their triangles, from planes across
+    /// these at feature edges, and from their positions, weighted by the areas around them.
     fn measure(&mut self) {
         for t in 0..self.triangles.len() {
             let corners = self.triangles[t];
@@ -125,8 +125,8 @@ impl Decimation {
         }
     }
 
-    /// Moves nodes until `most` triangles are left, or no move is left; with `form` only such that keep the
-    /// form.
+    /// Moves nodes until `most` triangles are left, or no move is possible; with `form` only moves that
+    /// preserve the form.
     fn run(&mut self, most: usize, form: bool) {
         let mut moves = BinaryHeap::new();
         if self.alive > most {
@@ -157,13 +157,13 @@ impl Decimation {
         }
     }
 
-    /// Triangles at a node.
+    /// Returns the triangles at a node.
     fn around(&self, node: u32) -> impl Iterator<Item = [u32; 3]> {
         let all = self.at_node[node as usize].iter().map(|&t| self.triangles[t as usize]);
         all.filter(move |corners| corners.contains(&node) && corners[0] != corners[1])
     }
 
-    /// Nodes that share a triangle with a node, ascending.
+    /// Returns the nodes that share a triangle with a node, ascending.
     fn neighbours(&self, node: u32) -> Vec<u32> {
         let mut found: Vec<u32> = self.around(node).flatten().filter(|&other| other != node).collect();
         found.sort_unstable();
@@ -171,7 +171,7 @@ impl Decimation {
         found
     }
 
-    /// Whether a move leaves feature edges where they are, folds nothing and joins nothing that was apart.
+    /// Returns true if a move preserves feature edges, folds nothing and joins nothing that was separate.
     fn keeps_form(&self, from: u32, to: u32) -> bool {
         let features = &self.features[from as usize];
         let along_feature = features.len() == 2 && features.contains(&to);
@@ -190,6 +190,7 @@ impl Decimation {
 
     fn collapse(&mut self, from: u32, to: u32) {
         let moved = std::mem::take(&mut self.at_node[from as usize]);
+        // Remove the triangles that contain both nodes; the others move to `to`.
         for t in moved {
             let corners = &mut self.triangles[t as usize];
             if !corners.contains(&from) {
@@ -203,6 +204,7 @@ impl Decimation {
                 self.at_node[to as usize].push(t);
             }
         }
+        // Feature edges follow the node.
         for other in std::mem::take(&mut self.features[from as usize]) {
             let of_other = &mut self.features[other as usize];
             of_other.retain(|node| *node != from && *node != to);
@@ -212,13 +214,14 @@ impl Decimation {
                 self.features[to as usize].push(other);
             }
         }
+        // The error accumulates; moves that were rated before are outdated.
         let error = self.error[from as usize];
         self.error[to as usize] += error;
         self.changes[to as usize] += 1;
         self.gone_to[from as usize] = to;
     }
 
-    /// What is left, by the nodes of the body.
+    /// Returns the remaining mesh, by the nodes of the body.
     fn mesh(&self, before: &SurfaceMesh) -> Option<SurfaceMesh> {
         let there = |node: u32| {
             let Some(&own) = self.index.get(&node) else { return node };
@@ -245,7 +248,7 @@ mod tests {
     use crate::elements::{ElementShape, Elements};
     use crate::{Nodes, skin};
 
-    /// A box of n x n x n bricks with sides of length 1.
+    /// Returns a box of n x n x n bricks with sides of length 1.
     fn cube(n: usize) -> (SurfaceMesh, Nodes) {
         let node = |i: usize, j: usize, k: usize| ((i * (n + 1) + j) * (n + 1) + k) as i64;
         let mut elements = Elements::default();
@@ -268,7 +271,7 @@ mod tests {
         mesh.triangles().iter().map(|&[a, b, c]| x(a).dot(&x(b).cross(&x(c))) / 6.0).sum()
     }
 
-    /// A cube stays a cube of the same volume, with triangles of about one size.
+    /// A cube stays a cube of equal volume, with triangles of about equal size.
     #[test]
     fn a_cube_keeps_its_form() {
         let (mesh, nodes) = cube(10);
@@ -286,7 +289,7 @@ mod tests {
         assert_eq!(Some(fewer), mesh.decimated(&nodes.positions, 300));
     }
 
-    /// However few triangles are wanted, there are no more.
+    /// The number of triangles never exceeds the limit.
     #[test]
     fn the_number_is_kept_to() {
         let (mesh, nodes) = cube(3);

@@ -1,14 +1,14 @@
-//! Edges that show the form of a surface.
+//! Feature edges that show the form of a surface.
 
 use nalgebra::Vector3;
 
-/// Surfaces that meet at more than this angle have an edge between them, in degrees.
+/// Angle between two surfaces, in degrees, above which there is an edge between them.
 const SHARP: f64 = 30.0;
 
-/// A side of a triangle that is an edge of its element.
+/// Side of a triangle that is an edge of its element.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Side {
-    /// From node to node, as the triangle runs.
+    /// Nodes of the side, in the direction of the triangle.
     pub step: [u32; 2],
     pub triangle: u32,
 }
@@ -20,8 +20,8 @@ impl Side {
     }
 }
 
-/// The sides where triangles meet at an angle, where more than two of them meet, and where the surface ends;
-/// ascending.
+/// Returns the sides where triangles meet at an angle, where more than two of them meet, and where the
+/// surface ends; ascending.
 pub(super) fn feature_edges(
     triangles: &[[u32; 3]],
     mut sides: Vec<Side>,
@@ -31,10 +31,10 @@ pub(super) fn feature_edges(
     sides.sort_by_key(|side| (side.key(), side.triangle));
     let is_feature = |sharing: &&[Side]| match sharing {
         [one, other] => {
-            // Where both run along the edge in the same direction, one of the shells is turned over.
+            // If both run along the edge in one direction, one of the shells is turned over.
             let turned = if one.step == other.step { -1.0 } else { 1.0 };
             let cosine = turned * normal(one).dot(&normal(other));
-            // Triangles without area have no normal, and no edge.
+            // Triangles without area have no normal, and no feature edge.
             cosine < SHARP.to_radians().cos()
                 && normal(one) != Vector3::zeros()
                 && normal(other) != Vector3::zeros()
@@ -45,7 +45,7 @@ pub(super) fn feature_edges(
     groups.filter(is_feature).map(|sharing| sharing[0].key()).collect()
 }
 
-/// Unit normal of a triangle; zero where it has no area.
+/// Returns the unit normal of a triangle; zero if it has no area.
 pub(super) fn normal([a, b, c]: [u32; 3], positions: &[[f64; 3]]) -> Vector3<f64> {
     let x = |i: u32| Vector3::from(positions[i as usize]);
     let cross = (x(b) - x(a)).cross(&(x(c) - x(a)));

@@ -1,8 +1,8 @@
-//! Sums of squared distances from planes and points, as a function of the place.
+//! Sums of squared distances from planes and points, as functions of the position.
 
 use nalgebra::{Matrix3, Vector3};
 
-/// x'Ax - 2 b'x + c.
+/// Quadratic function x'Ax - 2 b'x + c.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Quadric {
     a: Matrix3<f64>,
@@ -11,7 +11,8 @@ pub(super) struct Quadric {
 }
 
 impl Quadric {
-    /// `weight` times the squared distance from the plane through `point` with the unit normal `normal`.
+    /// Returns `weight` times the squared distance from the plane through `point` with the unit normal
+    /// `normal`.
     pub(super) fn plane(normal: Vector3<f64>, point: Vector3<f64>, weight: f64) -> Self {
         let distance = normal.dot(&point);
         Self {
@@ -21,12 +22,12 @@ impl Quadric {
         }
     }
 
-    /// `weight` times the squared distance from `point`.
+    /// Returns `weight` times the squared distance from `point`.
     pub(super) fn point(point: Vector3<f64>, weight: f64) -> Self {
         Self { a: Matrix3::identity() * weight, b: weight * point, c: weight * point.norm_squared() }
     }
 
-    /// The value at `x`, which rounding does not make negative.
+    /// Returns the value at `x`; negative rounding becomes zero.
     pub(super) fn at(&self, x: Vector3<f64>) -> f64 {
         (x.dot(&(self.a * x)) - 2.0 * self.b.dot(&x) + self.c).max(0.0)
     }

@@ -1,17 +1,17 @@
-//! A face of an element as the ring of its nodes, and the triangles that fill it.
+//! Ring of the nodes of a face, and its triangulation.
 
 use crate::elements::ElementShape;
 
-/// Nodes around a face by their indices: corners, with the middles of edges between them where there are any.
+/// Nodes around a face by their indices: corners, with mid-edge nodes between them, if any.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ring {
-    /// Index of the node, and whether it is a corner.
+    /// Index of the node, and true for a corner.
     nodes: Vec<(u32, bool)>,
 }
 
 impl Ring {
-    /// The ring of a face of an element. Elements of fewer corners that are written as larger ones have
-    /// nodes twice in a row, which count once; `None` where fewer than three corners are left.
+    /// Returns the ring of a face of an element. Elements with fewer corners written as larger ones have
+    /// repeated nodes, which count once; `None` if fewer than three corners are left.
     pub(super) fn of(shape: ElementShape, face: &[usize], nodes: &[u32]) -> Option<Self> {
         let mut ring: Vec<(u32, bool)> = Vec::with_capacity(2 * face.len());
         for (k, &corner) in face.iter().enumerate() {
@@ -20,7 +20,7 @@ impl Ring {
             let middle = shape.middle(corner, next).and_then(|at| nodes.get(at));
             ring.extend(middle.map(|&node| (node, false)));
         }
-        // Of the same node twice the corner stays.
+        // Of a repeated node the corner is kept.
         ring.dedup_by(|next, kept| {
             let same = next.0 == kept.0;
             kept.1 |= same && next.1;
@@ -35,8 +35,8 @@ impl Ring {
         (corners[2] != u32::MAX).then_some(ring)
     }
 
-    /// The corners, ascending, of which there are at most four; `u32::MAX` where there are fewer. Faces of
-    /// two elements that touch have the same, whether or not both have middles.
+    /// Returns the corners, ascending, at most four; `u32::MAX` fills missing ones. Faces of two elements
+    /// that touch have equal keys, with or without mid-edge nodes.
     pub(super) fn key(&self) -> [u32; 4] {
         let mut corners: Vec<u32> =
             self.nodes.iter().filter(|(_, corner)| *corner).map(|own| own.0).collect();
@@ -47,11 +47,11 @@ impl Ring {
         key
     }
 
-    /// Triangles with the same sense of rotation, and for each of their sides (from each corner to the next)
-    /// whether it lies on the ring.
+    /// Returns triangles with the orientation of the ring, and for each of their sides (from each corner to
+    /// the next) true if it lies on the ring.
     ///
-    /// A corner between two middles is cut off; what is left is a fan about a middle, or about the first
-    /// corner.
+    /// A corner between two mid-edge nodes is cut off; the remainder is a fan about a mid-edge node, or
+    /// about the first corner.
     pub(super) fn triangles(&self) -> Vec<([u32; 3], [bool; 3])> {
         let n = self.nodes.len();
         let mut found = Vec::new();
@@ -98,8 +98,8 @@ mod tests {
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 1, 2, 3]), Some(vec![[0, 1, 2], [0, 2, 3]]));
     }
 
-    /// A triangle that is written as a quadrilateral is one, with and without middles; one with two corners
-    /// is nothing.
+    /// A triangle written as a quadrilateral is a triangle, with and without mid-edge nodes; a face with
+    /// two corners is dropped.
     #[test]
     fn collapsed_faces_have_fewer_corners() {
         assert_eq!(triangles(ElementShape::Quadrilateral, &[0, 1, 2, 2]), Some(vec![[0, 1, 2]]));

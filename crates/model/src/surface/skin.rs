@@ -1,4 +1,4 @@
-//! The surface of elements: faces of solids that belong to one of them only, shells as they are, beams as
+//! Surface of elements: faces of solids that belong to one element only, shells as they are, beams as
 //! lines.
 
 use super::SurfaceMesh;
@@ -8,17 +8,17 @@ use crate::Nodes;
 use crate::elements::{ElementShape, Elements};
 use std::collections::{HashMap, HashSet};
 
-/// The surface of elements, and how many of them are not in it because the model lacks nodes of theirs.
+/// Surface of elements, and the number of elements left out because the model lacks some of their nodes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Skin {
-    /// The surface; `None` where no element can be drawn.
+    /// Surface; `None` if no element can be drawn.
     pub mesh: Option<SurfaceMesh>,
-    /// Elements with nodes that are not in the table.
+    /// Number of elements with nodes that are not in the table.
     pub without_nodes: usize,
 }
 
-/// The surface of `elements` on the nodes of a table, by the indices there. Shells and lines that lie on a
-/// solid, as meshers write the surfaces and curves of a volume, are not drawn twice.
+/// Returns the surface of `elements` on the nodes of a table, by their indices there. Shells and lines on
+/// the surface of a solid, which meshers write for surfaces and curves of a volume, are not drawn twice.
 pub fn skin(elements: &Elements, nodes: &Nodes) -> Skin {
     let index: HashMap<i64, u32> = nodes.ids.iter().zip(0..).map(|(&id, i)| (id, i)).collect();
     let (mut placed, mut without_nodes) = (Placed::default(), 0);
@@ -53,11 +53,11 @@ struct Placed {
     nodes: Vec<u32>,
 }
 
-/// A face of an element, by its corners.
+/// Face of an element, by its corners.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Face {
     key: [u32; 4],
-    /// First of the nodes of its element.
+    /// Start of the nodes of its element.
     start: usize,
     shape: ElementShape,
     face: u8,
@@ -69,7 +69,7 @@ impl Placed {
         starts.zip(&self.ends).map(|(start, &(shape, end))| (shape, start, &self.nodes[start..end]))
     }
 
-    /// Faces of elements of volume, or of all others, by their corners.
+    /// Returns the faces of solid elements, or of all others, sorted by their corners.
     fn faces(&self, solid: bool) -> Vec<Face> {
         let mut faces = Vec::new();
         for (shape, start, nodes) in self.iter().filter(|(shape, ..)| shape.is_solid() == solid) {
@@ -82,8 +82,8 @@ impl Placed {
         faces
     }
 
-    /// Faces of solids that no second one has, and shells that are no face of a solid; in the order of the
-    /// elements.
+    /// Returns the faces of solids that occur once, and shells that are no face of a solid, in the order of
+    /// the elements.
     fn outer_faces(&self) -> Vec<Ring> {
         let solids = self.faces(true);
         let mut outer: Vec<Face> =
@@ -101,7 +101,7 @@ impl Placed {
         outer.into_iter().filter_map(ring).collect()
     }
 
-    /// Lines between nodes that are no edge of another element, each once.
+    /// Returns the lines between nodes that are no edge of another element, each once.
     fn free_lines(&self) -> Vec<[u32; 2]> {
         let ordered = |a: u32, b: u32| [a.min(b), a.max(b)];
         let is_line = |shape: &ElementShape| *shape == ElementShape::Line;
@@ -123,7 +123,7 @@ impl Placed {
         }
         let mut found = Vec::new();
         for (nodes, ends) in lines {
-            // The second of two lines between the same nodes finds nothing any more.
+            // The second of two lines between the same nodes is skipped here.
             if !wanted.remove(&ends) {
                 continue;
             }
@@ -141,7 +141,8 @@ impl Placed {
 mod tests {
     use super::*;
 
-    /// A bar of n bricks along x, with the quadrilaterals and lines that a mesher writes for its end at x = 0.
+    /// Returns a bar of n bricks along x, with the quadrilaterals and lines that a mesher writes for its
+    /// end at x = 0.
     fn bar(n: usize) -> (Elements, Nodes) {
         let mut elements = Elements::default();
         let node = |i: usize, k: usize| (1 + 4 * i + k) as i64;

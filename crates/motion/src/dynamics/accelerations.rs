@@ -1,4 +1,4 @@
-//! Accelerations from forces, and velocities from momenta: what Mc(q) solves.
+//! Accelerations from forces, and velocities from momenta: solutions with Mc(q).
 
 use super::Evaluation;
 use super::kernels::{add_scaled, dot};
@@ -6,17 +6,18 @@ use super::prescribed::{NotPositiveDefinite, Prescribed};
 use nalgebra::{Vector3, Vector6};
 
 impl Evaluation<'_> {
-    /// nu' from Mc(q) nu' = applied - h_nu - (0, 0, K_ff q + D qd).
+    /// Computes nu' from Mc(q) nu' = applied - h_nu - (0, 0, K_ff q + D qd).
     ///
-    /// `applied` are the generalised forces (F, tau, Q) other than elastic and damping forces; V' is the rate
-    /// of the components in body axes, so that R'' = A (V' + omega x V). Block elimination: with m_ff = L L'
-    /// and Y = L^-1 \[C1' C(q)'\] the rigid motions are left with Mc_rr - Y'Y, 6 x 6 (of a plane body 3 x 3).
+    /// `applied` are the generalised forces (F, tau, Q) without elastic and damping forces. V' is the rate
+    /// of the components in body axes, so that R'' = A (V' + omega x V). Block elimination: with m_ff = L
+    /// L' and Y = L^-1 \[C1' C(q)'\] the rigid motions remain with Mc_rr - Y'Y, 6 x 6 (for a plane body 3 x
+    /// 3).
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`]; `acceleration` is then without meaning.
+    /// [`NotPositiveDefinite`]; `acceleration` then has no meaning.
     ///
     /// # Panics
-    /// When a length is not 6 + nf (of a plane body 3 + nf).
+    /// When a length is not 6 + nf (for a plane body 3 + nf).
     pub fn accelerations(
         &mut self,
         applied: &[f64],
@@ -25,14 +26,15 @@ impl Evaluation<'_> {
         self.prescribed_accelerations(applied, &Prescribed::NOTHING, acceleration)
     }
 
-    /// [`Evaluation::accelerations`] where V' or omega' are given: the forces of `applied` that belong to
-    /// them are not read. [`Evaluation::balance`] of the result has the forces that such motion takes.
+    /// Computes nu' as [`Evaluation::accelerations`] does, with prescribed components of V' or omega'. The
+    /// forces of `applied` along these components are not read. [`Evaluation::balance`] of the result
+    /// contains the forces of the prescribed motion.
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`Evaluation::accelerations`].
     ///
     /// # Panics
-    /// As there.
+    /// The panics of [`Evaluation::accelerations`].
     pub fn prescribed_accelerations(
         &mut self,
         applied: &[f64],
@@ -59,14 +61,14 @@ impl Evaluation<'_> {
         Ok(())
     }
 
-    /// Goes to the state with modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of
-    /// nu. At the cost of [`Evaluation::set`] and one solution with Mc.
+    /// Sets the state to modal coordinates `q` (nf) and momenta (p, h, pi) = Mc(q) nu, in the order of nu.
+    /// The cost is that of [`Evaluation::set`] and one solution with Mc.
     ///
-    /// * `prescribed`: V or omega that are given instead; the momenta that belong to them follow, and those
-    ///   of `momenta` are not read.
+    /// * `prescribed`: components of V or omega given instead of their momenta. The momenta along them
+    ///   follow, and those in `momenta` are not read.
     ///
     /// # Errors
-    /// [`NotPositiveDefinite`]; the state is then without meaning.
+    /// [`NotPositiveDefinite`]; the state then has no meaning.
     ///
     /// # Panics
     /// When the lengths are not those of the equations.
@@ -93,7 +95,8 @@ impl Evaluation<'_> {
             .ok_or(NotPositiveDefinite)
     }
 
-    /// Solves Mc(q) x = (linear, angular, `self.modal`): x of V and omega, that of the modes to `self.modal`.
+    /// Solves Mc(q) x = (linear, angular, `self.modal`): returns x of V and omega, and writes that of the
+    /// modes to `self.modal`.
     #[inline(always)] // compiled once per instruction set
     fn solve(
         &mut self,
@@ -118,7 +121,7 @@ impl Evaluation<'_> {
                 matrix[(j, i)] = matrix[(i, j)];
             }
         }
-        // Motions that are given, or that a plane body does not have.
+        // Replace the equations of motions that are prescribed, or that a plane body does not have.
         for i in 0..6 {
             let given = if body.rigid.contains(&i) { prescribed.entry(i) } else { Some(0.0) };
             let Some(value) = given else { continue };

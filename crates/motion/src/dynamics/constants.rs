@@ -1,4 +1,4 @@
-//! The constants of the equations as plain matrices, for files that other programs evaluate.
+//! Constants of the equations as plain matrices, for files that other programs evaluate.
 
 use super::EquationsOfMotion;
 use super::equations::{C1, C2, W0, W1};
@@ -6,33 +6,33 @@ use super::kernels::Panels;
 use super::modal_matrix::{ModalMass, ModalMatrix};
 use faer::Mat;
 
-/// What [`EquationsOfMotion`] evaluate, for the rigid motions that the body has: T translations (3, in the
+/// Constants of [`EquationsOfMotion`] for the rigid motions that the body has: T translations (3, in the
 /// plane 2) and A axes that it turns about (3, in the plane 1), with P pairs of axes xx, yy, zz, yz, xz, xy
-/// (in the plane zz). Matrices on top of each other are nf x nf.
+/// (in the plane zz). Stacked matrices are nf x nf each.
 pub struct Constants {
     /// (m, c, I0): 1 + T + P entries.
     pub rigid: Vec<f64>,
-    /// What is linear in q, a row each: W0 (translation by translation, T A rows), W1 (P rows, where it is
-    /// held), C1 (T), C2 (A).
+    /// Arrays linear in q, one row each: W0 (translation by translation, T A rows), W1 (P rows, if held),
+    /// C1 (T), C2 (A).
     pub linear: Mat<f64>,
-    /// E of each pair (6.7), less geometric stiffness for spin (7.4).
+    /// E of each pair (6.7), minus geometric stiffness for spin (7.4).
     pub w2: Option<Mat<f64>>,
     /// W3' of each axis, with geometric stiffness for angular acceleration.
     pub w3: Option<Mat<f64>>,
-    /// W3' - W3 of each axis; `None` where it is twice `w3`, the blocks being skew.
+    /// W3' - W3 of each axis; `None` if it is twice `w3` because the blocks are skew.
     pub w3_skew: Option<Mat<f64>>,
     /// Geometric stiffness for acceleration along each translation.
     pub acceleration: Option<Mat<f64>>,
-    /// m_ff and L of m_ff = L L'; `None`: the identity.
+    /// m_ff and L of m_ff = L L'; `None` for the identity.
     pub modal_mass: Option<(Mat<f64>, Option<Mat<f64>>)>,
-    /// K_ff: nf x nf, or nf x 1, its diagonal.
+    /// K_ff: full (nf x nf), or its diagonal (nf x 1).
     pub stiffness: Mat<f64>,
-    /// D, as `stiffness`; `None`: no damping.
+    /// D: full (nf x nf), or its diagonal (nf x 1); `None` without damping.
     pub damping: Option<Mat<f64>>,
 }
 
 impl EquationsOfMotion {
-    /// The constants.
+    /// Returns the constants.
     pub fn constants(&self) -> Constants {
         let (nf, translations) = (self.nf, self.translations());
         let has_w1 = self.terms().w1;

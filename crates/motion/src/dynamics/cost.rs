@@ -1,4 +1,4 @@
-//! What an evaluation of the equations of motion costs, counted.
+//! Number of multiplications in an evaluation of the equations of motion.
 
 use super::EquationsOfMotion;
 use super::equations::PAIRS;
@@ -6,13 +6,13 @@ use super::kernels::Panels;
 use super::modal_matrix::{ModalMass, ModalMatrix};
 
 impl EquationsOfMotion {
-    /// Multiplications of one evaluation: [`Evaluation::set`](super::Evaluation::set) and
-    /// [`Evaluation::accelerations`](super::Evaluation::accelerations), which is what one call of an explicit
-    /// integrator takes, here or in the momenta of a motion.
+    /// Returns the number of multiplications of one evaluation with
+    /// [`Evaluation::set`](super::Evaluation::set) and
+    /// [`Evaluation::accelerations`](super::Evaluation::accelerations): one call of an explicit integrator,
+    /// here or in the momenta of a motion.
     ///
-    /// Counted from the arrays that are there, as they lie in memory: rows that fill up a panel are
-    /// multiplied too. With nf modes, r rigid motions, a axes and p pairs of axes to turn about, and t axes
-    /// to move along:
+    /// Counted from the arrays in memory, including the rows that pad a panel. With nf modes, r rigid
+    /// motions, a axes and p pairs of axes to turn about, and t axes to move along:
     ///
     /// | what | multiplications |
     /// |---|---|
@@ -20,11 +20,11 @@ impl EquationsOfMotion {
     /// | W2 | rows nf + 3 p nf |
     /// | W3 | 2 rows nf + 2 a nf; skew blocks of their own: rows nf more |
     /// | geometric stiffness for acceleration | 2 rows nf + 5 t nf |
-    /// | elimination of the modes | (r (r + 1) / 2 + 2 r) nf, and r + 2 solutions with a triangle of m_ff that is no identity |
+    /// | elimination of the modes | (r (r + 1) / 2 + 2 r) nf, and r + 2 solutions with the factor of a full m_ff |
     /// | K_ff and D | 2 nf each, or nf (nf + 1) where they are full |
     ///
-    /// Not counted are some hundreds with 3-vectors and 6 x 6 matrices, whatever nf is, and the forces of the
-    /// surroundings.
+    /// Some hundred operations with 3-vectors and 6 x 6 matrices, independent of nf, and the forces of the
+    /// surroundings are not counted.
     pub fn multiplications(&self) -> usize {
         let (nf, r, a, t) = (self.nf, self.rigid.len(), self.axes.len(), self.translations());
         let panels = |panels: &Option<Panels>| panels.as_ref().map_or(0, |panels| panels.padded_rows() * nf);

@@ -1,4 +1,4 @@
-//! The constants of the equations of motion, laid out for their evaluation.
+//! Constants of the equations of motion, laid out for their evaluation.
 
 use super::Terms;
 use super::geometric::{Stiffening, stiffness_under};
@@ -10,24 +10,24 @@ use flexbody_body::invariants::Invariants;
 use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
 
-/// How far m_ff of mass-normalised modes may be from the identity by rounding.
+/// Largest deviation of m_ff from the identity that counts as rounding for mass-normalised modes.
 const MASS_ROUNDING: f64 = 1e-12;
 
-/// How large the entries of K_ff and D beside the diagonal may be by rounding, relative to sqrt(a_ii a_jj):
-/// products with K of modes of very different stiffness.
+/// Largest off-diagonal entry of K_ff and D, relative to sqrt(a_ii a_jj), that counts as rounding of
+/// products with K for modes of very different stiffness.
 const STIFFNESS_ROUNDING: f64 = 1e-10;
 
-/// Entries of a symmetric 3x3 matrix, in the order of all arrays of such here.
+/// Order of the entries of a symmetric 3x3 matrix in all arrays here.
 pub(super) const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)];
 
-/// Rows of [`EquationsOfMotion::linear`].
+/// First rows of W0, W1, C1 and C2 in [`EquationsOfMotion::linear`], and their total.
 pub(super) const W0: usize = 0;
 pub(super) const W1: usize = 9;
 pub(super) const C1: usize = 15;
 pub(super) const C2: usize = 18;
 pub(super) const LINEAR: usize = 21;
 
-/// The equations of motion of one flexible body in constant invariants (theory section 6, which is section 3
+/// Equations of motion of one flexible body in constant invariants (theory section 6, which is section 3
 /// for solids).
 ///
 /// ```text
@@ -35,15 +35,16 @@ pub(super) const LINEAR: usize = 21;
 /// ```
 ///
 /// V is the velocity of the origin of the body frame, omega the angular velocity of the frame, both in body
-/// axes; F, tau (about the origin) and Q are the generalised forces that do the power F'V + tau'omega + Q'qd.
-/// With 6 + nf entries in this order, of a plane body 3 + nf: V_x, V_y, omega_z, qd. Units are those of the
-/// body: length/time, 1/time and, q being the amplitudes of mass-normalised modes, mass^(1/2) length/time.
+/// axes. F, tau (about the origin) and Q are the generalised forces with the power F'V + tau'omega + Q'qd.
+/// Vectors have 6 + nf entries in this order, for a plane body 3 + nf: V_x, V_y, omega_z, qd. Units are
+/// those of the body: length/time, 1/time and, since q are the amplitudes of mass-normalised modes,
+/// mass^(1/2) length/time.
 ///
-/// [`Evaluation`](super::Evaluation) computes with them. The equations hold for the mass matrices of solids
+/// [`Evaluation`](super::Evaluation) evaluates the equations, which hold for the mass matrices of solids
 /// and for general ones. Geometric stiffness of the body (theory 7.3) for spin, acceleration and angular
-/// acceleration is part of the kinetic energy: it belongs to motion of second order in q that adds q'K^a_k q
-/// / 2 to the first moment, q'K^alpha_k to row k of C(q), and takes q'K^omega(omega) q / 2 from T (theory
-/// 7.4).
+/// acceleration is part of the kinetic energy. It belongs to motion of second order in q, which adds
+/// q'K^a_k q / 2 to the first moment and q'K^alpha_k to row k of C(q), and subtracts q'K^omega(omega) q / 2
+/// from T (theory 7.4).
 ///
 /// ```
 /// # fn check(body: &flexbody_body::flex_body::FlexBody) {
@@ -58,26 +59,26 @@ pub(super) const LINEAR: usize = 21;
 /// ```
 #[derive(Debug, Clone)]
 pub struct EquationsOfMotion {
-    /// Rows of rigid motion that there are: indices into (V, omega).
+    /// Existing rigid motions, as indices into (V, omega).
     pub(super) rigid: &'static [usize],
     /// Axes that the body turns about.
     pub(super) axes: &'static [usize],
-    /// [`PAIRS`] of these axes.
+    /// Entries of [`PAIRS`] for these axes.
     pub(super) pairs: &'static [(usize, usize)],
     pub(super) nf: usize,
     pub(super) mass: f64,
     pub(super) first_moment: Vector3<f64>,
     pub(super) inertia: Matrix3<f64>,
-    /// What is linear in q ([`LINEAR`] x nf, row-major): W0 (row 3 k + b), W1 ([`PAIRS`]), C1, C2.
+    /// Arrays linear in q ([`LINEAR`] x nf, row-major): W0 (row 3 k + b), W1 ([`PAIRS`]), C1, C2.
     pub(super) linear: Vec<f64>,
-    /// The same matrix, laid out for products.
+    /// Matrix `linear` in a layout for products.
     pub(super) linear_panels: Panels,
-    /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`, less geometric stiffness for spin: T sees no more of
-    /// W2.
+    /// E_ab = (W2_ab + W2_ab') / 2 for each of `pairs`, minus geometric stiffness for spin: T depends only
+    /// on this part of W2.
     pub(super) w2: Option<Panels>,
     /// W3_a' for each of `axes`, with geometric stiffness for angular acceleration.
     pub(super) w3: Option<Panels>,
-    /// W3_a' - W3_a where that is not 2 W3_a', the blocks not being skew.
+    /// W3_a' - W3_a, if it is not 2 W3_a' because the blocks are not skew.
     pub(super) w3_skew: Option<Panels>,
     /// Geometric stiffness for acceleration along each axis that the body moves along.
     pub(super) accelerated: Option<Panels>,
@@ -88,11 +89,11 @@ pub struct EquationsOfMotion {
 }
 
 impl EquationsOfMotion {
-    /// The equations of `body` with those of the given terms that it holds.
+    /// Creates the equations of `body` with those of the given terms that the body holds.
     ///
-    /// Taken as they are meant: m_ff that is the identity to 1e-12 (with arrays of 32-bit floats to their
-    /// rounding) is the identity; K_ff and D whose entries beside the diagonal are below 1e-10 of sqrt(a_ii
-    /// a_jj) are diagonal. D is the body's modal damping or, where it has none, diag(2 zeta_j omega_j).
+    /// Rounding is removed: m_ff within 1e-12 of the identity (for arrays of 32-bit floats within their
+    /// rounding) becomes the identity; K_ff and D with off-diagonal entries below 1e-10 of sqrt(a_ii a_jj)
+    /// become diagonal. D is the modal damping of the body or, if there is none, diag(2 zeta_j omega_j).
     pub fn new(body: &FlexBody, terms: Terms) -> Self {
         let parts = EquationParts::new(body, terms);
         let (invariants, nf) = (parts.invariants, parts.nf);
@@ -122,40 +123,40 @@ impl EquationsOfMotion {
         }
     }
 
-    /// Number of modes nf.
+    /// Returns the number of modes nf.
     pub fn n_modes(&self) -> usize {
         self.nf
     }
 
-    /// Number of rigid motions: 6, of a plane body 3.
+    /// Returns the number of rigid motions: 6, for a plane body 3.
     pub fn n_rigid(&self) -> usize {
         self.rigid.len()
     }
 
-    /// Number of velocities in nu: 6 + nf, of a plane body 3 + nf.
+    /// Returns the number of velocities in nu: 6 + nf, for a plane body 3 + nf.
     pub fn n_velocities(&self) -> usize {
         self.rigid.len() + self.nf
     }
 
-    /// Elastic energy q'K_ff q / 2.
+    /// Returns the elastic energy q'K_ff q / 2.
     ///
     /// # Panics
-    /// When `q` has another number of entries than there are modes.
+    /// When the length of `q` is not the number of modes.
     pub fn elastic_energy(&self, q: &[f64]) -> f64 {
         0.5 * self.stiffness.quadratic(q)
     }
 
-    /// The terms that are there.
+    /// Returns the terms that the equations contain.
     pub fn terms(&self) -> Terms {
         self.terms
     }
 
-    /// Row of `linear`.
+    /// Returns a row of `linear`.
     pub(super) fn row(&self, row: usize) -> &[f64] {
         &self.linear[row * self.nf..][..self.nf]
     }
 
-    /// V, omega and the modes of a vector in the order of nu.
+    /// Returns V, omega and the modal part of a vector in the order of nu.
     pub(crate) fn split<'v>(&self, nu: &'v [f64]) -> (Vector3<f64>, Vector3<f64>, &'v [f64]) {
         assert_eq!(nu.len(), self.n_velocities(), "one entry per rigid motion and mode");
         let (rigid, modal) = nu.split_at(self.rigid.len());
@@ -167,43 +168,43 @@ impl EquationsOfMotion {
         (velocity, omega, modal)
     }
 
-    /// Row `axis` of [C1(q); C(q)].
+    /// Returns row `axis` of [C1(q); C(q)].
     pub(super) fn coupling_row<'v>(&self, coupling: &'v [f64], axis: usize) -> &'v [f64] {
         &coupling[axis * self.nf..][..self.nf]
     }
 
-    /// Number of axes that the body moves along.
+    /// Returns the number of axes that the body moves along.
     pub(super) fn translations(&self) -> usize {
         if self.rigid.len() == 3 { 2 } else { 3 }
     }
 
-    /// y += factor (K_ff q + D qd).
+    /// Computes y += factor (K_ff q + D qd).
     #[inline(always)]
     pub(super) fn add_internal(&self, factor: f64, q: &[f64], qd: &[f64], y: &mut [f64]) {
         self.stiffness.add_product(factor, q, y);
         self.damping.add_product(factor, qd, y);
     }
 
-    /// Stiffness and damping of mode `j` alone, where the modes are mass-normalised.
+    /// Returns stiffness and damping of mode `j`, if the modes are mass-normalised.
     pub(super) fn oscillator(&self, j: usize) -> Option<(f64, f64)> {
         matches!(self.modal_mass, ModalMass::Identity)
             .then(|| (self.stiffness.get(j, j), self.damping.get(j, j)))
     }
 
-    /// qd'D qd: the power that damping takes.
+    /// Returns qd'D qd, the power dissipated by damping.
     pub(super) fn dissipation(&self, qd: &[f64]) -> f64 {
         self.damping.quadratic(qd)
     }
 
-    /// Entries of a force and a torque that belong to rigid motions of the body.
+    /// Writes the entries of a force and a torque that belong to rigid motions of the body.
     pub(super) fn put_rigid(&self, force: Vector3<f64>, torque: Vector3<f64>, rigid: &mut [f64]) {
         let at = |axis: usize| if axis < 3 { force[axis] } else { torque[axis - 3] };
         rigid.iter_mut().zip(self.rigid).for_each(|(entry, &axis)| *entry = at(axis));
     }
 }
 
-/// What the constants of the equations are made of: the body, the terms that it holds and that are wanted,
-/// and the axes of its motion.
+/// Inputs for the constants of the equations: the body, the requested terms that it holds, and the axes of
+/// its motion.
 struct EquationParts<'b> {
     body: &'b FlexBody,
     invariants: &'b Invariants,
@@ -245,7 +246,7 @@ impl<'b> EquationParts<'b> {
         })
     }
 
-    /// The rows of [`EquationsOfMotion::linear`].
+    /// Returns the rows of [`EquationsOfMotion::linear`].
     fn linear(&self) -> Vec<f64> {
         let (invariants, nf) = (self.invariants, self.nf);
         let (w0, c2) = (invariants.w0(), invariants.c2());
@@ -266,7 +267,7 @@ impl<'b> EquationParts<'b> {
         (0..LINEAR * nf).map(|at| entry(at / nf, at % nf)).collect()
     }
 
-    /// The symmetric parts of W2, less geometric stiffness for spin.
+    /// Returns the symmetric parts of W2, minus geometric stiffness for spin.
     fn w2(&self) -> Option<Panels> {
         let nf = self.nf;
         let spin = self.geometric(LoadKind::Spin);
@@ -279,13 +280,13 @@ impl<'b> EquationParts<'b> {
                     .map_or(0.0, |w2| 0.5 * (w2[(a * nf + i, b * nf + j)] + w2[(a * nf + j, b * nf + i)]));
                 let component = LoadKind::SPIN.iter().position(|&axes| axes == (a, b));
                 let taken = spin.as_ref().zip(component).map_or(0.0, |(spin, c)| spin(c, i, j));
-                // w'E w has both orders of a pair, the load one.
+                // w'E w contains both orders of a pair of axes, the load only one.
                 own - if a == b { taken } else { 0.5 * taken }
             })
         })
     }
 
-    /// W3', with geometric stiffness for angular acceleration; and W3' - W3 where that is not twice W3'.
+    /// Returns W3' with geometric stiffness for angular acceleration, and W3' - W3 if it is not twice W3'.
     fn w3(&self) -> (Option<Panels>, Option<Panels>) {
         let (nf, axes) = (self.nf, self.axes);
         let turned = self.geometric(LoadKind::AngularAcceleration);
@@ -301,7 +302,7 @@ impl<'b> EquationParts<'b> {
         let general = self.invariants.general().is_some();
         let transposed = self.stacked(axes.len(), &|at, i, j| {
             let (own, mirrored) = entries(at, i, j);
-            // Of a solid the blocks are skew: what is left of W3 + W3' is rounding.
+            // The blocks of a solid are skew: W3 + W3' is rounding.
             let w3 = if general { mirrored } else { 0.5 * (mirrored - own) };
             w3 + turned.as_ref().map_or(0.0, |turned| turned(axes[at], i, j))
         });
@@ -312,7 +313,7 @@ impl<'b> EquationParts<'b> {
         (Some(transposed), (general || turned.is_some()).then(|| self.stacked(axes.len(), &skew)))
     }
 
-    /// Geometric stiffness for acceleration.
+    /// Returns the geometric stiffness for acceleration.
     fn accelerated(&self) -> Option<Panels> {
         let along = self.geometric(LoadKind::Acceleration)?;
         Some(self.stacked(if self.body.dimension() == 2 { 2 } else { 3 }, &along))
@@ -323,7 +324,7 @@ impl<'b> EquationParts<'b> {
         stiffness_under(self.body, &kind, which)
     }
 
-    /// `count` square matrices on top of each other, with the entries (matrix, i, j).
+    /// Returns `count` square matrices stacked vertically, with the entries (matrix, i, j).
     fn stacked(&self, count: usize, entry: &dyn Fn(usize, usize, usize) -> f64) -> Panels {
         let block = |at| Mat::from_fn(self.nf, self.nf, |i, j| entry(at, i, j));
         Panels::stacked(&(0..count).map(block).collect::<Vec<_>>())

@@ -1,4 +1,4 @@
-//! The equations of motion at one state.
+//! Evaluation of the equations of motion at one state.
 
 use super::EquationsOfMotion;
 use super::equations::{C1, LINEAR, PAIRS, W0, W1};
@@ -8,11 +8,11 @@ use pulp::Arch;
 
 const _: () = assert!(LINEAR <= WIDTH, "what is linear in q is one panel");
 
-/// The equations of motion at one state, and the memory to evaluate them: nothing is allocated after
+/// Equations of motion at one state, with all memory for their evaluation: nothing is allocated after
 /// [`Evaluation::new`].
 ///
-/// [`Evaluation::set`] takes the state; everything else refers to the last one. Before the first it is rest,
-/// undeformed. Vectors with 6 + nf entries (of a plane body 3 + nf) are in the order of
+/// [`Evaluation::set`] sets the state; all other methods refer to the last state. The initial state is at
+/// rest and undeformed. Vectors with 6 + nf entries (for a plane body 3 + nf) are in the order of
 /// [`EquationsOfMotion`], in body axes about the origin of the body frame; matrices are row-major.
 #[derive(Debug, Clone)]
 pub struct Evaluation<'a> {
@@ -38,7 +38,7 @@ pub struct Evaluation<'a> {
     first_moment: Vector3<f64>,
     /// C1(q) qd.
     c1_qd: Vector3<f64>,
-    /// -c~ + W0 Q, c with what geometric stiffness adds: momentum per angular velocity.
+    /// -c~ + W0 Q, with the contribution of geometric stiffness to c: linear momentum per angular velocity.
     pub(super) lever: Matrix3<f64>,
     pub(super) lever_rate: Matrix3<f64>,
     inertia: Matrix3<f64>,
@@ -46,17 +46,17 @@ pub struct Evaluation<'a> {
     pub(super) momentum: Vector3<f64>,
     pub(super) angular_momentum: Vector3<f64>,
     pub(super) velocity_forces: Vec<f64>,
-    /// For [`Evaluation::accelerations`]: L^-1 [C1(q)' C(q)'] (6 x nf) and modal forces.
+    /// Work arrays of [`Evaluation::accelerations`]: L^-1 [C1(q)' C(q)'] (6 x nf) and modal forces.
     pub(super) whitened: Vec<f64>,
     pub(super) modal: Vec<f64>,
-    /// For [`Evaluation::jacobian`]: products with rates and accelerations.
+    /// Work arrays of [`Evaluation::jacobian`]: products with rates and accelerations.
     pub(super) w2_scratch: Vec<f64>,
     pub(super) w3_scratch: [Vec<f64>; 2],
     pub(super) accelerated_scratch: Vec<f64>,
 }
 
 impl<'a> Evaluation<'a> {
-    /// Memory for evaluations of `equations`, set to rest without deformation.
+    /// Creates an evaluation of `equations` at rest without deformation.
     pub fn new(equations: &'a EquationsOfMotion) -> Self {
         let nf = equations.nf;
         let zeros = |n: usize| vec![0.0; n];
@@ -97,9 +97,9 @@ impl<'a> Evaluation<'a> {
         evaluation
     }
 
-    /// Goes to the state with modal coordinates `q` (nf) and velocities `nu`.
+    /// Sets the state to modal coordinates `q` (nf) and velocities `nu`.
     ///
-    /// One pass over W2 and two over W3 (theory 6.2, 6.3):
+    /// Takes one pass over W2 and two over W3 (theory 6.2, 6.3):
     ///
     /// ```text
     /// (p, h, pi) = Mc(q) nu
@@ -127,6 +127,7 @@ impl<'a> Evaluation<'a> {
         let body = self.equations;
         let nf = body.nf;
         let q = &self.q[..];
+        // Terms linear in q: first moment, lever -c~ + W0 Q, and I0 + W1 Q.
         let mut linear_q = [0.0; WIDTH];
         body.linear_panels.times(q, &mut linear_q);
         self.first_moment = body.first_moment + Vector3::from_fn(|k, _| linear_q[C1 + k]);
@@ -135,12 +136,14 @@ impl<'a> Evaluation<'a> {
         for (pair, &axes) in PAIRS.iter().enumerate() {
             add_symmetric(&mut self.inertia, axes, linear_q[W1 + pair]);
         }
+        // I(q) += Q' W2 Q.
         if let Some(w2) = &body.w2 {
             w2.times(q, &mut self.w2_q);
             for (&pair, product) in body.pairs.iter().zip(self.w2_q.chunks_exact(nf)) {
                 add_symmetric(&mut self.inertia, pair, dot(q, product));
             }
         }
+        // C1(q) and C(q), with K^a q in the rows of C1 and W3' q in those of C.
         self.coupling.copy_from_slice(&body.linear[C1 * nf..]);
         if let Some(accelerated) = &body.accelerated {
             accelerated.times(q, &mut self.accelerated_q);
@@ -160,7 +163,7 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// Sets everything that depends on the velocities too, after [`Evaluation::deform`].
+    /// Sets everything that depends on the velocities as well; must follow [`Evaluation::deform`].
     #[inline(always)] // compiled once per instruction set
     pub(super) fn move_on(&mut self) {
         let c1_rate_qd = self.set_lever_and_inertia_rates();
@@ -170,17 +173,19 @@ impl<'a> Evaluation<'a> {
         self.set_modal_velocity_forces();
     }
 
-    /// C1 qd and the rates of lever and inertia; gives dC1/dt qd.
+    /// Sets C1 qd and the rates of lever and inertia; returns dC1/dt qd.
     #[inline(always)] // compiled once per instruction set
     fn set_lever_and_inertia_rates(&mut self) -> Vector3<f64> {
         let body = self.equations;
         let nf = body.nf;
         let qd = &self.qd[..];
+        // Rates of the terms linear in q.
         let mut linear_qd = [0.0; WIDTH];
         body.linear_panels.times(qd, &mut linear_qd);
         self.c1_qd = Vector3::from_fn(|k, _| linear_qd[C1 + k]);
         self.lever_rate = Matrix3::from_fn(|k, b| linear_qd[W0 + 3 * k + b]);
         let mut c1_rate_qd = Vector3::zeros();
+        // Geometric stiffness: rate q' K^a qd of the first moment, and qd' K^a qd.
         if let Some(accelerated) = &body.accelerated {
             accelerated.times(qd, &mut self.accelerated_qd);
             let mut rate = Vector3::zeros();
@@ -191,6 +196,7 @@ impl<'a> Evaluation<'a> {
             self.c1_qd += rate;
             self.lever_rate -= rate.cross_matrix();
         }
+        // Rate of I(q): W1 Qd + 2 Q' W2 Qd.
         self.inertia_rate = Matrix3::zeros();
         for (pair, &axes) in PAIRS.iter().enumerate() {
             add_symmetric(&mut self.inertia_rate, axes, linear_qd[W1 + pair]);
@@ -203,7 +209,7 @@ impl<'a> Evaluation<'a> {
         c1_rate_qd
     }
 
-    /// Products of W3 with qd; gives C(q) qd and dC/dt qd.
+    /// Sets the products of W3 with qd; returns C(q) qd and dC/dt qd.
     #[inline(always)] // compiled once per instruction set
     fn set_coupling_products(&mut self) -> (Vector3<f64>, Vector3<f64>) {
         let body = self.equations;
@@ -226,14 +232,14 @@ impl<'a> Evaluation<'a> {
         (coupling_qd, coupling_rate_qd)
     }
 
-    /// p and h.
+    /// Sets p and h.
     #[inline(always)] // compiled once per instruction set
     fn set_momenta_of_frame(&mut self, coupling_qd: &Vector3<f64>) {
         self.momentum = self.equations.mass * self.velocity + self.relative_momentum();
         self.angular_momentum = self.lever.tr_mul(&self.velocity) + self.inertia * self.omega + coupling_qd;
     }
 
-    /// The rigid entries of h_nu.
+    /// Sets the rigid entries of h_nu.
     #[inline(always)] // compiled once per instruction set
     fn set_rigid_velocity_forces(&mut self, c1_rate_qd: &Vector3<f64>, coupling_rate_qd: &Vector3<f64>) {
         let body = self.equations;
@@ -244,7 +250,7 @@ impl<'a> Evaluation<'a> {
         body.put_rigid(force, torque, &mut self.velocity_forces[..body.rigid.len()]);
     }
 
-    /// The modal entries of h_nu.
+    /// Sets the modal entries of h_nu.
     #[inline(always)] // compiled once per instruction set
     fn set_modal_velocity_forces(&mut self) {
         let body = self.equations;
@@ -278,48 +284,48 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// The equations.
+    /// Returns the equations.
     pub fn equations(&self) -> &'a EquationsOfMotion {
         self.equations
     }
 
-    /// s(q) = c + C1 q + q'K^a q / 2, first moment of the deformed body, with its geometric stiffness K^a for
-    /// acceleration. Unit: mass length.
+    /// Returns s(q) = c + C1 q + q'K^a q / 2, the first moment of the deformed body with its geometric
+    /// stiffness K^a for acceleration. Unit: mass length.
     pub fn first_moment(&self) -> Vector3<f64> {
         self.first_moment
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q, less q'K^omega q, inertia of the deformed body about the origin. Unit: mass
-    /// length^2.
+    /// Returns I(q) = I0 + W1 Q + Q'W2 Q, minus q'K^omega q: the inertia of the deformed body about the
+    /// origin. Unit: mass length^2.
     pub fn inertia(&self) -> Matrix3<f64> {
         self.inertia
     }
 
-    /// Linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q with what geometric
-    /// stiffness adds to c.
+    /// Returns the linear momentum p = m V + (-c~ + W0 Q) omega + C1(q) qd, body axes; -c~ + W0 Q includes
+    /// the contribution of geometric stiffness to c.
     pub fn linear_momentum(&self) -> Vector3<f64> {
         self.momentum
     }
 
-    /// Angular momentum about the origin of the body frame, h = (-c~ + W0 Q)'V + I(q) omega + C(q) qd, body
-    /// axes.
+    /// Returns the angular momentum about the origin of the body frame, h = (-c~ + W0 Q)'V + I(q) omega +
+    /// C(q) qd, body axes.
     pub fn angular_momentum(&self) -> Vector3<f64> {
         self.angular_momentum
     }
 
-    /// pi = C1(q)'V + C(q)'omega + m_ff qd (nf).
+    /// Computes pi = C1(q)'V + C(q)'omega + m_ff qd (nf).
     ///
     /// # Panics
-    /// When `pi` has not nf entries.
+    /// When the length of `pi` is not nf.
     pub fn modal_momentum(&self, pi: &mut [f64]) {
         assert_eq!(pi.len(), self.equations.nf, "one entry per mode");
         pi.fill(0.0);
         self.add_modal_inertia(&self.velocity, &self.omega, &self.qd, pi);
     }
 
-    /// T = nu' Mc(q) nu / 2.
+    /// Returns T = nu' Mc(q) nu / 2.
     pub fn kinetic_energy(&self) -> f64 {
-        // V'p + omega'h has the coupling to qd once.
+        // V'p + omega'h contains the coupling to qd once.
         let product = |axis: usize| dot(self.equations.coupling_row(&self.coupling, axis), &self.qd);
         let coupling: f64 =
             (0..3).map(|k| self.velocity[k] * product(k) + self.omega[k] * product(3 + k)).sum();
@@ -327,27 +333,27 @@ impl<'a> Evaluation<'a> {
         0.5 * (rigid + coupling + self.equations.modal_mass.quadratic(&self.qd))
     }
 
-    /// U = q' K_ff q / 2.
+    /// Returns U = q' K_ff q / 2.
     pub fn elastic_energy(&self) -> f64 {
         self.equations.elastic_energy(&self.q)
     }
 
-    /// V, omega: velocity of the origin and angular velocity of the body frame, body axes.
+    /// Returns V and omega: velocity of the origin and angular velocity of the body frame, body axes.
     pub fn rigid_velocity(&self) -> (Vector3<f64>, Vector3<f64>) {
         (self.velocity, self.omega)
     }
 
-    /// q (nf).
+    /// Returns q (nf).
     pub fn modal_coordinates(&self) -> &[f64] {
         &self.q
     }
 
-    /// qd (nf).
+    /// Returns qd (nf).
     pub fn modal_velocity(&self) -> &[f64] {
         &self.qd
     }
 
-    /// pi' = dT/dq - K_ff q - D qd + Q for modal forces `applied` = Q (nf).
+    /// Computes pi' = dT/dq - K_ff q - D qd + Q for modal forces `applied` = Q (nf).
     ///
     /// # Panics
     /// When a length is not nf.
@@ -359,7 +365,7 @@ impl<'a> Evaluation<'a> {
         {
             *rate = applied - h;
         }
-        // h_nu has the rates of C1(q)'V and C(q)'omega, which belong to pi'.
+        // h_nu contains the rates of C1(q)'V and C(q)'omega, which belong to pi': add them back.
         if body.accelerated.is_some() {
             let translations = self.accelerated_qd.chunks_exact(body.nf).take(body.translations());
             for (k, product) in translations.enumerate() {
@@ -374,21 +380,21 @@ impl<'a> Evaluation<'a> {
         body.add_internal(-1.0, &self.q, &self.qd, rate);
     }
 
-    /// p - m V = (-c~ + W0 Q) omega + C1 qd: linear momentum of the motion about the origin, body axes.
+    /// Returns p - m V = (-c~ + W0 Q) omega + C1 qd: the linear momentum of the motion relative to the
+    /// origin, body axes.
     pub fn relative_momentum(&self) -> Vector3<f64> {
         self.lever * self.omega + self.c1_qd
     }
 
-    /// h_nu: the forces that the inertia of the body takes without acceleration (6 + nf, or 3 + nf).
+    /// Returns h_nu, the inertia forces without acceleration (6 + nf, or 3 + nf).
     pub fn velocity_forces(&self) -> &[f64] {
         &self.velocity_forces
     }
 
-    /// The forces that have to be applied for the accelerations nu': Mc(q) nu' + h_nu + (0, 0, K_ff q + D
-    /// qd).
+    /// Computes the forces that cause the accelerations nu': Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd).
     ///
     /// # Panics
-    /// When a length is not 6 + nf (of a plane body 3 + nf).
+    /// When a length is not 6 + nf (for a plane body 3 + nf).
     pub fn balance(&self, acceleration: &[f64], forces: &mut [f64]) {
         let body = self.equations;
         let (linear, angular, modal) = body.split(acceleration);
@@ -407,10 +413,10 @@ impl<'a> Evaluation<'a> {
         body.add_internal(1.0, &self.q, &self.qd, flexible);
     }
 
-    /// Mc(q), (6 + nf) x (6 + nf), of a plane body (3 + nf) x (3 + nf), row-major (theory 6.2).
+    /// Computes Mc(q), (6 + nf) x (6 + nf), for a plane body (3 + nf) x (3 + nf), row-major (theory 6.2).
     ///
     /// # Panics
-    /// When `matrix` has not that many entries.
+    /// When `matrix` has another number of entries.
     pub fn mass_matrix(&self, matrix: &mut [f64]) {
         let body = self.equations;
         let (r, n) = (body.rigid.len(), body.n_velocities());
@@ -432,7 +438,7 @@ impl<'a> Evaluation<'a> {
         }
     }
 
-    /// The rows of Mc that belong to V and omega, without modes; zero where the body does not move.
+    /// Returns the block of Mc for V and omega; zero for motions that the body does not have.
     pub(super) fn rigid_mass(&self) -> Matrix6<f64> {
         let mut matrix = Matrix6::zeros();
         for &i in self.equations.rigid {
@@ -448,7 +454,7 @@ impl<'a> Evaluation<'a> {
         matrix
     }
 
-    /// y += C1(q)' linear + C(q)' angular + m_ff modal.
+    /// Computes y += C1(q)' linear + C(q)' angular + m_ff modal.
     fn add_modal_inertia(&self, linear: &Vector3<f64>, angular: &Vector3<f64>, modal: &[f64], y: &mut [f64]) {
         for k in 0..3 {
             add_scaled(linear[k], self.equations.coupling_row(&self.coupling, k), y);
@@ -457,7 +463,7 @@ impl<'a> Evaluation<'a> {
         self.equations.modal_mass.add_product(modal, y);
     }
 
-    /// What runs in the vector instructions of the machine.
+    /// Returns the dispatcher to the vector instructions of the machine.
     pub(super) fn arch(&self) -> Arch {
         self.arch
     }
@@ -471,7 +477,7 @@ pub(super) fn add_symmetric(matrix: &mut Matrix3<f64>, (a, b): (usize, usize), v
     }
 }
 
-/// w_a w_b, summed over both orders of a pair of different axes.
+/// Returns w_a w_b, summed over both orders of a pair of different axes.
 pub(super) fn spin_product(w: &Vector3<f64>, (a, b): (usize, usize)) -> f64 {
     if a == b { w[a] * w[a] } else { 2.0 * w[a] * w[b] }
 }

@@ -1,20 +1,20 @@
-//! Stiffness of inertia and geometric stiffness of a body, as the equations of motion take them.
+//! Stiffness of inertia and geometric stiffness of a body, in the form for the equations of motion.
 
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_model::LoadKind;
 
-/// Which stiffness of a body is meant.
+/// Selection of the stiffness of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stiffening {
-    /// That of inertia alone, which is a part of the kinetic energy.
+    /// Stiffness of inertia only, which is a part of the kinetic energy.
     OfInertia,
-    /// That of inertia and the geometric stiffness together.
+    /// Stiffness of inertia and geometric stiffness together.
     All,
 }
 
-/// Entries (component, i, j) of the stiffness for a kind of load, zero for components that are not given;
-/// `None` where none is.
+/// Returns the entries (component, i, j) of the stiffness for a kind of load, zero for components that are
+/// not given; `None` if no component is given.
 pub fn stiffness_under<'b>(
     body: &'b FlexBody,
     kind: &LoadKind,

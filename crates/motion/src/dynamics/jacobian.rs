@@ -5,7 +5,7 @@ use super::equations::{PAIRS, W0, W1};
 use super::evaluation::{add_symmetric, spin_product};
 use nalgebra::{Matrix3, Vector3};
 
-/// What the derivatives with respect to q_j and qd_j of one mode j consist of.
+/// Entries of one mode j in the derivatives with respect to q_j and qd_j.
 struct ModeDerivatives {
     /// dN/dq_j.
     lever: Matrix3<f64>,
@@ -26,21 +26,22 @@ struct ModeDerivatives {
 }
 
 impl Evaluation<'_> {
-    /// Derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd), at constant
-    /// accelerations nu'.
+    /// Computes the derivatives of [`Evaluation::balance`], f = Mc(q) nu' + h_nu + (0, 0, K_ff q + D qd),
+    /// at constant accelerations nu'.
     ///
-    /// * `acceleration`: nu' (n = 6 + nf, of a plane body 3 + nf); zero for the derivatives of h_nu and the
-    ///   elastic forces alone.
+    /// * `acceleration`: nu' (n = 6 + nf, for a plane body 3 + nf); zero for the derivatives of h_nu and
+    ///   the elastic forces alone.
     /// * `by_q`: df/dq (n x nf), row-major.
     /// * `by_nu`: df/dnu (n x n), row-major.
     ///
-    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = dN/dq_j = (W0)_j and I_j = dI/dq_j
-    /// = (W1)_j + 2 (E q)_j, where E is the part of W2 that the kinetic energy sees (theory 6.4), transposes
-    /// as N^T and rates as dN, dI:
+    /// df/dnu' is [`Evaluation::mass_matrix`]. With N = -c~ + W0 Q, N_j = dN/dq_j = (W0)_j and I_j =
+    /// dI/dq_j = (W1)_j + 2 (E q)_j, where E is the part of W2 in the kinetic energy (theory 6.4),
+    /// transposes as N^T and rates as dN, dI:
     ///
     /// ```text
     /// dF/dq_j      = N_j alpha + omega x N_j omega
-    /// dtau/dq_j    = N_j^T V' + I_j alpha + (W3)_j qdd + 2 (E qd)_j omega + omega x (N_j^T V + I_j omega + (W3)_j qd) + V x N_j omega
+    /// dtau/dq_j    = N_j^T V' + I_j alpha + (W3)_j qdd + 2 (E qd)_j omega
+    ///                + omega x (N_j^T V + I_j omega + (W3)_j qd) + V x N_j omega
     /// dQ_i/dq_j    = alpha^T (W3)_ji - omega^T E_ij omega + (K_ff)_ij
     /// dF/dV        = m omega~
     /// dtau/dV      = dN^T - p~ + omega~ N^T + m V~
@@ -62,7 +63,7 @@ impl Evaluation<'_> {
     /// ```
     ///
     /// # Panics
-    /// When a length is another.
+    /// When a length differs.
     pub fn jacobian(&mut self, acceleration: &[f64], by_q: &mut [f64], by_nu: &mut [f64]) {
         let body = self.equations;
         let (n, nf) = (body.n_velocities(), body.nf);
@@ -76,7 +77,7 @@ impl Evaluation<'_> {
         self.modal_block(&(linear + self.omega.cross(&self.velocity)), &angular, by_q, by_nu);
     }
 
-    /// The products with W2, W3 and K^a that an evaluation does not need.
+    /// Computes the products with W2, W3 and K^a that an evaluation does not need.
     #[inline(always)] // compiled once per instruction set
     fn multiply(&mut self, modal: &[f64]) {
         let body = self.equations;
@@ -96,7 +97,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// df/dV and df/domega of the rigid rows.
+    /// Writes df/dV and df/domega of the rigid rows.
     fn rigid_columns(&self, by_nu: &mut [f64]) {
         let body = self.equations;
         let (n, r) = (body.n_velocities(), body.rigid.len());
@@ -115,7 +116,8 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Columns of q_j and qd_j in the rigid rows, and those of V and omega in row j of the modes.
+    /// Writes the columns of q_j and qd_j in the rigid rows, and those of V and omega in row j of the
+    /// modes.
     fn modal_columns(
         &self,
         j: usize,
@@ -164,7 +166,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// The entries of mode `j` in all that the derivatives by q_j and qd_j take.
+    /// Returns the entries of mode `j` in the derivatives by q_j and qd_j.
     fn mode_derivatives(&self, j: usize) -> ModeDerivatives {
         let body = self.equations;
         let mut lever = Matrix3::from_fn(|k, b| body.row(W0 + 3 * k + b)[j]);
@@ -175,7 +177,7 @@ impl Evaluation<'_> {
             accelerated_qd = self.accelerated_column(&self.accelerated_qd, j);
         }
         let (inertia, inertia_rate) = self.inertia_derivatives(j);
-        // (W3_a x)_j is that of the transpose less that of the difference.
+        // (W3_a x)_j is the entry of the transpose minus that of the difference.
         let w3_times = |transposed: &[f64], skew: &[f64]| {
             self.w3_column(|at| transposed[at * body.nf + j] - skew[at * body.nf + j])
         };
@@ -195,7 +197,7 @@ impl Evaluation<'_> {
         }
     }
 
-    /// Entry `j` of the product with K^a of every axis that the body moves along.
+    /// Returns entry `j` of the product with K^a for every axis that the body moves along.
     fn accelerated_column(&self, products: &[f64], j: usize) -> Vector3<f64> {
         let body = self.equations;
         let mut column = Vector3::zeros();
@@ -203,7 +205,7 @@ impl Evaluation<'_> {
         column
     }
 
-    /// `entry` of every axis that the body turns about (by its place among them); zero without W3.
+    /// Returns `entry` for every axis that the body turns about (by its index among them); zero without W3.
     fn w3_column(&self, entry: impl Fn(usize) -> f64) -> Vector3<f64> {
         let body = self.equations;
         let mut column = Vector3::zeros();
@@ -213,7 +215,7 @@ impl Evaluation<'_> {
         column
     }
 
-    /// dI/dq_j and its rate.
+    /// Returns dI/dq_j and its rate.
     fn inertia_derivatives(&self, j: usize) -> (Matrix3<f64>, Matrix3<f64>) {
         let (body, nf) = (self.equations, self.equations.nf);
         let (mut inertia, mut rate) = (Matrix3::zeros(), Matrix3::zeros());
@@ -229,8 +231,8 @@ impl Evaluation<'_> {
         (inertia, rate)
     }
 
-    /// Derivatives of the modal forces by q and qd; `linear` is the acceleration of the origin, V' + omega x
-    /// V.
+    /// Writes the derivatives of the modal forces by q and qd; `linear` is the acceleration of the origin,
+    /// V' + omega x V.
     fn modal_block(
         &self,
         linear: &Vector3<f64>,
@@ -248,12 +250,14 @@ impl Evaluation<'_> {
         }
         for i in 0..nf {
             let row = &mut by_q[(r + i) * nf..][..nf];
+            // -omega' E_ij omega.
             if let Some(w2) = &body.w2 {
                 for (at, &pair) in body.pairs.iter().enumerate() {
                     let factor = spin_product(w, pair);
                     row.iter_mut().zip(w2.row(at * nf + i)).for_each(|(sum, e)| *sum -= factor * e);
                 }
             }
+            // K^a_ij . (V' + omega x V).
             if let Some(accelerated) = &body.accelerated {
                 for k in 0..body.translations() {
                     row.iter_mut()
@@ -261,6 +265,7 @@ impl Evaluation<'_> {
                         .for_each(|(sum, e)| *sum += linear[k] * e);
                 }
             }
+            // alpha' (W3)_ji, and sum_a omega_a (W3_a' - W3_a) by qd.
             if let Some(w3) = &body.w3 {
                 for (at, &a) in body.axes.iter().enumerate() {
                     for (j, transposed) in w3.row(at * nf + i).enumerate() {

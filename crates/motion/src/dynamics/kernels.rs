@@ -1,17 +1,17 @@
 //! Products of constant matrices with vectors, and dot products, in vector registers.
 //!
-//! Nothing is contracted and every sum has an order that depends on sizes only: the same bits on every
-//! machine.
+//! No operations are contracted, and every sum has an order that depends on sizes only: results are bitwise
+//! equal on every machine.
 
 use faer::Mat;
 
-/// Rows of a panel: eight AVX registers of sums, enough to hide the latency of an addition.
+/// Number of rows of a panel: eight AVX registers of sums, enough to hide the latency of an addition.
 pub(super) const WIDTH: usize = 32;
 
-/// Lanes of a dot product.
+/// Number of lanes of a dot product.
 const LANES: usize = 8;
 
-/// A matrix (rows x n, n > 0) cut to panels of [`WIDTH`] rows, the last filled up with zeros. A product
+/// Matrix (rows x n, n > 0) cut into panels of [`WIDTH`] rows, the last padded with zeros. A product
 /// streams the memory once and keeps the sums of a panel in registers.
 #[derive(Debug, Clone)]
 pub(super) struct Panels {
@@ -29,24 +29,24 @@ impl Panels {
         Self { columns, panels: panels.map(|(first, j)| column(first, j)).collect() }
     }
 
-    /// Square matrices (n x n) on top of each other, one at least.
+    /// Creates panels of square matrices (n x n) stacked vertically, at least one.
     pub(super) fn stacked(blocks: &[Mat<f64>]) -> Self {
         let n = blocks[0].nrows();
         Self::new(blocks.len() * n, n, |row, j| blocks[row / n][(row % n, j)])
     }
 
-    /// Room that a product needs: the rows, filled up to whole panels.
+    /// Returns the number of rows padded to whole panels, the length of a product.
     pub(super) fn padded_rows(&self) -> usize {
         self.panels.len() / self.columns * WIDTH
     }
 
-    /// The entries of a row, column by column.
+    /// Returns the entries of a row, column by column.
     pub(super) fn row(&self, row: usize) -> impl Iterator<Item = f64> + '_ {
         let columns = &self.panels[row / WIDTH * self.columns..][..self.columns];
         columns.iter().map(move |column| column[row % WIDTH])
     }
 
-    /// y = A x.
+    /// Computes y = A x.
     #[inline(always)] // compiled once per instruction set
     pub(super) fn times(&self, x: &[f64], y: &mut [f64]) {
         let targets = y.as_chunks_mut::<WIDTH>().0;
@@ -62,7 +62,7 @@ impl Panels {
     }
 }
 
-/// a' b.
+/// Returns a' b.
 #[inline(always)]
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<LANES>(), b.as_chunks::<LANES>());
@@ -77,7 +77,7 @@ pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     ((s0 + s4) + (s2 + s6)) + ((s1 + s5) + (s3 + s7)) + rest
 }
 
-/// y += factor x.
+/// Computes y += factor x.
 #[inline(always)]
 pub(super) fn add_scaled(factor: f64, x: &[f64], y: &mut [f64]) {
     for (y, x) in y.iter_mut().zip(x) {

@@ -1,28 +1,27 @@
-//! Where the derivatives of loads are collected.
+//! Derivatives of loads.
 
 use super::EquationsOfMotion;
 use nalgebra::Vector3;
 
-/// In which axes a load is constant.
+/// Axes in which a load is constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum LoadAxes {
-    /// In world axes: it stays as the body turns.
+    /// World axes: the load keeps its direction while the body turns.
     World,
-    /// In body axes: it turns with the body.
+    /// Body axes: the load turns with the body.
     Body,
 }
 
-/// Derivatives of the generalised forces of loads, which add up here; n = 6 + nf rows, of a plane body 3 +
-/// nf.
+/// Accumulated derivatives of the generalised forces of loads; n = 6 + nf rows, for a plane body 3 + nf.
 ///
-/// They belong to the right-hand side: [`Evaluation::jacobian`](super::Evaluation::jacobian) has those of the
-/// left. Constant loads do not depend on the place R of the body.
+/// The derivatives belong to the right-hand side; [`Evaluation::jacobian`](super::Evaluation::jacobian)
+/// gives those of the left. Constant loads do not depend on the position R of the body.
 #[derive(Debug)]
 pub struct LoadJacobian<'m> {
-    /// By q (n x nf), row-major.
+    /// Derivatives by q (n x nf), row-major.
     pub by_q: &'m mut [f64],
-    /// By a small rotation phi in body axes, A becoming A (I + phi~): n x 3, of a plane body n x 1,
-    /// row-major.
+    /// Derivatives by a small rotation phi in body axes, A becoming A (I + phi~): n x 3, for a plane body n
+    /// x 1, row-major.
     pub by_turn: &'m mut [f64],
 }
 
@@ -42,13 +41,13 @@ impl LoadJacobian<'_> {
         }
     }
 
-    /// Row of mode `i` in `by_q`.
+    /// Returns the row of mode `i` in `by_q`.
     pub(super) fn modal_row(&mut self, body: &EquationsOfMotion, i: usize) -> &mut [f64] {
         &mut self.by_q[(body.rigid.len() + i) * body.nf..][..body.nf]
     }
 
-    /// Adds a force, a torque about the origin and modal forces to the column of axis number `at` of
-    /// `by_turn`.
+    /// Adds a force, a torque about the origin and modal forces to column `at` of `by_turn`, which belongs
+    /// to one axis.
     pub(super) fn add_by_turn(
         &mut self,
         body: &EquationsOfMotion,

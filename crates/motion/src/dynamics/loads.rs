@@ -8,7 +8,7 @@ impl Evaluation<'_> {
     /// Adds the forces of uniform gravity: (m g, s x g, C1(q)'g), the gradient of -g'(m R + A s).
     ///
     /// * `gravity`: A'g, in body axes. Unit: length/time^2.
-    /// * `forces`: 6 + nf, of a plane body 3 + nf.
+    /// * `forces`: 6 + nf entries, for a plane body 3 + nf.
     ///
     /// # Panics
     /// When `forces` has another length.
@@ -58,7 +58,7 @@ impl Evaluation<'_> {
 }
 
 impl EquationsOfMotion {
-    /// Adds a force and a torque about the origin; the modal forces.
+    /// Adds a force and a torque about the origin; returns the modal forces.
     pub(super) fn add_rigid<'f>(
         &self,
         force: Vector3<f64>,

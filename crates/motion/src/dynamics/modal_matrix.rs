@@ -1,21 +1,21 @@
-//! A symmetric matrix of the modes, in the cheapest form that it has.
+//! Symmetric matrix of the modes, in its cheapest form.
 
 use super::kernels::{add_scaled, dot};
 use faer::MatRef;
 use nalgebra::DMatrix;
 
-/// K_ff, D or m_ff (nf x nf).
+/// Symmetric modal matrix K_ff, D or m_ff (nf x nf).
 #[derive(Debug, Clone)]
 pub(super) enum ModalMatrix {
-    /// The diagonal of a diagonal matrix.
+    /// Diagonal of a diagonal matrix.
     Diagonal(Vec<f64>),
-    /// Row-major.
+    /// Full matrix, row-major.
     Full { n: usize, entries: Vec<f64> },
 }
 
 impl ModalMatrix {
-    /// The symmetric part of `a`, as a diagonal where no other entry is larger than `rounding` times
-    /// sqrt(|a_ii a_jj|).
+    /// Takes the symmetric part of `a`; stores only the diagonal if no other entry is larger than
+    /// `rounding` times sqrt(|a_ii a_jj|).
     pub(super) fn new(a: MatRef<'_, f64>, rounding: f64) -> Self {
         let n = a.nrows();
         let size: Vec<f64> = (0..n).map(|i| a[(i, i)].abs().sqrt()).collect();
@@ -37,7 +37,7 @@ impl ModalMatrix {
         }
     }
 
-    /// (A x)_i.
+    /// Returns (A x)_i.
     pub(super) fn row_product(&self, i: usize, x: &[f64]) -> f64 {
         match self {
             Self::Diagonal(diagonal) => diagonal[i] * x[i],
@@ -45,7 +45,7 @@ impl ModalMatrix {
         }
     }
 
-    /// y += factor A x.
+    /// Computes y += factor A x.
     #[inline(always)] // compiled once per instruction set
     pub(super) fn add_product(&self, factor: f64, x: &[f64], y: &mut [f64]) {
         match self {
@@ -62,7 +62,7 @@ impl ModalMatrix {
         }
     }
 
-    /// x' A x.
+    /// Returns x' A x.
     pub(super) fn quadratic(&self, x: &[f64]) -> f64 {
         match self {
             Self::Diagonal(diagonal) => diagonal.iter().zip(x).map(|(a, x)| a * x * x).sum(),
@@ -73,21 +73,21 @@ impl ModalMatrix {
     }
 }
 
-/// m_ff and what solves with it.
+/// Modal mass m_ff and its factor.
 #[derive(Debug, Clone)]
 pub(super) enum ModalMass {
-    /// Mass-normalised modes.
+    /// Identity, for mass-normalised modes.
     Identity,
-    /// Any other.
+    /// Any other modal mass.
     Full {
         matrix: ModalMatrix,
-        /// L of m_ff = L L' (row-major, its lower triangle), where m_ff is positive definite.
+        /// L of m_ff = L L' (row-major, its lower triangle), if m_ff is positive definite.
         factor: Option<Vec<f64>>,
     },
 }
 
 impl ModalMass {
-    /// The identity where no entry differs from it by more than `rounding`.
+    /// Creates the identity if no entry differs from it by more than `rounding`.
     pub(super) fn new(a: MatRef<'_, f64>, rounding: f64) -> Self {
         let n = a.nrows();
         let is_identity = |i: usize, j: usize| (a[(i, j)] - f64::from(i == j)).abs() <= rounding;
@@ -107,7 +107,7 @@ impl ModalMass {
         }
     }
 
-    /// y += m_ff x.
+    /// Computes y += m_ff x.
     #[inline(always)]
     pub(super) fn add_product(&self, x: &[f64], y: &mut [f64]) {
         match self {
@@ -116,7 +116,7 @@ impl ModalMass {
         }
     }
 
-    /// x' m_ff x.
+    /// Returns x' m_ff x.
     pub(super) fn quadratic(&self, x: &[f64]) -> f64 {
         match self {
             Self::Identity => dot(x, x),
@@ -124,7 +124,7 @@ impl ModalMass {
         }
     }
 
-    /// x <- L^-1 x; `None` when m_ff is not positive definite.
+    /// Computes x <- L^-1 x; returns `None` if m_ff is not positive definite.
     #[inline(always)]
     pub(super) fn solve_lower(&self, x: &mut [f64]) -> Option<()> {
         let Self::Full { factor, .. } = self else { return Some(()) };
@@ -135,7 +135,7 @@ impl ModalMass {
         Some(())
     }
 
-    /// x <- L^-T x; `None` when m_ff is not positive definite.
+    /// Computes x <- L^-T x; returns `None` if m_ff is not positive definite.
     #[inline(always)]
     pub(super) fn solve_upper(&self, x: &mut [f64]) -> Option<()> {
         let Self::Full { factor, .. } = self else { return Some(()) };

@@ -1,4 +1,4 @@
-//! The motion of one body in space as a system that can be integrated.
+//! Motion of one body in space as a system for integration.
 
 use super::{
     Configuration, EquationsOfMotion, EulerParameters, Evaluation, Orientation, Place, Prescribed, Snapshot,
@@ -6,27 +6,27 @@ use super::{
 use crate::integration::{Failure, Oscillator, System};
 use nalgebra::{Matrix3, Vector3};
 
-/// Deformations below this part of the size of the body count as this much, so that a body at rest has a
-/// scale.
+/// Smallest deformation, relative to the size of the body, that the scales assume, so that a body at rest
+/// has a scale.
 const LEAST_DEFORMATION: f64 = 1e-6;
 
-/// The scale of vibration is at least this part of that of the whole internal motion.
+/// Smallest scale of vibration relative to the scale of the whole internal motion.
 const LEAST_VIBRATION: f64 = 1e-3;
 
-/// Forces on a body from outside, and motion that is prescribed.
+/// External forces on a body, and prescribed motion.
 pub trait Surroundings {
     /// Adds the generalised forces (F, tau, Q) in body axes at the state of `evaluation`
     /// ([`EquationsOfMotion`]).
     fn add_forces(&self, time: f64, place: &Place, evaluation: &Evaluation<'_>, forces: &mut [f64]);
 
-    /// Rigid motion that is prescribed of a frame with these axes: velocities (V, omega) along them, and the
-    /// rates of their components. Nothing unless said.
+    /// Returns the prescribed rigid motion of a frame with the given axes: velocities (V, omega) along
+    /// these axes, and the rates of their components. The default prescribes nothing.
     fn prescribed(&self, _time: f64, _axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         (Prescribed::NOTHING, Prescribed::NOTHING)
     }
 }
 
-/// No forces: a free body in empty space.
+/// Surroundings without forces, for a free body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct EmptySpace;
 
@@ -43,18 +43,18 @@ impl Surroundings for EmptySpace {
 /// ```
 ///
 /// in world axes, with the angular momentum L about a point G that starts at the origin R of the frame and
-/// flies with P / m. P and L of a free body are constant entries of y, so that every method keeps the momenta
-/// to rounding, whatever the mass matrix and the frame; it is (6.3) of the theory with the rotation and the
-/// flight of the frame taken out. For a free body whose frame is at its centre of mass D vanishes, and what
-/// is left is a Hamiltonian system on quaternions with a constant structure, which Gauss collocation keeps
+/// moves with P / m. P and L of a free body are constant entries of y, so that every method conserves the
+/// momenta to rounding, for any mass matrix and frame; it is (6.3) of the theory with the rotation and the
+/// translation of the frame separated. For a free body with its frame at the centre of mass D vanishes, and
+/// the system is Hamiltonian on quaternions with a constant structure, which Gauss collocation preserves
 /// (McLachlan, Modin, Verdier, Collective symplectic integrators, Nonlinearity 27, 2014).
 ///
-/// W, j and k collect work and impulses for [`Snapshot::balance`]. A plane body uses the entries of its
+/// W, j and k accumulate work and impulses for [`Snapshot::balance`]. A plane body uses the entries of its
 /// plane.
 pub struct Motion<'a> {
     evaluation: Evaluation<'a>,
     surroundings: &'a dyn Surroundings,
-    /// Where the origin was at the start.
+    /// Position of the origin at the start.
     reference: Vector3<f64>,
     size: Size,
     oscillators: Vec<Oscillator>,
@@ -63,15 +63,15 @@ pub struct Motion<'a> {
     rates: Vec<f64>,
 }
 
-/// Mass, length and rates of a body, which its motion is measured against.
+/// Mass, length and rates of a body, the scales of its motion.
 #[derive(Debug, Clone)]
 struct Size {
     mass: f64,
     /// Radius of gyration about the centre of mass.
     radius: f64,
-    /// Stiffness of every mode, positive.
+    /// Stiffness of every mode; positive.
     stiffness: Vec<f64>,
-    /// Circular frequency of the softest.
+    /// Circular frequency of the softest mode.
     first_rate: f64,
 }
 
@@ -81,7 +81,7 @@ impl Size {
         let about_origin = 0.5 * equations.inertia.trace() / mass;
         let about_centre = about_origin - c.norm_squared() / (mass * mass);
         let own: Vec<f64> = (0..equations.nf).map(|j| equations.stiffness.get(j, j)).collect();
-        // Modes without stiffness count as the softest that has some.
+        // Modes without stiffness get that of the softest mode with stiffness.
         let softest = own.iter().copied().filter(|&k| k > 0.0).fold(f64::INFINITY, f64::min);
         let softest = if softest.is_finite() { softest } else { 1.0 };
         Self {
@@ -93,10 +93,10 @@ impl Size {
     }
 }
 
-/// Entries of y besides q and pi.
+/// Number of entries of y besides q and pi.
 const PLAIN: usize = 3 + 4 + 3 + 3 + 3 + 1 + 3 + 3;
 
-/// Where the entries of y stand, for a body of nf modes.
+/// Positions of the entries of y, for a body of nf modes.
 #[derive(Debug, Clone, Copy)]
 struct Layout(usize);
 
@@ -148,10 +148,10 @@ fn attitude(state: &[f64]) -> EulerParameters {
 }
 
 impl<'a> Motion<'a> {
-    /// The motion from `start`, and y at the start.
+    /// Creates the motion from `start`, and returns y at the start.
     ///
     /// # Panics
-    /// When `start` has not the number of modes of the equations.
+    /// When the number of modes of `start` differs from that of the equations.
     pub fn new(
         equations: &'a EquationsOfMotion,
         surroundings: &'a dyn Surroundings,
@@ -196,22 +196,22 @@ impl<'a> Motion<'a> {
         (motion, state)
     }
 
-    /// Mass of the body, and its radius of gyration sqrt(tr(I) / 2m) about the centre of mass.
+    /// Returns the mass of the body, and its radius of gyration sqrt(tr(I) / 2m) about the centre of mass.
     pub fn size(&self) -> (f64, f64) {
         (self.size.mass, self.size.radius)
     }
 
-    /// Elastic energy of a deformation that is 1e-9 of the radius of gyration in the softest mode: far below
-    /// what is integrated, far above rounding.
+    /// Returns the elastic energy of a deformation by 1e-9 of the radius of gyration in the softest mode:
+    /// far below the accuracy of the integration, far above rounding.
     pub fn least_energy(&self) -> f64 {
         const PART: f64 = 1e-9;
         0.5 * self.size.mass * (PART * self.size.radius * self.size.first_rate).powi(2)
     }
 
-    /// The body at a state.
+    /// Returns the body at a state.
     ///
     /// # Errors
-    /// [`Failure::Rates`] where the mass matrix of the deformed body is not positive definite.
+    /// [`Failure::Rates`] if the mass matrix of the deformed body is not positive definite.
     pub fn evaluate<'m>(&'m mut self, time: f64, state: &'m [f64]) -> Result<Snapshot<'m>, Failure> {
         let (place, rates) = self.go_to(time, state)?;
         let reaction = match rates {
@@ -232,11 +232,11 @@ impl<'a> Motion<'a> {
         })
     }
 
-    /// nu' at a state, in the order of [`EquationsOfMotion`]: V' and omega' are the rates of the components
-    /// in body axes.
+    /// Computes nu' at a state, in the order of [`EquationsOfMotion`]: V' and omega' are the rates of the
+    /// components in body axes.
     ///
     /// # Errors
-    /// As [`Motion::evaluate`].
+    /// The errors of [`Motion::evaluate`].
     pub fn accelerations(&mut self, time: f64, state: &[f64]) -> Result<&[f64], Failure> {
         let (place, rates) = self.go_to(time, state)?;
         self.apply(time, &place, &rates)?;
@@ -252,12 +252,12 @@ impl<'a> Motion<'a> {
         Layout(self.evaluation.equations().n_modes())
     }
 
-    /// Attitude of the frame and modal coordinates at a state.
+    /// Returns attitude of the frame and modal coordinates at a state.
     pub fn shape<'s>(&self, state: &'s [f64]) -> (EulerParameters, &'s [f64]) {
         (attitude(state), &state[Layout::MODES..self.layout().linear()])
     }
 
-    /// Sets the evaluation; the place and the rates of what is prescribed.
+    /// Sets the evaluation; returns the place of the frame and the rates of prescribed motion.
     fn go_to(&mut self, time: f64, state: &[f64]) -> Result<(Place, Prescribed), Failure> {
         let (layout, equations) = (self.layout(), self.evaluation.equations());
         let (offset, linear) = (vector(state, layout.offset()), vector(state, layout.linear()));
@@ -273,7 +273,7 @@ impl<'a> Motion<'a> {
         Ok((place, rates))
     }
 
-    /// Generalised forces to `self.forces`, those included that the prescribed motion takes, which are
+    /// Writes the generalised forces to `self.forces`, including those of the prescribed motion, which are
     /// returned.
     fn apply(
         &mut self,
@@ -329,7 +329,7 @@ impl System for Motion<'_> {
         put(&world_force, layout.linear(), rates);
         put(&(world_torque + offset.cross(&world_force)), layout.angular(), rates);
         self.evaluation.modal_momentum_rate(modal, &mut rates[layout.modal()..layout.offset()]);
-        // A V - P / m, without the rounding of V where P is that of this V.
+        // Compute A V - P / m without the rounding of V if V follows from P.
         let relative = match prescribed.linear {
             None => place.axes * self.evaluation.relative_momentum() / -mass,
             Some(_) => place.axes * velocity - vector(state, layout.linear()) / mass,
@@ -344,9 +344,9 @@ impl System for Motion<'_> {
         Ok(())
     }
 
-    /// Positions are measured against the radius of gyration r, attitude against 1, momenta and modes in the
-    /// energy norm: against the rotational energy and that of the vibration, the latter at least 1e-3 of the
-    /// former in amplitude, and both at least those of a deformation of 1e-6 r at the first frequency. Work
+    /// Positions are scaled by the radius of gyration r, attitude by 1, momenta and modes in the energy
+    /// norm: by the rotational energy and that of the vibration. The latter is at least 1e-3 of the former
+    /// in amplitude, and both are at least those of a deformation of 1e-6 r at the first frequency. Work
     /// and impulses follow and are not controlled.
     fn scales(&self, state: &[f64], scales: &mut [f64]) {
         let (layout, size) = (self.layout(), &self.size);
@@ -380,7 +380,7 @@ impl System for Motion<'_> {
         &self.oscillators
     }
 
-    /// Euler parameters of unit length.
+    /// Scales the Euler parameters to unit length.
     fn settle(&self, state: &mut [f64]) {
         let e = &mut state[Layout::ATTITUDE..Layout::MODES];
         let square: f64 = e.iter().map(|e| e * e).sum();

@@ -1,14 +1,15 @@
-//! The same equations in rates of coordinates: velocities along world axes, and any parameters of the
+//! Equations of motion in rates of coordinates: velocities along world axes, and any parameters of the
 //! rotation.
 
 use super::kernels::add_scaled;
 use super::{EquationsOfMotion, Evaluation};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
-/// Parameters theta (R of them) of the rotation A from body axes to world axes, with omega = G(theta) theta'
-/// in body axes.
+/// Parameters theta (R of them) of the rotation A from body axes to world axes, with omega = G(theta)
+/// theta' in body axes.
 ///
-/// With these, coordinates x = (R, theta, q) have velocities x' = (R', theta', qd), R' along world axes, and
+/// With these parameters, coordinates x = (R, theta, q) have velocities x' = (R', theta', qd), R' along
+/// world axes, and
 ///
 /// ```text
 /// nu = H x',    H = blkdiag(A', G, I)
@@ -17,20 +18,20 @@ use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 ///
 /// which is the form of theory (3.2), and of (4.2) in the plane.
 pub trait Orientation<const R: usize> {
-    /// A: body axes to world axes.
+    /// Returns A, the rotation from body axes to world axes.
     fn axes(&self) -> Matrix3<f64>;
 
-    /// G (3 x R).
+    /// Returns G (3 x R).
     fn map(&self) -> SMatrix<f64, 3, R>;
 
-    /// dG/dt theta': what omega' has besides G theta''.
+    /// Returns dG/dt theta', the part of omega' besides G theta''.
     fn drift(&self, rate: &SVector<f64, R>) -> Vector3<f64>;
 }
 
-/// The angular velocity itself: theta' = omega, theta no coordinates.
+/// Angular velocity as rate of rotation: theta' = omega, without coordinates theta.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AngularVelocity {
-    /// A: body axes to world axes.
+    /// Rotation A from body axes to world axes.
     pub axes: Matrix3<f64>,
 }
 
@@ -56,14 +57,14 @@ impl Orientation<3> for AngularVelocity {
 pub struct EulerParameters(pub [f64; 4]);
 
 impl EulerParameters {
-    /// The same rotation with p'p = 1.
+    /// Returns the parameters scaled to p'p = 1.
     pub fn normalised(&self) -> Self {
         let length = self.0.iter().map(|p| p * p).sum::<f64>().sqrt();
         Self(self.0.map(|p| p / length))
     }
 
-    /// Those of the rotation with these axes as columns, from the largest of the four (Shepperd, J. Guidance
-    /// and Control 1, 1978).
+    /// Returns the parameters of the rotation with these axes as columns, computed from the largest of the
+    /// four (Shepperd, J. Guidance and Control 1, 1978).
     pub fn of_axes(axes: &Matrix3<f64>) -> Self {
         let a = |i: usize, j: usize| axes[(i, j)];
         let trace = axes.trace();
@@ -86,14 +87,14 @@ impl EulerParameters {
         Self(products[largest]).normalised()
     }
 
-    /// p' = G'omega / 4.
+    /// Returns p' = G'omega / 4.
     pub fn rate(&self, omega: &Vector3<f64>) -> [f64; 4] {
         (self.map().tr_mul(omega) * 0.25).into()
     }
 }
 
 impl From<EulerParameters> for RotationVector {
-    /// The shortest one: 2 e / |e| atan2(|e|, p0) with p0 >= 0.
+    /// Returns the shortest rotation vector: 2 e / |e| atan2(|e|, p0) with p0 >= 0.
     fn from(EulerParameters([p0, p1, p2, p3]): EulerParameters) -> Self {
         let sign = if p0 < 0.0 { -1.0 } else { 1.0 };
         let e = Vector3::new(p1, p2, p3) * sign;
@@ -104,7 +105,7 @@ impl From<EulerParameters> for RotationVector {
 }
 
 impl From<RotationVector> for EulerParameters {
-    /// (cos f/2, v/f sin f/2) with f = |v|.
+    /// Returns (cos f/2, v/f sin f/2) with f = |v|.
     fn from(RotationVector(vector): RotationVector) -> Self {
         let angle = vector.norm();
         let (sin, cos) = (0.5 * angle).sin_cos();
@@ -127,33 +128,32 @@ impl Orientation<4> for EulerParameters {
         SMatrix::<f64, 3, 4>::new(-p1, p0, p3, -p2, -p2, -p3, p0, p1, -p3, p2, -p1, p0) * 2.0
     }
 
-    /// Zero: G is linear in p and G(p') p' = 0.
+    /// Returns zero: G is linear in p and G(p') p' = 0.
     fn drift(&self, _: &SVector<f64, 4>) -> Vector3<f64> {
         Vector3::zeros()
     }
 }
 
-/// The rotation vector v: turn by the angle |v| about v.
+/// Rotation vector v: a rotation by the angle |v| about v.
 ///
 /// A = I + sin f / f v~ + (1 - cos f) / f^2 v~^2 and G = I - (1 - cos f) / f^2 v~ + (f - sin f) / f^3 v~^2
 /// with f = |v|. G is singular at f = 2 pi.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RotationVector(pub Vector3<f64>);
 
-/// Angles below which the series of [`RotationVector`] are summed: their first terms left out are below
-/// rounding.
+/// Angle below which the series of [`RotationVector`] are used: the truncated terms are below rounding.
 const SMALL: f64 = 1.0;
 
-/// Terms of these series: the next is below 1e-20 of the first.
+/// Number of terms of these series: the next term is below 1e-20 of the first.
 const TERMS: u32 = 10;
 
 impl RotationVector {
-    /// The shortest one of the rotation with these axes as columns.
+    /// Returns the shortest rotation vector of the rotation with these axes as columns.
     pub fn of_axes(axes: &Matrix3<f64>) -> Self {
         Self::from(EulerParameters::of_axes(axes))
     }
 
-    /// sin f / f, b = (1 - cos f) / f^2, c = (f - sin f) / f^3 and b'/f, c'/f with b' = db/df.
+    /// Returns sin f / f, b = (1 - cos f) / f^2, c = (f - sin f) / f^3, b'/f and c'/f with b' = db/df.
     fn coefficients(&self) -> [f64; 5] {
         let square = self.0.norm_squared();
         let f = square.sqrt();
@@ -180,7 +180,7 @@ impl RotationVector {
         [sin / f, b, c, (sin / f - 2.0 * b) / square, (b - 3.0 * c) / square]
     }
 
-    /// d(G x)/dv for a constant x.
+    /// Returns d(G x)/dv for a constant x.
     pub(super) fn map_derivative(&self, x: &Vector3<f64>) -> Matrix3<f64> {
         let [_, b, c, b_slope, c_slope] = self.coefficients();
         let v = &self.0;
@@ -214,7 +214,7 @@ impl Orientation<3> for RotationVector {
     }
 }
 
-/// The angle of a plane body about z.
+/// Angle of a plane body about z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaneAngle(pub f64);
 
@@ -234,13 +234,13 @@ impl Orientation<1> for PlaneAngle {
 }
 
 impl EquationsOfMotion {
-    /// nu = H x'.
+    /// Computes nu = H x'.
     ///
-    /// * `rates`: x' = (R', theta', qd), 3 + R + nf; of a plane body 2 + R + nf.
-    /// * `nu`: 6 + nf, of a plane body 3 + nf.
+    /// * `rates`: x' = (R', theta', qd), 3 + R + nf entries, for a plane body 2 + R + nf.
+    /// * `nu`: 6 + nf entries, for a plane body 3 + nf.
     ///
     /// # Panics
-    /// When a length is another.
+    /// When a length differs.
     pub fn velocities<const R: usize>(
         &self,
         orientation: &impl Orientation<R>,
@@ -255,7 +255,7 @@ impl EquationsOfMotion {
         flexible.copy_from_slice(modal);
     }
 
-    /// H'f: generalised forces of (R', theta', qd) from those of nu.
+    /// Computes H'f, the generalised forces of (R', theta', qd) from those of nu.
     ///
     /// # Panics
     /// When a length is not that of [`EquationsOfMotion::velocities`].
@@ -287,7 +287,8 @@ impl EquationsOfMotion {
 }
 
 impl Evaluation<'_> {
-    /// H'Mc H of (R'', theta'', qdd), row-major: (3 + R + nf) squared, of a plane body (2 + R + nf) squared.
+    /// Computes H'Mc H of (R'', theta'', qdd), row-major: (3 + R + nf) squared, for a plane body (2 + R +
+    /// nf) squared.
     ///
     /// # Panics
     /// When `matrix` has another length.
@@ -299,7 +300,7 @@ impl Evaluation<'_> {
         let (axes, map) = (orientation.axes(), orientation.map());
         let turned = axes * self.lever * map;
         let inertia = map.tr_mul(&(self.inertia() * map));
-        // Above the diagonal, so that the whole is exactly symmetric.
+        // Compute the upper triangle and mirror it, so that the matrix is exactly symmetric.
         let upper = |i: usize, j: usize| match (i < d, j < d) {
             (true, true) => body.mass * f64::from(i == j),
             (true, false) => turned[(i, j - d)],
@@ -323,11 +324,11 @@ impl Evaluation<'_> {
         }
     }
 
-    /// H'(Mc dH/dt x' + h_nu): the velocity forces that belong to [`Evaluation::mass_matrix_of`], without
-    /// elastic and damping forces.
+    /// Computes H'(Mc dH/dt x' + h_nu), the velocity forces that belong to [`Evaluation::mass_matrix_of`],
+    /// without elastic and damping forces.
     ///
-    /// * `rate`: theta', that of the state.
-    /// * `forces`: 3 + R + nf, of a plane body 2 + R + nf.
+    /// * `rate`: theta' of the state.
+    /// * `forces`: 3 + R + nf entries, for a plane body 2 + R + nf.
     ///
     /// # Panics
     /// When `forces` has another length.

@@ -1,4 +1,4 @@
-//! Points of a body: where forces and torques act and motion is read.
+//! Points of a body, where forces and torques act and motion is measured.
 
 use super::geometric::{Stiffening, stiffness_under};
 use super::kernels::{add_scaled, dot};
@@ -9,14 +9,14 @@ use flexbody_body::flex_body::{FlexBody, Interface};
 use flexbody_model::LoadKind;
 use nalgebra::{Matrix3, Vector3};
 
-/// A vector that is linear in q, and where the body has geometric stiffness for the load that does work on it
-/// quadratic (theory 7.5).
+/// Vector that depends linearly on q and, if the body has geometric stiffness for the load that does work
+/// on it, also quadratically (theory 7.5).
 #[derive(Debug, Clone)]
 struct PointMotion {
     nf: usize,
-    /// 3 x nf, row-major.
+    /// Linear part Psi (3 x nf), row-major.
     rows: Vec<f64>,
-    /// Components with their K.
+    /// Components with a quadratic part, each with its matrix K.
     second: Vec<(usize, ModalMatrix)>,
 }
 
@@ -39,14 +39,14 @@ impl PointMotion {
         &self.rows[k * self.nf..][..self.nf]
     }
 
-    /// Psi q - q'K q / 2.
+    /// Returns Psi q - q'K q / 2.
     fn at(&self, q: &[f64]) -> Vector3<f64> {
         let mut value = self.product(q);
         self.second.iter().for_each(|(k, matrix)| value[*k] -= 0.5 * matrix.quadratic(q));
         value
     }
 
-    /// Psi qd - q'K qd.
+    /// Returns Psi qd - q'K qd.
     fn rate(&self, q: &[f64], qd: &[f64]) -> Vector3<f64> {
         let mut value = self.product(qd);
         let bilinear =
@@ -55,7 +55,7 @@ impl PointMotion {
         value
     }
 
-    /// -qd'K qd.
+    /// Returns -qd'K qd.
     fn bend(&self, qd: &[f64]) -> Vector3<f64> {
         let mut value = Vector3::zeros();
         self.second.iter().for_each(|(k, matrix)| value[*k] -= matrix.quadratic(qd));
@@ -67,30 +67,30 @@ impl PointMotion {
         Vector3::from_fn(|k, _| dot(self.row(k), x))
     }
 
-    /// Column j of Psi - q'K.
+    /// Returns column j of Psi - q'K.
     fn column(&self, j: usize, q: &[f64]) -> Vector3<f64> {
         let mut column = Vector3::from_fn(|k, _| self.rows[k * self.nf + j]);
         self.second.iter().for_each(|(k, matrix)| column[*k] -= matrix.row_product(j, q));
         column
     }
 
-    /// modal += (Psi - q'K)' load.
+    /// Computes modal += (Psi - q'K)' load.
     fn add_work(&self, load: &Vector3<f64>, q: &[f64], modal: &mut [f64]) {
         (0..3).for_each(|k| add_scaled(load[k], self.row(k), modal));
         self.second.iter().for_each(|(k, matrix)| matrix.add_product(-load[*k], q, modal));
     }
 
-    /// -sum_k load_k (K_k)_ij.
+    /// Returns -sum_k load_k (K_k)_ij.
     fn second(&self, load: &Vector3<f64>, i: usize, j: usize) -> f64 {
         -self.second.iter().map(|(k, matrix)| load[*k] * matrix.get(i, j)).sum::<f64>()
     }
 }
 
-/// A point of a flexible body and what the modes do there: a node, or the reference point of an interface.
+/// Point of a flexible body and its motion in the modes: a node, or the reference point of an interface.
 ///
-/// All vectors are in body axes; forces and torques along other axes are the caller's to turn. Forces are
-/// consistent: the generalised forces do the power of the force on the velocity of the point and of the
-/// torque on its angular velocity, whatever the deformation.
+/// All vectors are in body axes; the caller turns forces and torques given along other axes. Forces are
+/// consistent: the power of the generalised forces is that of the force on the velocity of the point and of
+/// the torque on its angular velocity, for any deformation.
 #[derive(Debug, Clone)]
 pub struct BodyPoint {
     position: Vector3<f64>,
@@ -99,8 +99,8 @@ pub struct BodyPoint {
 }
 
 impl BodyPoint {
-    /// Node `node` of `body`, by its index; users of the library ask the body (`FlexBody::node_point`). It
-    /// has an orientation where the node has rotations.
+    /// Creates a point at node `node` of `body`, given by its index; users of the library call
+    /// `FlexBody::node_point`. The point has an orientation if the node has rotations.
     ///
     /// # Panics
     /// When the index is not below the number of nodes.
@@ -108,7 +108,7 @@ impl BodyPoint {
     pub fn node(body: &FlexBody, node: usize) -> Self {
         let (modes, nf) = (body.modes(), body.n_modes());
         let motion = |shape: &Mat<f64>| PointMotion::new(nf, |k, j| shape[(3 * node + k, j)]);
-        // Nodes without rotations have zeros in their place.
+        // Nodes without rotations have zero rows.
         let rotation = modes.rotation.as_ref().map(motion).filter(|rows| rows.rows.iter().any(|v| *v != 0.0));
         Self {
             position: Vector3::from(body.nodes().positions[node]),
@@ -117,10 +117,11 @@ impl BodyPoint {
         }
     }
 
-    /// The reference point of `interface` of `body`: the motion of its nodes on average (theory 5.3). It has
-    /// an orientation where the nodes determine one. Geometric stiffness for forces and moments at the
-    /// interface is there where `terms` have it. `None` for an interface without a reference point.
-    #[doc(hidden)] // As above.
+    /// Creates a point at the reference point of `interface` of `body`, which follows the mean motion of
+    /// its nodes (theory 5.3). The point has an orientation if the nodes determine one. Geometric stiffness
+    /// for forces and moments at the interface is included if `terms` contain it. Returns `None` for an
+    /// interface without a reference point.
+    #[doc(hidden)] // Its arguments are no part of the interface of the library.
     pub fn interface(body: &FlexBody, interface: &Interface, terms: Terms) -> Option<Self> {
         let (modes, nf) = (body.modes(), body.n_modes());
         let rotation = modes.rotation.as_ref().map(|rotation| rotation.as_ref());
@@ -139,52 +140,54 @@ impl BodyPoint {
         })
     }
 
-    /// Whether the point has an orientation.
+    /// Returns true if the point has an orientation.
     pub fn turns(&self) -> bool {
         self.rotation.is_some()
     }
 
-    /// Place in the deformed body, r(q) = x + Psi_t q (theory 6.8 and, with geometric stiffness, 7.5).
+    /// Returns the position in the deformed body, r(q) = x + Psi_t q (theory 6.8 and, with geometric
+    /// stiffness, 7.5).
     ///
     /// # Panics
-    /// Here and below when the body is another.
+    /// When the evaluation belongs to another body; this holds for all methods with an evaluation.
     pub fn place(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
         self.position + self.translation.at(&evaluation.q)
     }
 
-    /// Deflection r(q) - r(0) from the undeformed body, body axes.
+    /// Returns the deflection r(q) - r(0) from the undeformed body, body axes.
     pub fn deflection(&self, q: &[f64]) -> Vector3<f64> {
         self.translation.at(q)
     }
 
-    /// Velocity V + omega x r(q) + dr/dt.
+    /// Returns the velocity V + omega x r(q) + dr/dt.
     pub fn velocity(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
         let turned = evaluation.omega.cross(&self.place(evaluation));
         evaluation.velocity + turned + self.translation.rate(&evaluation.q, &evaluation.qd)
     }
 
-    /// Axes of the point in columns: the rotation by the vector theta(q) = Psi_r q, the identity without
-    /// deformation. `None` where it has no orientation.
+    /// Returns the axes of the point in columns: the rotation by the vector theta(q) = Psi_r q, the
+    /// identity without deformation. Returns `None` without an orientation.
     pub fn axes(&self, evaluation: &Evaluation<'_>) -> Option<Matrix3<f64>> {
         self.turn(evaluation).map(|turn| turn.axes())
     }
 
-    /// Angular velocity omega + G(theta)' dtheta/dt: that of the axes. `None` where it has no orientation.
+    /// Returns the angular velocity omega + G(theta)' dtheta/dt of the axes of the point. Returns `None`
+    /// without an orientation.
     pub fn angular_velocity(&self, evaluation: &Evaluation<'_>) -> Option<Vector3<f64>> {
         let rate = self.rotation.as_ref()?.rate(&evaluation.q, &evaluation.qd);
         // G gives components in the turned axes, and A G = G'.
         Some(evaluation.omega + self.turn(evaluation)?.map().tr_mul(&rate))
     }
 
-    /// What the velocity v of the point changes in the world without accelerations: with J nu = v its
-    /// acceleration is J nu' and this, omega x v + omega x dr/dt + (d2r/dq dq) qd qd. For constraints between
+    /// Returns the acceleration of the point for nu' = 0: omega x v + omega x dr/dt + (d2r/dq dq) qd qd.
+    /// With the velocity v = J nu the acceleration is J nu' plus this drift. Used for constraints between
     /// bodies.
     pub fn velocity_drift(&self, evaluation: &Evaluation<'_>) -> Vector3<f64> {
         let rate = self.translation.rate(&evaluation.q, &evaluation.qd);
         evaluation.omega.cross(&(self.velocity(evaluation) + rate)) + self.translation.bend(&evaluation.qd)
     }
 
-    /// Acceleration J nu' + drift of the point for the accelerations nu' in the order of
+    /// Returns the acceleration J nu' + drift of the point for the accelerations nu' in the order of
     /// [`EquationsOfMotion`](super::EquationsOfMotion), relative to the world and along body axes (\[RD\]
     /// (10.9)):
     ///
@@ -193,7 +196,7 @@ impl BodyPoint {
     /// ```
     ///
     /// # Panics
-    /// When `acceleration` has not the length of the equations.
+    /// When `acceleration` does not have the length of the equations.
     pub fn acceleration(&self, evaluation: &Evaluation<'_>, acceleration: &[f64]) -> Vector3<f64> {
         let (linear, angular, modal) = evaluation.equations().split(acceleration);
         let turned = angular.cross(&self.place(evaluation));
@@ -201,8 +204,8 @@ impl BodyPoint {
         linear + turned + bent + self.velocity_drift(evaluation)
     }
 
-    /// The same of the angular velocity: d(omega_p)/dt without accelerations. `None` where the point has no
-    /// orientation.
+    /// Returns the angular acceleration of the point for nu' = 0, d(omega_p)/dt without accelerations.
+    /// Returns `None` without an orientation.
     pub fn angular_drift(&self, evaluation: &Evaluation<'_>) -> Option<Vector3<f64>> {
         let rotation = self.rotation.as_ref()?;
         let (turn, rate) = (self.turn(evaluation)?, rotation.rate(&evaluation.q, &evaluation.qd));
@@ -212,9 +215,9 @@ impl BodyPoint {
         Some(evaluation.omega.cross(&relative) + bend)
     }
 
-    /// Adds a force b at the point: (b, r x b, (dr/dq)'b).
+    /// Adds the generalised forces of a force b at the point: (b, r x b, (dr/dq)'b).
     ///
-    /// * `forces`: 6 + nf, of a plane body 3 + nf.
+    /// * `forces`: 6 + nf entries, for a plane body 3 + nf.
     ///
     /// # Panics
     /// When `forces` has another length.
@@ -224,9 +227,9 @@ impl BodyPoint {
         self.translation.add_work(force, &evaluation.q, modal);
     }
 
-    /// Adds a torque t at the point: (0, t, (dtheta/dq)'G(theta) t).
+    /// Adds the generalised forces of a torque t at the point: (0, t, (dtheta/dq)'G(theta) t).
     ///
-    /// * `forces`: 6 + nf, of a plane body 3 + nf.
+    /// * `forces`: 6 + nf entries, for a plane body 3 + nf.
     ///
     /// # Panics
     /// When `forces` has another length, or the point has no orientation.
@@ -236,7 +239,7 @@ impl BodyPoint {
         rotation.add_work(&self.turned_torque(evaluation, torque), &evaluation.q, modal);
     }
 
-    /// G(theta) t: a torque t as it works on the rotation vector of the point.
+    /// Returns G(theta) t, the generalised force of a torque t on the rotation vector of the point.
     ///
     /// # Panics
     /// When the point has no orientation.
@@ -247,7 +250,8 @@ impl BodyPoint {
     /// Adds the derivatives of [`BodyPoint::add_force`]: with r_j = dr/dq_j
     ///
     /// ```text
-    /// dtau/dq_j = r_j x b,    dQ_i/dq_j = d2r/dq_i dq_j . b,    d/dphi = (b~, r~ b~, (dr/dq)'b~) of a force in world axes
+    /// dtau/dq_j = r_j x b,    dQ_i/dq_j = d2r/dq_i dq_j . b
+    /// d/dphi    = (b~, r~ b~, (dr/dq)'b~) of a force in world axes
     /// ```
     ///
     /// # Panics

@@ -1,9 +1,9 @@
-//! Rigid motion that is given, and what a solution for the rest can fail by.
+//! Prescribed rigid motion, and the error of a solution for the free motion.
 
 use nalgebra::{Matrix3, Vector3};
 
 /// The mass matrix at a state is not positive definite: terms were dropped and the deformation is too large
-/// for what is left, or the invariants are not those of a body.
+/// for the remaining ones, or the invariants belong to no physical body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct NotPositiveDefinite;
 
@@ -15,13 +15,13 @@ impl std::fmt::Display for NotPositiveDefinite {
 
 impl std::error::Error for NotPositiveDefinite {}
 
-/// A vector along the axes of the frame of a body. What is along those of the world is a plain vector: one becomes the
-/// other by [`AlongFrame::in_world`] alone.
+/// Vector along the axes of the frame of a body. Vectors along world axes are plain vectors; only
+/// [`AlongFrame::in_world`] converts one into the other.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct AlongFrame(pub Vector3<f64>);
 
 impl AlongFrame {
-    /// This vector along the axes of the world, A v.
+    /// Returns the vector along the axes of the world, A v.
     ///
     /// * `axes`: A, the axes of the frame in the world, in columns.
     pub fn in_world(&self, axes: &Matrix3<f64>) -> Vector3<f64> {
@@ -29,21 +29,21 @@ impl AlongFrame {
     }
 }
 
-/// Rigid motion that is given instead of following from forces: velocities of the frame or, where accelerations are
-/// asked for, the rates of change of their components. What is `None` is free.
+/// Prescribed rigid motion: velocities of the frame or, for accelerations, the rates of their components. A
+/// part that is `None` is free.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Prescribed {
-    /// V or V'.
+    /// Prescribed V or V'.
     pub linear: Option<AlongFrame>,
-    /// omega or omega'.
+    /// Prescribed omega or omega'.
     pub angular: Option<AlongFrame>,
 }
 
 impl Prescribed {
-    /// Nothing: a free body.
+    /// No prescribed motion: a free body.
     pub const NOTHING: Self = Self { linear: None, angular: None };
 
-    /// What is given of entry `axis` of (V, omega).
+    /// Returns the prescribed value of entry `axis` of (V, omega).
     pub(super) fn entry(&self, axis: usize) -> Option<f64> {
         if axis < 3 { self.linear.map(|v| v.0[axis]) } else { self.angular.map(|w| w.0[axis - 3]) }
     }

@@ -1,18 +1,18 @@
-//! A body at one state of its motion, as a reader thinks of it.
+//! Positions, velocities and energies of a body at one state of its motion.
 
 use super::{EulerParameters, Evaluation};
 use nalgebra::{Matrix3, Vector3};
 
-/// Where a body is: its frame in the world.
+/// Position and orientation of the body frame in the world.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Origin of the body frame, world axes.
     pub origin: Vector3<f64>,
-    /// A: body axes to world axes.
+    /// Rotation A from body axes to world axes.
     pub axes: Matrix3<f64>,
 }
 
-/// A state in the velocities that a reader thinks in.
+/// State in positions and velocities.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Configuration {
     /// Origin of the body frame, world axes.
@@ -25,32 +25,33 @@ pub struct Configuration {
     pub omega: Vector3<f64>,
     /// Modal coordinates (nf).
     pub q: Vec<f64>,
-    /// Their rates (nf).
+    /// Rates of the modal coordinates (nf).
     pub qd: Vec<f64>,
 }
 
-/// What the motion of a body keeps or exchanges, at one time. Momenta in world axes.
+/// Energies, momenta, work and impulses of a motion at one time. Momenta are in world axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Balance {
     /// Kinetic energy.
     pub kinetic: f64,
     /// Elastic energy.
     pub elastic: f64,
-    /// Kinetic energy of the flight, P^2 / 2m: what is left of the rest does not depend on who looks.
+    /// Kinetic energy of translation, P^2 / 2m; the remainder of the kinetic energy is independent of the
+    /// inertial frame.
     pub flight: f64,
     /// Work of forces, damping and prescribed motion since the start.
     pub work: f64,
     /// Linear momentum.
     pub linear: Vector3<f64>,
-    /// Angular momentum about where the origin of the body was at the start.
+    /// Angular momentum about the position of the body origin at the start.
     pub angular: Vector3<f64>,
     /// Impulse of the forces since the start.
     pub impulse: Vector3<f64>,
-    /// Their angular impulse about the same point.
+    /// Angular impulse of the forces about this point.
     pub angular_impulse: Vector3<f64>,
 }
 
-/// A body at one state of its [`Motion`](super::Motion).
+/// Body at one state of its [`Motion`](super::Motion).
 #[derive(Debug)]
 pub struct Snapshot<'m> {
     pub(super) place: Place,
@@ -65,17 +66,17 @@ pub struct Snapshot<'m> {
 }
 
 impl Snapshot<'_> {
-    /// Where the frame is.
+    /// Returns position and orientation of the frame.
     pub fn place(&self) -> &Place {
         &self.place
     }
 
-    /// The equations of motion at this state.
+    /// Returns the equations of motion at this state.
     pub fn evaluation(&self) -> &Evaluation<'_> {
         self.evaluation
     }
 
-    /// The state as positions and velocities.
+    /// Returns the state in positions and velocities.
     pub fn configuration(&self) -> Configuration {
         let (velocity, omega) = self.evaluation.rigid_velocity();
         Configuration {
@@ -88,7 +89,7 @@ impl Snapshot<'_> {
         }
     }
 
-    /// Energies, momenta and what the surroundings put in.
+    /// Returns energies and momenta, and the work and impulses of the surroundings.
     pub fn balance(&self) -> Balance {
         let linear = self.place.axes * self.evaluation.linear_momentum();
         let angular = self.place.axes * self.evaluation.angular_momentum();
@@ -104,8 +105,8 @@ impl Snapshot<'_> {
         }
     }
 
-    /// Force and torque about the origin that the prescribed motion takes, body axes; zero where nothing is
-    /// prescribed.
+    /// Returns force and torque of the prescribed motion about the origin, body axes; zero without
+    /// prescribed motion.
     pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
         self.reaction
     }

@@ -2,10 +2,10 @@
 //! interpolation of order 7 (Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, second
 //! edition, II.5 and II.6; DOP853).
 
-/// Stages of a step; one more is the rate at its end, three more interpolate.
+/// Number of stages of a step. One more stage is the rate at its end, three more serve the interpolation.
 pub(super) const STAGES: usize = 12;
 
-/// Stages with those of the interpolation.
+/// Number of stages including those of the interpolation.
 pub(super) const ALL_STAGES: usize = 16;
 
 /// Time of every stage, relative to the step.
@@ -28,7 +28,7 @@ pub(super) const C: [f64; ALL_STAGES] = [
     0.7777777777777778,
 ];
 
-/// Stage and weight of what each stage is made of; that of stage 12 is the solution of order 8.
+/// Index and weight of the rates in each stage; stage 12 is the solution of order 8.
 pub(super) const A: [&[(usize, f64)]; ALL_STAGES] = [
     &[],
     &[(0, 0.05260015195876773)],
@@ -124,7 +124,7 @@ pub(super) const A: [&[(usize, f64)]; ALL_STAGES] = [
     ],
 ];
 
-/// What the solution of order 5 differs by.
+/// Weights of the error of the solution of order 5.
 pub(super) const ERROR_5: &[(usize, f64)] = &[
     (0, 0.01312004499419488),
     (5, -1.2251564463762044),
@@ -136,7 +136,7 @@ pub(super) const ERROR_5: &[(usize, f64)] = &[
     (11, -0.022355307863886294),
 ];
 
-/// What the solution of order 3 differs by.
+/// Weights of the error of the solution of order 3.
 pub(super) const ERROR_3: &[(usize, f64)] = &[
     (0, -0.18980075407240762),
     (5, 4.450312892752409),

@@ -3,27 +3,28 @@
 use super::dormand_prince::{A, ALL_STAGES, C, ERROR_3, ERROR_5, INTERPOLATION, STAGES};
 use super::{Failure, System, Work};
 
-/// The step is chosen for this part of the tolerance.
+/// Safety factor: the next step is chosen for an error of this part of the tolerance.
 const SAFETY: f64 = 0.9;
 
-/// How much a step may shrink or grow at once.
+/// Smallest factor of the step length from one attempt to the next.
 const SHRINK: f64 = 1.0 / 3.0;
+/// Largest factor of the step length from one step to the next.
 const GROW: f64 = 6.0;
 
-/// Steps below this part of the time do not move it.
+/// Step length, relative to the time, below which a step does not advance the time.
 const SMALLEST: f64 = 16.0 * f64::EPSILON;
 
-/// The method of Dormand and Prince of order 8 with control of the step, DOP853 of Hairer, Norsett and Wanner
-/// (Solving Ordinary Differential Equations I, II.5 and II.10), and their interpolation of order 7.
+/// Method of Dormand and Prince of order 8 with step control, DOP853 of Hairer, Norsett and Wanner (Solving
+/// Ordinary Differential Equations I, II.5 and II.10), with their interpolation of order 7.
 ///
-/// A step is taken when the root mean square over the entries of error / scale is at most the tolerance, the
-/// error being h e5^2 / sqrt(e5^2 + 0.01 e3^2) of the embedded solutions of order 5 and 3. Undamped
-/// oscillations are stable up to about h omega = 6, which the control finds by itself.
+/// A step is accepted if the root mean square over the entries of error / scale is at most the tolerance,
+/// where the error is h e5^2 / sqrt(e5^2 + 0.01 e3^2) of the embedded solutions of order 5 and 3. Undamped
+/// oscillations are stable up to about h omega = 6; the step control finds this limit.
 #[derive(Debug, Clone)]
 pub struct Explicit {
     tolerance: f64,
     longest: f64,
-    /// What the control proposes for the next step.
+    /// Length proposed by the step control for the next step.
     proposed: Option<f64>,
     /// Rates of the stages.
     rates: Vec<Vec<f64>>,
@@ -31,7 +32,7 @@ pub struct Explicit {
     /// State of a stage.
     stage: Vec<f64>,
     scales: Vec<f64>,
-    /// Start, end and length of the last step; its rates serve the next one and interpolation.
+    /// Start, end and length of the last step, whose rates serve the next step and interpolation.
     last: Option<[f64; 3]>,
     /// Coefficients of the interpolation.
     polynomial: Vec<Vec<f64>>,
@@ -40,8 +41,8 @@ pub struct Explicit {
 }
 
 impl Explicit {
-    /// Steps of at most `longest` for `dimension` entries whose error is kept below `tolerance` times the
-    /// scales of the system.
+    /// Creates the method for `dimension` entries, with steps of at most `longest` and an error below
+    /// `tolerance` times the scales of the system.
     ///
     /// # Panics
     /// When the tolerance or the longest step is not positive.
@@ -63,20 +64,20 @@ impl Explicit {
         }
     }
 
-    /// What was done so far.
+    /// Returns the work done so far.
     pub fn work(&self) -> Work {
         self.work
     }
 
-    /// Forgets the last step, since f or the state jumps here.
+    /// Discards the last step, because f or the state jumps here.
     pub fn restart(&mut self) {
         (self.proposed, self.last) = (None, None);
     }
 
-    /// Takes one step from `time`, to `end` at most, and returns its end.
+    /// Takes one step from `time`, at most to `end`, and returns its end.
     ///
     /// # Errors
-    /// [`Failure::StepTooSmall`], or what the system says at the state itself.
+    /// [`Failure::StepTooSmall`]; the failures of the system at the state itself.
     ///
     /// # Panics
     /// When the state has another number of entries.
@@ -101,21 +102,21 @@ impl Explicit {
         };
         let mut grow = GROW;
         loop {
-            // A rest too short for a step of its own is shared.
+            // A remainder too short for a step of its own is split between two steps.
             let left = end - time;
             let (h, until) = match length.min(self.longest) {
                 h if h >= left * (1.0 - SMALLEST) => (left, end),
                 h if 2.0 * h > left => (0.5 * left, time + 0.5 * left),
                 h => (h, time + h),
             };
-            // Breaks may be a rounding apart, and what lies between them is one step however short.
+            // Breaks may be one rounding apart: the interval between them is one step of any length.
             let too_short = h <= SMALLEST * time.abs() && h < left;
             if h.is_nan() || too_short {
                 return Err(Failure::StepTooSmall { time });
             }
             let error = match self.attempt(system, time, h) {
                 Ok(error) => error,
-                // No rates on the way: what is there is not far enough from where there are none.
+                // No rates at a stage: the next attempt is shorter and closer to the valid state.
                 Err(Failure::Rates { .. }) => f64::INFINITY,
                 Err(failure) => return Err(failure),
             };
@@ -131,19 +132,19 @@ impl Explicit {
                 return Ok(until);
             }
             self.work.rejected += 1;
-            // NaN shrinks too.
+            // NaN shrinks the step too.
             length = h * if factor < 1.0 { factor } else { SHRINK };
             grow = 1.0;
         }
     }
 
-    /// The state at `time` within the last step, of order 7.
+    /// Computes the state at `time` within the last step, with order 7.
     ///
     /// # Errors
-    /// Those of the system.
+    /// The failures of the system.
     ///
     /// # Panics
-    /// Without a step since the start.
+    /// When no step was taken since the start.
     pub fn interpolate(
         &mut self,
         system: &mut dyn System,
@@ -179,7 +180,7 @@ impl Explicit {
         Ok(())
     }
 
-    /// `self.stage` of a step of `h` from `self.before`.
+    /// Computes `self.stage` of a step of length `h` from `self.before`.
     fn combine(&mut self, index: usize, h: f64) {
         self.stage.copy_from_slice(&self.before);
         for &(j, a) in A[index] {
@@ -197,7 +198,7 @@ impl Explicit {
         weights.iter().map(|&(j, weight)| weight * self.rates[j][i]).sum()
     }
 
-    /// The state after a step, to `self.stage`, and its error relative to the tolerance.
+    /// Writes the state after a step to `self.stage`; returns its error relative to the tolerance.
     fn attempt(&mut self, system: &mut dyn System, time: f64, h: f64) -> Result<f64, Failure> {
         for index in 1..STAGES {
             self.combine(index, h);
@@ -215,7 +216,8 @@ impl Explicit {
         Ok(h * e5 / ((e5 + 0.01 * e3) * self.scales.len() as f64).sqrt() / self.tolerance)
     }
 
-    /// A first length from the rate of the state and that rate's own, in the unit of time that they set.
+    /// Returns a first step length from the rate of the state and the rate of change of that rate, in the
+    /// time unit that both define.
     fn first_length(&mut self, system: &mut dyn System, time: f64, left: f64) -> Result<f64, Failure> {
         let scales = std::mem::take(&mut self.scales);
         let size = |of: &dyn Fn(usize) -> f64| {

@@ -1,4 +1,4 @@
-//! The free motion of an oscillator with any damping.
+//! Free motion of an oscillator with any damping.
 
 /// Returns \[c, s\] of the free motion of x'' + 2 d x' + w^2 x = 0 over a time h, with which
 ///
@@ -8,7 +8,7 @@
 /// ```
 ///
 /// * `square`: w^2, not negative.
-/// * `decay`: d; the motion oscillates where d < w, and creeps beyond.
+/// * `decay`: d; the motion oscillates for d < w, and is overdamped beyond.
 /// * `step`: h, not negative.
 pub fn free_oscillation(square: f64, decay: f64, step: f64) -> [f64; 2] {
     let difference = square - decay * decay;
@@ -18,7 +18,7 @@ pub fn free_oscillation(square: f64, decay: f64, step: f64) -> [f64; 2] {
         let fades = (-decay * step).exp();
         return [fades * cos, fades * sin / root];
     }
-    // The slower rate without the cancellation of d - root.
+    // Slower decay rate, computed without the cancellation of d - root.
     let slow = square / (decay + root).max(f64::MIN_POSITIVE);
     let fades = (-slow * step).exp();
     let faster = -(-2.0 * root * step).exp_m1();
@@ -29,8 +29,8 @@ pub fn free_oscillation(square: f64, decay: f64, step: f64) -> [f64; 2] {
 mod tests {
     use super::*;
 
-    /// The motion from x = 1, x' = 0 and its rate fulfil the equation at every damping, and the step from critical
-    /// damping to either side is none.
+    /// The motion from x = 1, x' = 0 and its rate fulfil the equation for any damping, and are continuous
+    /// at critical damping.
     #[test]
     fn motion_with_any_damping_fulfils_its_equation() {
         for (square, decay) in
@@ -42,7 +42,7 @@ mod tests {
                     [c + s * decay, -s * square]
                 };
                 let [x, v] = motion(step);
-                // Two half steps are one step.
+                // Two half steps equal one step.
                 let [c, s] = free_oscillation(square, decay, 0.5 * step);
                 let [half, rate] = motion(0.5 * step);
                 let whole =

@@ -1,40 +1,41 @@
-//! Implicit steps that conserve: collocation at the points of Gauss.
+//! Implicit conserving steps: collocation at Gauss points.
 
 use super::stages::{STAGES, StageMode, stage_modes};
 use super::{Failure, Oscillator, System, Work};
 
 type Square = [[f64; STAGES]; STAGES];
 
-/// Corrections of a step: where they contract at all, they are down to rounding long before.
+/// Limit of the number of corrections in a step: a contracting iteration reaches rounding long before.
 const MOST_CORRECTIONS: usize = 100;
 
-/// Corrections below this part of the scales have reached rounding when they no longer shrink.
+/// Corrections below this part of the scales that no longer shrink have reached rounding.
 const NEAR_ROUNDING: f64 = 1e-9;
 
-/// What is left of the stages, in scales: so far below rounding that it does not add up over millions of
-/// steps.
+/// Residual of the stages, in scales, at which the iteration ends: so far below rounding that it does not
+/// add up over millions of steps.
 const SOLVED: f64 = 1e-20;
 
 /// Collocation at Gauss points (Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1.3): order 2
-/// (the implicit midpoint rule), 4 or 6 with steps of one length.
+/// (the implicit midpoint rule), 4 or 6 with steps of constant length.
 ///
-/// The methods are symmetric, symplectic and keep quadratic invariants, and stable for every step. Stages are
-/// solved down to rounding, by iterations that treat the [`Oscillator`]s of the system exactly; increments
-/// are summed with compensation, so that rounding does not drift over millions of steps.
+/// The methods are symmetric and symplectic, conserve quadratic invariants, and are stable for every step
+/// length. Stages are solved to rounding by iterations that treat the [`Oscillator`]s of the system
+/// exactly; increments are summed with compensation, so that rounding does not drift over millions of
+/// steps.
 #[derive(Debug, Clone)]
 pub struct Gauss {
     tableau: Box<Tableau>,
     modes: Vec<StageMode>,
-    /// Corrections that count no longer.
+    /// Size of corrections at which the iteration ends.
     solved: f64,
-    /// Into how many each of its steps is divided.
+    /// Number of parts that each step is divided into.
     refinement: u32,
     /// Increments Z of the stages, and their rates.
     increments: [Vec<f64>; STAGES],
     rates: [Vec<f64>; STAGES],
     stage: Vec<f64>,
     scales: Vec<f64>,
-    /// What rounding took from the state.
+    /// Rounding errors of the state, for compensated summation.
     carry: Vec<f64>,
     /// (I + d h A + lambda h^2 A^2)^-1 of every oscillator.
     oscillators: Vec<(Oscillator, Square)>,
@@ -43,14 +44,15 @@ pub struct Gauss {
     work: Work,
 }
 
-/// A method: what its stages are made of.
+/// Coefficients of a method.
 #[derive(Debug, Clone)]
 struct Tableau {
     stages: usize,
-    /// Places of the stages in the step, and weights of their rates.
+    /// Positions of the stages in the step, and weights of their rates.
     nodes: [f64; STAGES],
     weights: Square,
-    /// Stages of the next step, and the end of this one, from the increments of this one.
+    /// Coefficients of the stages of the next step, and of the end of this step, on the increments of this
+    /// step.
     ahead: Square,
     to_end: [f64; STAGES],
 }
@@ -72,7 +74,7 @@ impl Tableau {
             _ => panic!("Gauss methods of order 2, 4 and 6, not {order}"),
         };
         let stages = order / 2;
-        // The polynomial through zero and the increments.
+        // Lagrange polynomial through zero and the increments.
         let polynomial = |j: usize, x: f64| {
             let others = (0..stages).filter(|&k| k != j);
             others.fold(x / nodes[j], |product, k| product * (x - nodes[k]) / (nodes[j] - nodes[k]))
@@ -88,7 +90,7 @@ impl Tableau {
 }
 
 impl Gauss {
-    /// The method of the given order for `dimension` entries.
+    /// Creates the method of the given order for `dimension` entries.
     ///
     /// # Panics
     /// When the order is not 2, 4 or 6.
@@ -111,39 +113,40 @@ impl Gauss {
         }
     }
 
-    /// The same with stages that are solved until what is left of them is below `solved` in scales, instead
-    /// of down to rounding.
+    /// Returns the method with stages solved until the residual is below `solved` in scales, instead of to
+    /// rounding.
     pub fn solved_to(self, solved: f64) -> Self {
         Self { solved, ..self }
     }
 
-    /// The same with every step of an integration divided into so many: at the ends of the steps before they
-    /// meet again.
+    /// Returns the method with every step of an integration divided into `refinement` parts. The ends of
+    /// the undivided steps remain among the ends of steps.
     pub fn refined(self, refinement: u32) -> Self {
         Self { refinement: refinement.max(1), ..self }
     }
 
-    /// Into how many each of its steps is divided.
+    /// Returns the number of parts that each step is divided into.
     pub(super) fn refinement(&self) -> u32 {
         self.refinement
     }
 
-    /// What was done so far.
+    /// Returns the work done so far.
     pub fn work(&self) -> Work {
         self.work
     }
 
-    /// Forgets the last step, since f or the state jumps here.
+    /// Discards the last step, because f or the state jumps here.
     pub fn restart(&mut self) {
         self.last = None;
         self.carry.fill(0.0);
     }
 
-    /// Takes a step of `h` from `time`. It goes on from the last one unless [`Gauss::restart`] was called.
+    /// Takes a step of length `h` from `time`. The step continues the last one unless [`Gauss::restart`]
+    /// was called.
     ///
     /// # Errors
-    /// [`Failure::NotConverged`] where the step is too long for what the oscillators leave to the iteration,
-    /// or what the system says.
+    /// [`Failure::NotConverged`] if the step is too long for the part of the system outside the
+    /// oscillators; failures of the system.
     ///
     /// # Panics
     /// When the state has another number of entries.
@@ -171,7 +174,7 @@ impl Gauss {
             let own_size = system.correct_stages(h, &self.modes, &self.scales, lacks)?;
             let in_scales = self.correct(h);
             let size = own_size.unwrap_or(in_scales);
-            // How much the corrections shrink; nothing is known at the first.
+            // Contraction of the corrections; unknown at the first correction.
             let ratio = before.map(|before: f64| size / before);
             let stalled = |ratio: f64| ratio > 0.5 && size < NEAR_ROUNDING;
             if !size.is_finite() || ratio.is_some_and(|ratio| ratio > 2.0 && !stalled(ratio)) {
@@ -191,7 +194,7 @@ impl Gauss {
         Err(failed)
     }
 
-    /// Increments to start from, and the oscillators for this length.
+    /// Computes start increments, and the oscillator matrices for this step length.
     fn prepare(&mut self, system: &dyn System, h: f64) {
         if self.last == Some(h) {
             for at in 0..self.stage.len() {
@@ -207,19 +210,19 @@ impl Gauss {
         self.oscillators = own.map(|&oscillator| (oscillator, self.inverse(&oscillator, h))).collect();
     }
 
-    /// (I + d h A + lambda h^2 A^2)^-1.
+    /// Returns (I + d h A + lambda h^2 A^2)^-1.
     fn inverse(&self, oscillator: &Oscillator, h: f64) -> Square {
         let n = self.tableau.stages;
         let a = nalgebra::DMatrix::from_fn(n, n, |i, j| h * self.tableau.weights[i][j]);
         let matrix =
             nalgebra::DMatrix::identity(n, n) + &a * oscillator.damping + &a * (&a * oscillator.stiffness);
-        // The eigenvalues of A lie in the right half plane: regular for every damped oscillator; else it is
-        // left to the iteration.
+        // The eigenvalues of A lie in the right half plane: the matrix is regular for every damped
+        // oscillator. Otherwise the plain iteration treats it.
         let inverse = matrix.try_inverse().unwrap_or_else(|| nalgebra::DMatrix::identity(n, n));
         std::array::from_fn(|i| std::array::from_fn(|j| if i < n && j < n { inverse[(i, j)] } else { 0.0 }))
     }
 
-    /// What the increments lack, h A f - Z, in place of the rates.
+    /// Computes the residual of the increments, h A f - Z, in place of the rates.
     fn find_lacks(&mut self, h: f64) {
         for at in 0..self.stage.len() {
             let rates = self.rates.each_ref().map(|rates| rates[at]);
@@ -229,7 +232,8 @@ impl Gauss {
         }
     }
 
-    /// Corrects the increments by what they lack, seen through the oscillators; root mean square in scales.
+    /// Corrects the increments by their residual, filtered by the oscillators; returns the root mean square
+    /// of the correction in scales.
     fn correct(&mut self, h: f64) -> f64 {
         for (oscillator, inverse) in &self.oscillators {
             let (x, p) = (oscillator.coordinate, oscillator.momentum);
@@ -255,13 +259,14 @@ impl Gauss {
         (sum / (self.tableau.stages * self.stage.len()) as f64).sqrt()
     }
 
-    /// Adds the increment of the step with what rounding took before.
+    /// Adds the increment of the step and the compensation of earlier rounding.
     fn advance(&mut self, state: &mut [f64]) {
         for (at, y) in state.iter_mut().enumerate() {
             let increments = self.increments.each_ref().map(|z| z[at]);
             let increment = product(&self.tableau.to_end, &increments) + self.carry[at];
             let sum = *y + increment;
-            // Exact where the state is larger than its increment; else the rounding is that of the increment.
+            // Exact if the state is larger than its increment; otherwise the rounding is that of the
+            // increment.
             self.carry[at] = (*y - sum) + increment;
             *y = sum;
         }

@@ -1,4 +1,4 @@
-//! Time integration of ordinary differential equations; knows no bodies.
+//! Time integration of ordinary differential equations, independent of bodies.
 
 mod dormand_prince;
 mod explicit;

@@ -1,21 +1,21 @@
-//! From instant to instant: what every integration does with its steps.
+//! Time loop shared by all integrators: output times, breaks, observers.
 
 use super::{Explicit, Failure, Gauss, System, Work};
 
-/// What lengths may differ by, relative, as rounding of times makes them.
+/// Relative difference of lengths that rounding of times explains.
 const STEP_ROUNDING: f64 = 1e-9;
 
-/// Where explicit steps to a break end, relative: a few roundings before it.
+/// Relative distance before a break at which explicit steps end: a few roundings.
 const BEFORE_BREAK: f64 = 4.0 * f64::EPSILON;
 
-/// How a system is integrated.
+/// Integration method with its steps.
 #[derive(Debug, Clone)]
 pub enum Method {
     /// Steps as long as the tolerance allows.
     Explicit(Explicit),
-    /// Steps of one length between two breaks, at most `step`.
+    /// Steps of constant length between two breaks, at most `step`.
     Gauss {
-        /// The method.
+        /// Collocation method.
         method: Gauss,
         /// Longest step.
         step: f64,
@@ -23,7 +23,7 @@ pub enum Method {
 }
 
 impl Method {
-    /// What was done so far.
+    /// Returns the work done so far.
     pub fn work(&self) -> Work {
         match self {
             Self::Explicit(method) => method.work(),
@@ -39,29 +39,29 @@ impl Method {
     }
 }
 
-/// What a state that is shown belongs to.
+/// Occasion of a state passed to an observer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// An instant that was asked for.
+    /// Requested output time.
     Instant,
-    /// The start of a stretch without breaks: the first instant, and the far side of every break.
+    /// Start of an interval without breaks: the first output time, and the far side of every break.
     Start,
-    /// The end of a step.
+    /// End of a step.
     End,
-    /// A place within a step.
+    /// Point within a step.
     Within,
 }
 
-/// Integrates from the first to the last of `instants` and shows the state at every one to `observe`, which
-/// may end the integration by returning an error. The steps do not depend on the instants between: within a
-/// step the explicit method interpolates, and the method of Gauss takes a shorter step aside.
+/// Integrates from the first to the last of `instants` and passes the state at each of them to `observe`,
+/// which may end the integration by returning an error. The steps do not depend on the times between:
+/// within a step the explicit method interpolates, and the Gauss method takes a separate shorter step.
 ///
-/// * `state`: y at the first instant; afterwards, y at the last.
-/// * `instants`: ascending.
-/// * `breaks`: ascending; times at which f jumps or has a kink. No step passes over one.
+/// * `state`: y at the first time; afterwards, y at the last.
+/// * `instants`: output times, ascending.
+/// * `breaks`: times at which f jumps or has a kink, ascending. No step passes over one.
 ///
 /// # Errors
-/// Of the system, of the method, or of `observe`. The state is then that of the last good step.
+/// Errors of the system, of the method, or of `observe`. The state is then that of the last good step.
 ///
 /// # Panics
 /// When the state has another number of entries than the system.
@@ -79,15 +79,16 @@ pub fn integrate<E: From<Failure>>(
     })
 }
 
-/// As [`integrate`], and shows besides the instants the state at the start, at the end of every step, at both
-/// sides of every break and, of the explicit method, at `parts` - 1 places within every step that divide it
-/// evenly. Times never descend; an instant at one of these places is shown twice.
+/// Integrates as [`integrate`] does. Besides the output times, `observe` gets the state at the start, at
+/// the end of every step, at both sides of every break and, for the explicit method, at `parts` - 1 evenly
+/// spaced points within every step. Times never descend; an output time at one of these points is passed
+/// twice.
 ///
 /// # Errors
-/// As [`integrate`].
+/// The errors of [`integrate`].
 ///
 /// # Panics
-/// As [`integrate`].
+/// The panics of [`integrate`].
 pub fn integrate_closely<E: From<Failure>>(
     method: &mut Method,
     system: &mut dyn System,
@@ -106,7 +107,8 @@ pub fn integrate_closely<E: From<Failure>>(
     let ends_in_break = breaks.binary_search_by(|at| at.total_cmp(&last)).is_ok();
     for (stop, is_break) in inner.chain([(last, ends_in_break)]) {
         method.restart();
-        // f at a break is that after it, which is not what the last rate of an explicit step is about.
+        // f at a break is that after it, but the last rate of an explicit step belongs to the time before
+        // it.
         let piece = SmoothInterval { from, before: if is_break { just_before(stop) } else { stop } };
         match method {
             Method::Explicit(method) => {
@@ -127,26 +129,26 @@ pub fn integrate_closely<E: From<Failure>>(
     Ok(())
 }
 
-/// The last time before a break that f does not count as after it.
+/// Returns the last time before a break at which f still belongs to the time before it.
 fn just_before(stop: f64) -> f64 {
     stop - BEFORE_BREAK * stop.abs()
 }
 
-/// A stretch of time without breaks.
+/// Time interval without breaks.
 #[derive(Debug, Clone, Copy)]
 struct SmoothInterval {
     from: f64,
-    /// Its end, just before the break there.
+    /// End of the interval, just before the break.
     before: f64,
 }
 
-/// The instants that were not shown yet.
+/// Output times that are still to come.
 struct Wanted<'i> {
     rest: &'i [f64],
 }
 
 impl Wanted<'_> {
-    /// The next one where it is not after `time`.
+    /// Returns the next output time if it is not after `time`.
     fn next_until(&mut self, time: f64) -> Option<f64> {
         let (&first, rest) = self.rest.split_first()?;
         (first <= time).then(|| {
@@ -155,14 +157,15 @@ impl Wanted<'_> {
         })
     }
 
-    /// The next one where it is before `time`.
+    /// Returns the next output time if it is before `time`.
     fn next_before(&mut self, time: f64) -> Option<f64> {
         self.rest.first().filter(|&&first| first < time)?;
         self.next_until(time)
     }
 }
 
-/// Integrates over a stretch with the explicit method; instants and places within a step are interpolated.
+/// Integrates over an interval with the explicit method; states at output times and at points within a step
+/// are interpolated.
 fn explicit_piece<E: From<Failure>>(
     method: &mut Explicit,
     system: &mut dyn System,
@@ -194,8 +197,8 @@ fn explicit_piece<E: From<Failure>>(
     Ok(())
 }
 
-/// Integrates over a stretch in equal steps of the method of Gauss; an instant within a step is reached by a
-/// shorter step aside.
+/// Integrates over an interval in equal steps of the Gauss method; a separate shorter step reaches an
+/// output time within a step.
 fn gauss_piece<E: From<Failure>>(
     method: &mut Gauss,
     longest: f64,
@@ -220,7 +223,7 @@ fn gauss_piece<E: From<Failure>>(
         finite(state, time)?;
         taken += 1.0;
         let end = if taken < steps { piece.from + taken * length } else { piece.before };
-        // What lies within rounding of the end is at the end.
+        // An output time within rounding of the end of the step is at the end.
         while let Some(instant) = wanted.next_before(end - STEP_ROUNDING * length) {
             let aside = aside.get_or_insert_with(|| method.clone());
             let mut within = before.clone();
@@ -238,7 +241,7 @@ fn gauss_piece<E: From<Failure>>(
     Ok(())
 }
 
-/// `time` is that of the last good state.
+/// Returns an error if the state is not finite; `time` is that of the last good state.
 fn finite(state: &[f64], time: f64) -> Result<(), Failure> {
     if state.iter().all(|y| y.is_finite()) { Ok(()) } else { Err(Failure::NotFinite { time }) }
 }

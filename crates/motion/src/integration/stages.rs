@@ -1,26 +1,26 @@
-//! The stages of an implicit step, seen one eigenvalue of the method at a time.
+//! Stages of an implicit step, decoupled by the eigenvalues of the method.
 
 use nalgebra::{Complex, DMatrix};
 
-/// Stages of the method of the highest order here.
+/// Number of stages of the method of the highest order.
 pub const STAGES: usize = 3;
 
-/// An eigenvalue mu of the matrix A of the method, with its part of every stage: sum over all of them of
-/// right_i mu left_j = A_ij. Of a pair of conjugate ones only that above the real axis is told, and its part
-/// counts with twice its real part.
+/// Eigenvalue mu of the matrix A of the method, with its part of every stage: the sum over all eigenvalues
+/// of right_i mu left_j is A_ij. Of a conjugate pair only the eigenvalue above the real axis is stored, and
+/// twice the real part of its contribution counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StageMode {
-    /// mu: to the right of the imaginary axis, mu^2 too.
+    /// Eigenvalue mu; mu and mu^2 lie to the right of the imaginary axis.
     pub value: Complex<f64>,
-    /// Takes the part of this eigenvalue from the stages.
+    /// Weights that extract the part of this eigenvalue from the stages.
     pub left: [Complex<f64>; STAGES],
-    /// Gives it back to the stages.
+    /// Weights that distribute this part to the stages.
     pub right: [Complex<f64>; STAGES],
-    /// Whether there is a conjugate one.
+    /// True if there is a conjugate eigenvalue.
     pub paired: bool,
 }
 
-/// The eigenvalues of the first `stages` rows and columns of A, which are distinct.
+/// Returns the eigenvalues of the first `stages` rows and columns of A, which are distinct.
 pub(super) fn stage_modes(a: &[[f64; STAGES]; STAGES], stages: usize) -> Vec<StageMode> {
     let matrix = DMatrix::from_fn(stages, stages, |i, j| a[i][j]);
     let complex = matrix.map(|entry| Complex::new(entry, 0.0));
@@ -53,14 +53,14 @@ pub(super) fn stage_modes(a: &[[f64; STAGES]; STAGES], stages: usize) -> Vec<Sta
     modes
 }
 
-/// Where the entry of largest size stands.
+/// Returns the position of the entry of largest magnitude.
 fn largest_entry(matrix: &DMatrix<Complex<f64>>) -> (usize, usize) {
     let places = (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
     let size = |at: &(usize, usize)| matrix[*at].norm_sqr();
     places.max_by(|a, b| size(a).total_cmp(&size(b))).expect("a matrix with entries")
 }
 
-/// Rounding beside the real part.
+/// Imaginary part relative to the real part that counts as rounding.
 const REAL: f64 = 1e-9;
 
 fn is_paired(value: Complex<f64>) -> bool {

@@ -1,39 +1,39 @@
-//! What is integrated, and why an integration ends early.
+//! Systems of differential equations, and reasons for an integration to end early.
 
 use super::StageMode;
 
-/// A system of ordinary differential equations y' = f(t, y).
+/// System of ordinary differential equations y' = f(t, y).
 pub trait System {
-    /// Number of entries of y.
+    /// Returns the number of entries of y.
     fn dimension(&self) -> usize;
 
-    /// f(t, y).
+    /// Computes f(t, y).
     ///
     /// # Errors
-    /// [`Failure::Rates`] where the equations have no solution at this state; an integrator with error
-    /// control then tries a shorter step.
+    /// [`Failure::Rates`] if the equations have no solution at this state; an integrator with error control
+    /// then tries a shorter step.
     fn rates(&mut self, time: f64, state: &[f64], rates: &mut [f64]) -> Result<(), Failure>;
 
-    /// What an error of each entry is measured against at this state: all positive, in the units of the
-    /// entry. A tolerance is the largest root mean square of error / scale that a step may add.
+    /// Writes the scale of the error of each entry at this state: all positive, in the units of the entry.
+    /// A tolerance is the largest root mean square of error / scale that a step may add.
     fn scales(&self, state: &[f64], scales: &mut [f64]);
 
-    /// The stiff part of the system that implicit steps solve without iterating; none unless the system knows
-    /// one.
+    /// Returns the stiff part of the system that implicit steps solve without iteration; the default is
+    /// empty.
     fn oscillators(&self) -> &[Oscillator] {
         &[]
     }
 
-    /// Sees what the stages of an implicit step of length h lack, `lacks`, through a stiff linear part J of
-    /// the system that is solved as a whole: replaces it by (I - h A kron J)^-1 `lacks`, with the matrix A of
-    /// the method given by its eigenvalues. Nothing unless the system has such a part.
+    /// Filters the residuals `lacks` of the stages of an implicit step of length h by a stiff linear part J
+    /// of the system that is solved as a whole: replaces them by (I - h A kron J)^-1 `lacks`, with the
+    /// matrix A of the method given by its eigenvalues. The default does nothing.
     ///
-    /// Returns the root mean square of the corrections over the stages in a norm of the system's own,
-    /// relative to the motion, where its scales, entry by entry, would count as much what is stiff as what is
-    /// soft and is known less closely; else `None`.
+    /// Returns the root mean square of the corrections over the stages, relative to the motion, in a norm
+    /// of the system. Such a norm is needed if entry-wise scales would weigh stiff and soft parts equally,
+    /// although the stiff part is known less accurately. Returns `None` if the entry-wise scales are valid.
     ///
     /// # Errors
-    /// Where that cannot be solved.
+    /// Failures of the solution with the stiff part.
     fn correct_stages(
         &mut self,
         _h: f64,
@@ -44,12 +44,12 @@ pub trait System {
         Ok(None)
     }
 
-    /// Restores what holds exactly, as the length of Euler parameters; called after every step that is taken.
+    /// Restores exact relations, such as the length of Euler parameters; called after every accepted step.
     fn settle(&self, _state: &mut [f64]) {}
 }
 
-/// A pair of entries with x' = p + ... and p' = -stiffness x - damping p + ..., where the rest varies slowly
-/// or little.
+/// Pair of entries with x' = p + ... and p' = -stiffness x - damping p + ..., where the other terms vary
+/// slowly or little.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Oscillator {
     /// Index of x.
@@ -58,27 +58,27 @@ pub struct Oscillator {
     pub momentum: usize,
     /// Square of the circular frequency.
     pub stiffness: f64,
-    /// Rate of decay of p.
+    /// Decay rate of p.
     pub damping: f64,
 }
 
-/// What an integration has done.
+/// Work of an integration.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Work {
-    /// Steps taken.
+    /// Number of accepted steps.
     pub steps: u64,
-    /// Steps tried and not taken.
+    /// Number of rejected steps.
     pub rejected: u64,
-    /// Evaluations of f(t, y).
+    /// Number of evaluations of f(t, y).
     pub rates: u64,
 }
 
-/// Why an integration cannot go on.
+/// Reason for an integration to fail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Failure {
-    /// f(t, y) does not exist: `reason` as a lowercase fragment.
+    /// f(t, y) does not exist.
     Rates {
-        /// What is wrong with the state.
+        /// Reason as a lowercase fragment of a sentence.
         reason: &'static str,
     },
     /// The state is no longer finite.
@@ -86,7 +86,7 @@ pub enum Failure {
         /// End of the last good step.
         time: f64,
     },
-    /// No step that time can still resolve meets the tolerance.
+    /// No step length that the time can resolve meets the tolerance.
     StepTooSmall {
         /// End of the last good step.
         time: f64,
@@ -95,7 +95,7 @@ pub enum Failure {
     NotConverged {
         /// Start of the step.
         time: f64,
-        /// Its length.
+        /// Length of the step.
         step: f64,
     },
 }

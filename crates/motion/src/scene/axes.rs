@@ -1,20 +1,19 @@
-//! Axes that vectors of a scene are along.
+//! Axes of the vectors in a scene.
 
 /// Axes that a vector is given in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Axes {
-    /// Fixed in space.
+    /// Axes fixed in space.
     World,
-    /// Those of the model, turning with the body. Of a body that came without a model these are those of its
-    /// file.
+    /// Axes of the model, turning with the body. For a body without a model they are the axes of its file.
     #[default]
     Model,
-    /// Those of the body frame of the flex-body file, turning with the body.
+    /// Axes of the body frame of the flex-body file, turning with the body.
     Body,
 }
 
 impl Axes {
-    /// Name in files.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::World => "world",

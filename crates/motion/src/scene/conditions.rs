@@ -1,28 +1,28 @@
-//! What the reference conditions of a body carry: the forces that keep its frame where the conditions say
-//! that it is.
+//! Reactions of the reference conditions of a body: the forces that keep its frame in the position that the
+//! conditions define.
 
 use super::stage::{UNCOUPLED, is_uncoupled};
 use flexbody_body::flex_body::FlexBody;
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// The reaction of mean axes (Tisserand), the reference conditions of free-surface modes.
+/// Reaction of mean axes (Tisserand), the reference conditions of free-surface modes.
 ///
-/// Displacements u of the nodes count from a frame that conditions C u = 0 tie to the body, with multipliers
-/// lambda in the equations of all nodes (theory 6.10). What C'lambda carries has no force and the torque
-/// about the origin of the frame
+/// Displacements u of the nodes refer to a frame that conditions C u = 0 tie to the body, with multipliers
+/// lambda in the equations of all nodes (theory 6.10). C'lambda has no resultant force and the torque about
+/// the origin of the frame
 ///
 /// ```text
 /// sum_i u_i x (K u + D u')_i = Q'W3 m_ff^-1 (K_ff q + D_ff qd)
 /// ```
 ///
-/// (theory 6.12): the moment that linear elastic forces and those of the damping have about the deformed
-/// body. It does no work and acts on no mode; it says how far elasticity that is linear in a floating frame
-/// is from one that turns with the material, of second order in q. The right side is the left one where the
-/// modes are eigenvectors (K Psi = M Psi Lambda); of other shapes it has that part of the elastic forces
-/// which the modes hold.
+/// (theory 6.12): the moment of linear elastic and damping forces about the deformed body. It does no work
+/// and acts on no mode. It measures the difference, of second order in q, between elasticity that is linear
+/// in a floating frame and elasticity that turns with the material. The right side equals the left one if
+/// the modes are eigenvectors (K Psi = M Psi Lambda); for other shapes it contains the part of the elastic
+/// forces in the span of the modes.
 #[derive(Debug, Clone)]
 pub(super) struct MeanAxes {
-    /// The blocks of W3 that belong to axes about which the body turns.
+    /// Blocks of W3 for the axes about which the body turns.
     w3: Vec<(usize, DMatrix<f64>)>,
     /// m_ff^-1 K_ff and m_ff^-1 D_ff.
     stiffness: DMatrix<f64>,
@@ -30,9 +30,9 @@ pub(super) struct MeanAxes {
 }
 
 impl MeanAxes {
-    /// Of `body`, or `None` where its frame is no mean frame (C1 and C2 do not vanish, as where something
-    /// carries the body), it does not hold W3, or its mass matrix is general: couples on nodes that turn are no sums
-    /// over the invariants.
+    /// Creates the reaction for `body`. Returns `None` if its frame is no mean-axis frame (C1 and C2 do not
+    /// vanish, as for a carried body), if it does not hold W3, or if its mass matrix is general: couples on
+    /// nodes that turn are no sums over the invariants.
     pub(super) fn new(body: &FlexBody) -> Option<Self> {
         let (invariants, nf) = (body.invariants(), body.n_modes());
         let w3 = invariants.w3()?;
@@ -50,7 +50,7 @@ impl MeanAxes {
         })
     }
 
-    /// The torque, axes of the frame, about its origin.
+    /// Returns the torque about the origin of the frame, axes of the frame.
     pub(super) fn torque(&self, q: &[f64], qd: &[f64]) -> Vector3<f64> {
         let (q, qd) = (DVector::from_column_slice(q), DVector::from_column_slice(qd));
         let internal = &self.stiffness * &q + &self.damping * qd;
@@ -60,7 +60,7 @@ impl MeanAxes {
     }
 }
 
-/// Whether angular accelerations of the frame excite no mode.
+/// Returns true if angular accelerations of the frame excite no mode.
 fn turns_no_mode(body: &FlexBody) -> bool {
     let invariants = body.invariants();
     let (c2, inertia, modal) = (invariants.c2(), invariants.inertia(), invariants.modal_mass());

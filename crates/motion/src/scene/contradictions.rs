@@ -1,10 +1,10 @@
-//! What a scene says against itself, or twice.
+//! Contradictions and repetitions within a scene.
 
 use flexbody_base::diagnostic::Code;
 use flexbody_base::text::walk::{TomlTable, Value, Walk, integer};
 use toml::de::DeValue;
 
-/// Complains about everything that another part of the scene would silently take the place of.
+/// Adds a diagnostic for every entry that another part of the scene would silently override.
 pub(super) fn contradictions(walk: &mut Walk<'_>, top: &TomlTable) {
     let spin = table_of(top, "spin");
     let holds = spin
@@ -72,7 +72,7 @@ fn table_of<'t>(top: &'t TomlTable<'_>, key: &str) -> Option<&'t TomlTable<'t>> 
     }
 }
 
-/// Complains about items of a list with the same `name`.
+/// Adds a diagnostic for items of a list with equal `name`.
 fn twice(
     walk: &mut Walk<'_>,
     list: Option<&Value<'_>>,

@@ -1,4 +1,4 @@
-//! A scene as data. Numbers are in the units of the body that it is for.
+//! A scene as data. Numbers are in the units of the body that the scene is for.
 
 use super::{Axes, Requirements, VectorHistory};
 use crate::dynamics::{RotationVector, Terms};
@@ -6,59 +6,60 @@ use flexbody_base::provenance::SourceFile;
 use nalgebra::{Matrix3, Vector3};
 use std::path::PathBuf;
 
-/// A scene: start, loads and prescribed motion of a body, and how that is simulated.
+/// A scene: initial state, loads and prescribed motion of a body, and settings of its simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scene {
     /// Name.
     pub name: String,
-    /// Duration, instants and method of the simulation.
+    /// Duration, output times and method of the simulation.
     pub run: Run,
-    /// The state at time zero.
+    /// State at time zero.
     pub initial: Initial,
     /// Uniform gravity, world axes.
     pub gravity: Option<Vector3<f64>>,
-    /// Forces and torques.
+    /// Applied forces and torques.
     pub loads: Vec<Load>,
     /// Prescribed spin.
     pub spin: Option<Spin>,
-    /// The interface that carries the body.
+    /// Interface or node that carries the body.
     pub carried: Option<Carried>,
-    /// Places whose paths are recorded.
+    /// Points whose paths are recorded.
     pub watched: Vec<Point>,
-    /// Demands on a body that is made for the scene.
+    /// Requirements for a body that is made for the scene.
     pub requirements: Requirements,
-    /// The file that it was read from.
+    /// File that the scene was read from.
     pub source: Option<SourceFile>,
-    /// The files that its histories were read from.
+    /// Files that histories of the scene were read from.
     pub series: Vec<SeriesFile>,
-    /// Whether its vectors are along the axes of a body in its [`Stage`](super::Stage), and its start is that
-    /// of this body's frame.
+    /// True if the vectors are along the axes of a body in its [`Stage`](super::Stage), and the initial
+    /// state is that of the frame of this body.
     pub resolved: bool,
-    /// Which load case it is of a scene that has several.
+    /// Name of this load case, if the scene file has several.
     pub case: Option<CaseName>,
 }
 
 /// Name of a load case of a scene file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CaseName {
-    /// Name of what all cases belong to.
+    /// Name of the scene that all cases belong to.
     pub scene: String,
     /// Name of the case.
     pub name: String,
 }
 
 impl Scene {
-    /// Name of the load case that it is.
+    /// Returns the name of the load case; `None` if the scene has no cases.
     pub fn case_name(&self) -> Option<&str> {
         Some(&self.case.as_ref()?.name)
     }
 
-    /// Name of the load case, or of a scene that is none.
+    /// Returns the name of the load case or, for a scene without cases, of the scene.
     pub fn short_name(&self) -> &str {
         self.case_name().unwrap_or(&self.name)
     }
 
-    /// The same for a body that has only `modes` (from 0, ascending) of the one that it was written for.
+    /// Returns the scene for a body that has only `modes` (from 0, ascending) of the body that the scene
+    /// was written for.
     pub fn of_modes(&self, modes: &[usize]) -> Self {
         let mut scene = self.clone();
         let kept =
@@ -67,7 +68,7 @@ impl Scene {
         scene
     }
 
-    /// Times at which something is not smooth, ascending.
+    /// Returns the times at which a history is not smooth, ascending.
     pub fn breaks(&self) -> Vec<f64> {
         let mut times: Vec<f64> =
             self.acting().chain(self.driving()).flat_map(VectorHistory::breaks).collect();
@@ -78,19 +79,20 @@ impl Scene {
 }
 
 impl Scene {
-    /// Angular velocity of a prescribed rotation, of the frame or of the interface that carries the body.
+    /// Returns the angular velocity of a prescribed rotation, of the frame or of the interface that carries
+    /// the body.
     pub fn rotation(&self) -> Option<&VectorHistory> {
         let carried = self.carried.as_ref().and_then(|carried| carried.spin.as_ref());
         let spin = self.spin.as_ref().map(|spin| &spin.velocity);
         spin.or(carried.map(|spin| &spin.velocity))
     }
 
-    /// Whether the motion of the frame, or of the interface that carries the body, is prescribed.
+    /// Returns true if the motion of the frame, or of the interface that carries the body, is prescribed.
     pub fn prescribes(&self) -> bool {
         self.spin.is_some() || self.carried.is_some()
     }
 
-    /// The same with the prescribed angular velocity times a factor.
+    /// Returns the scene with the prescribed angular velocity multiplied by `factor`.
     pub fn turning_faster(&self, factor: f64) -> Self {
         let mut scene = self.clone();
         let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
@@ -101,63 +103,63 @@ impl Scene {
         scene
     }
 
-    /// Histories of loads.
+    /// Returns the histories of the loads.
     pub fn acting(&self) -> impl Iterator<Item = &VectorHistory> {
         self.loads.iter().flat_map(|load| [&load.force, &load.torque])
     }
 
-    /// Histories of prescribed motion.
+    /// Returns the histories of prescribed motion.
     pub fn driving(&self) -> impl Iterator<Item = &VectorHistory> {
         let translation = self.carried.as_ref().and_then(|carried| carried.translation.as_ref());
         self.rotation().into_iter().chain(translation.map(Drive::history))
     }
 }
 
-/// Duration, instants and method of a simulation.
+/// Duration, output times and method of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
-    /// From time zero to this; `None` where nothing is to be simulated.
+    /// End time of the simulation, which starts at zero; `None` if nothing is simulated.
     pub duration: Option<f64>,
-    /// Instants recorded after the first, evenly spaced.
+    /// Number of evenly spaced output times after the first.
     pub outputs: usize,
-    /// Steps that the integration may take; a run that needs more is refused.
+    /// Largest number of integration steps; a run that needs more fails.
     pub most_steps: u64,
     /// Integration method.
     pub scheme: Scheme,
-    /// Terms of the equations of motion.
+    /// Terms of the equations of motion that are used.
     pub terms: Terms,
 }
 
 impl Run {
-    /// Steps that an integration may take unless the scene says otherwise: some minutes to an hour, with the
-    /// number of modes.
+    /// Default limit of the number of integration steps: some minutes to an hour, depending on the number
+    /// of modes.
     pub const MOST_STEPS: u64 = 20_000_000;
 }
 
 /// Integration methods ([`crate::integration`]).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Scheme {
-    /// Explicit, of order 8, with error control.
+    /// Explicit method of order 8 with error control.
     Adaptive {
         /// Largest error of a step, relative to the scales of the motion.
         tolerance: f64,
     },
-    /// Gauss collocation with steps of one length.
+    /// Gauss collocation with steps of constant length.
     Conserving {
-        /// 2, 4 or 6.
+        /// Order of the method: 2, 4 or 6.
         order: usize,
-        /// Longest step; `None`: a twentieth of the shortest period of the body.
+        /// Longest step; `None`: one twentieth of the shortest period of the body.
         step: Option<f64>,
     },
 }
 
-/// The state at time zero.
+/// State at time zero.
 ///
-/// A point that has the coordinates x in the model is at `origin` + A x in the world, A being the rotation by
-/// `rotation`: world axes start along those of the model unless that turns them.
+/// A point with the coordinates x in the model is at `origin` + A x in the world, where A is the rotation
+/// by `rotation`. Without rotation the world axes are the axes of the model.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Initial {
-    /// Where the origin of the model is, world axes.
+    /// Position of the origin of the model, world axes.
     pub origin: Vector3<f64>,
     /// Velocity of the centre of mass of the undeformed body, world axes.
     pub velocity: Vector3<f64>,
@@ -167,14 +169,14 @@ pub struct Initial {
     pub angular_velocity: Vector3<f64>,
     /// Axes of the angular velocity.
     pub axes: Axes,
-    /// Modes that are not at rest and undeformed.
+    /// Initial values of modes that do not start at rest and undeformed.
     pub modes: Vec<ModeStart>,
-    /// Whether the deformation starts at rest in equilibrium with what acts at time zero, instead of with a
-    /// shock.
+    /// True if the deformation starts at rest, in equilibrium with the loads and the motion at time zero,
+    /// instead of undeformed.
     pub settled: bool,
 }
 
-/// A mode at time zero.
+/// Initial values of a mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ModeStart {
     /// Number of the mode, from 0.
@@ -185,12 +187,12 @@ pub struct ModeStart {
     pub rate: f64,
 }
 
-/// A place of the body.
+/// Point of the body.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Point {
-    /// A node by its number.
+    /// Node of this number.
     Node(i64),
-    /// An interface by its name.
+    /// Interface of this name.
     Interface(String),
 }
 
@@ -203,30 +205,30 @@ impl std::fmt::Display for Point {
     }
 }
 
-/// A file that a history was read from.
+/// File that a history was read from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SeriesFile {
-    /// Where it lies.
+    /// Path of the file.
     pub path: PathBuf,
-    /// Its name and fingerprint.
+    /// Name and fingerprint of the file.
     pub source: SourceFile,
 }
 
-/// A force and a torque at a place.
+/// Force and torque at a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Load {
-    /// Where it acts.
+    /// Point of application.
     pub at: Point,
     /// Force.
     pub force: VectorHistory,
     /// Torque.
     pub torque: VectorHistory,
-    /// Axes of both.
+    /// Axes of force and torque.
     pub axes: Axes,
 }
 
 impl Load {
-    /// Force and torque at a time, along the axes of the load.
+    /// Returns force and torque at a time, along the axes of the load.
     pub fn at_time(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
         (self.force.at(time).0, self.torque.at(time).0)
     }
@@ -237,26 +239,27 @@ impl Load {
 pub struct Spin {
     /// Angular velocity.
     pub velocity: VectorHistory,
-    /// Its axes. Those of the world are, of a direction that does not change, the axes of the world at time
-    /// zero, with which it turns; of columns, axes that are fixed in space.
+    /// Axes of the angular velocity. For a history of constant direction, world axes are the world axes at
+    /// time zero, and the direction turns with the body frame. For a history given in columns they are axes
+    /// fixed in space.
     pub axes: Axes,
-    /// The attitude at time zero of the model, or where `axes` are those of the body of its frame, instead of
-    /// that of [`Initial`].
+    /// Attitude at time zero of the model, or of its frame if `axes` are body axes, in place of that of
+    /// [`Initial`].
     pub start: Option<RotationVector>,
-    /// Whether the centre of mass of the undeformed body is held where it is.
+    /// True if the centre of mass of the undeformed body is held in place.
     pub hold: bool,
 }
 
 impl Spin {
-    /// Angular velocity and acceleration at a time along axes of the model that have the `attitude`, of a
-    /// scene that is on its [`Stage`](super::Stage).
+    /// Returns angular velocity and acceleration at a time along axes of the model with the given
+    /// `attitude`, for a scene on its [`Stage`](super::Stage).
     pub fn at(&self, time: f64, attitude: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         turning(&self.velocity, self.axes, time, attitude)
     }
 }
 
-/// Angular velocity and acceleration along axes of the model that have the `attitude`. Turned with the body,
-/// the rate of an angular velocity is the same vector as seen from the world: omega x omega = 0.
+/// Returns angular velocity and acceleration along axes of the model with the given `attitude`. The rate of
+/// an angular velocity is equal in body axes and in world axes, since omega x omega = 0.
 fn turning(
     velocity: &VectorHistory,
     axes: Axes,
@@ -270,59 +273,59 @@ fn turning(
     }
 }
 
-/// An interface, or a node with rotations, whose motion is prescribed; the rest of the body hangs from it.
-/// Without motion it is held.
+/// Interface, or node with rotations, whose motion is prescribed and which carries the rest of the body.
+/// Without a prescribed motion it is held.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Carried {
     /// The interface or node that carries the body.
     pub by: Point,
-    /// Rotation.
+    /// Prescribed rotation.
     pub spin: Option<CarriedSpin>,
-    /// Motion along with that.
+    /// Prescribed translation, superposed on the rotation.
     pub translation: Option<Drive>,
 }
 
-/// Rotation of what carries a body, about a point that is fixed to it.
+/// Prescribed rotation of a carrier about a point fixed to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CarriedSpin {
     /// Angular velocity.
     pub velocity: VectorHistory,
-    /// Its axes, as those of a [`Spin`].
+    /// Axes of the angular velocity, with the conventions of [`Spin::axes`].
     pub axes: Axes,
-    /// The attitude at time zero, as that of a [`Spin`].
+    /// Attitude at time zero, with the conventions of [`Spin::start`].
     pub start: Option<RotationVector>,
-    /// A point of the axis in model coordinates; `None`: the reference point of what is carried.
+    /// Point of the rotation axis in model coordinates; `None`: the reference point of the carrier.
     pub through: Option<Vector3<f64>>,
 }
 
 impl CarriedSpin {
-    /// As [`Spin::at`].
+    /// Returns angular velocity and acceleration as [`Spin::at`] does.
     pub fn at(&self, time: f64, attitude: &Matrix3<f64>) -> (Vector3<f64>, Vector3<f64>) {
         turning(&self.velocity, self.axes, time, attitude)
     }
 }
 
-/// Motion of what carries a body, axis of rotation and all, along axes of the world, given by one of its
-/// derivatives. It starts at zero.
+/// Translation of a carrier together with its axis of rotation, along world axes, given by one of its time
+/// derivatives. The displacement starts at zero.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drive {
-    /// The way, of two continuous derivatives.
+    /// Displacement with two continuous derivatives.
     Displacement(VectorHistory),
-    /// The velocity.
+    /// Velocity.
     Velocity(VectorHistory),
-    /// The acceleration of a motion that starts at rest.
+    /// Acceleration of a motion that starts at rest.
     Acceleration(VectorHistory),
 }
 
 impl Drive {
-    /// The history of the way, the velocity or the acceleration, whichever is given.
+    /// Returns the history that is given: displacement, velocity or acceleration.
     pub fn history(&self) -> &VectorHistory {
         match self {
             Self::Displacement(history) | Self::Velocity(history) | Self::Acceleration(history) => history,
         }
     }
 
-    /// Velocity and acceleration at a time.
+    /// Returns velocity and acceleration at a time.
     pub fn at(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
         match self {
             Self::Displacement(way) => {

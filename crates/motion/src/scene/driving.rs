@@ -1,22 +1,22 @@
-//! The motion of the frame that a scene prescribes.
+//! Motion of the frame prescribed by a scene.
 
 use super::{Carried, Scene, Spin};
 use crate::dynamics::{AlongFrame, Prescribed};
 use flexbody_body::flex_body::Frame;
 use nalgebra::{Matrix3, Vector3};
 
-/// What a scene prescribes of the motion of the frame of its body.
+/// Prescribed motion of the frame of a body in a scene.
 #[derive(Debug, Clone, Copy)]
 pub struct Driving<'a> {
     spin: Option<&'a Spin>,
     carried: Option<CarriedMotion<'a>>,
 }
 
-/// The prescribed motion of the frame of a body that is carried.
+/// Prescribed motion of the frame of a carried body.
 #[derive(Debug, Clone, Copy)]
 struct CarriedMotion<'a> {
     carried: &'a Carried,
-    /// From the axis of rotation to the origin of the frame, its axes.
+    /// Vector from the axis of rotation to the origin of the frame, axes of the frame.
     arm: Vector3<f64>,
 }
 
@@ -28,8 +28,8 @@ impl<'a> CarriedMotion<'a> {
         Some(Self { carried, arm })
     }
 
-    /// V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the way d of the axis: along
-    /// the axes A of the frame.
+    /// Computes V = omega x arm + A'd', and V' = alpha x arm + A'd'' - omega x A'd', for the displacement d
+    /// of the axis, along the axes A of the frame.
     fn at(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         let nothing = (Vector3::zeros(), Vector3::zeros());
         let (omega, alpha) = self.carried.spin.as_ref().map_or(nothing, |spin| spin.at(time, axes));
@@ -47,13 +47,14 @@ impl<'a> CarriedMotion<'a> {
 }
 
 impl<'a> Driving<'a> {
-    /// What `scene` prescribes of the motion of `frame`, that of a body in its [`Stage`](super::Stage).
+    /// Collects the prescribed motion of `frame` in `scene`; `frame` belongs to a body in its
+    /// [`Stage`](super::Stage).
     pub fn new(frame: &Frame, scene: &'a Scene) -> Self {
         Self { spin: scene.spin.as_ref(), carried: CarriedMotion::new(frame, scene) }
     }
 
-    /// Velocities at a time and their rates, along the axes of the frame, which has the `axes` in the world
-    /// then.
+    /// Returns the velocities at a time and their rates, along the axes of the frame, whose `axes` in the
+    /// world are given.
     pub fn at(&self, time: f64, axes: &Matrix3<f64>) -> (Prescribed, Prescribed) {
         if let Some(carried) = &self.carried {
             return carried.at(time, axes);

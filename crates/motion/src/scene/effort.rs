@@ -1,4 +1,4 @@
-//! How long the steps of an integration may be, and how many there are, before it begins.
+//! Length and number of the steps of an integration, estimated before it begins.
 
 use super::{Scene, Scheme};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -6,40 +6,40 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use std::f64::consts::TAU;
 
-/// Steps of the conserving method per shortest period, unless said.
+/// Default number of steps of the conserving method per shortest period.
 const STEPS_PER_PERIOD: f64 = 20.0;
 
-/// Explicit steps per oscillation of a load or a spin, and steps of a given length: with fewer an oscillation
-/// could pass between them.
+/// Smallest number of steps per oscillation of a load or a spin, for explicit and for given step lengths;
+/// with fewer steps an oscillation could be missed.
 const STEPS_PER_OSCILLATION: f64 = 2.0;
 
-/// Longest explicit step that is stable, as the angle that the fastest mode turns in it.
+/// Longest stable explicit step, as the phase angle of the fastest mode per step.
 const STABLE: f64 = 6.0;
 
-/// Frequency of the fastest history of a scene that lasts `duration`, in oscillations per time; zero without
-/// any that oscillates.
+/// Returns the frequency of the fastest history of a scene that lasts `duration`, in oscillations per time;
+/// zero without oscillation.
 pub fn fastest_history(scene: &Scene, duration: f64) -> f64 {
     scene.acting().chain(scene.driving()).map(|history| history.frequency_until(duration)).fold(0.0, f64::max)
 }
 
-/// Longest explicit step for the histories of a scene that lasts `duration`.
+/// Returns the longest explicit step for the histories of a scene that lasts `duration`.
 pub(super) fn longest_step(scene: &Scene, duration: f64) -> f64 {
     duration.min(1.0 / (STEPS_PER_OSCILLATION * fastest_history(scene, duration)))
 }
 
-/// Steps that an integration takes at the least.
+/// Lower bound of the number of steps of an integration.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Effort {
     steps: f64,
-    /// The reason for their number, for messages.
+    /// Reason for the number of steps, for messages.
     because: String,
 }
 
 impl Effort {
-    /// The scheme of `scene` with the step that is taken, and what it costs at the least.
+    /// Returns the scheme of `scene` with the actual step length, and the lower bound of its steps.
     ///
     /// # Errors
-    /// FB551 where the step is given and longer than half a period of a load.
+    /// FB551 if the step is given and longer than half a period of a load.
     pub(super) fn plan(body: &FlexBody, scene: &Scene, duration: f64) -> Result<(Scheme, Self)> {
         let fastest_mode = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt() / TAU;
         let fastest_load = fastest_history(scene, duration);
@@ -78,10 +78,10 @@ impl Effort {
         }
     }
 
-    /// Refuses what takes more steps than the scene allows.
+    /// Returns an error if more steps are needed than the scene allows.
     ///
     /// # Errors
-    /// FB550.
+    /// FB550 if the lower bound exceeds the limit of the scene.
     pub(super) fn refuse_too_much(&self, scene: &Scene) -> Result<()> {
         if self.steps <= scene.run.most_steps as f64 {
             return Ok(());

@@ -1,4 +1,4 @@
-//! The deformation that stays as it is under what acts at time zero.
+//! Static equilibrium of the deformation with the loads and the motion at time zero.
 
 use super::Scene;
 use super::surroundings::SceneForces;
@@ -9,34 +9,38 @@ use flexbody_base::error::{Error, Result};
 use flexbody_body::flex_body::FlexBody;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// A value, or the reason why there is no equilibrium.
+/// Value, or the reason why there is no equilibrium.
 type Outcome<T> = std::result::Result<T, String>;
 
-/// A deformation and its residual.
+/// Deformation and its residual.
 type Trial = (DVector<f64>, DVector<f64>);
 
-/// Newton steps; each squares the error, so that more than these go nowhere.
+/// Limit of Newton steps. Each step squares the error, so that more steps mean divergence.
 const MAX_STEPS: usize = 40;
 
-/// Halvings of a Newton step that does not reduce the residual.
+/// Limit of halvings of a Newton step that does not reduce the residual.
 const MAX_HALVINGS: usize = 30;
 
-/// Residual of the equilibrium relative to its largest summand, in the norm of K_ff^-1.
+/// Residual of the equilibrium relative to its largest summand, in the norm of K_ff^-1, at which Newton's
+/// method ends.
 const RESIDUAL: f64 = 1e-12;
 
-/// Residual below which an equilibrium that Newton's method cannot improve any more is one, its rest being rounding.
+/// Residual below which an equilibrium is accepted if Newton's method cannot improve it further, the rest
+/// being rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// Step of the differences in modal coordinates, relative to the size of the deformation in the norm of K_ff.
+/// Step of the finite differences in modal coordinates, relative to the size of the deformation in the norm
+/// of K_ff.
 const DIFFERENCE: f64 = 1e-4;
 
-/// Gives `start` the deformation q of equilibrium, q'' = 0 with q' = 0, by Newton's method on r(q) = m_ff q''.
+/// Sets the deformation q of `start` to equilibrium, q'' = 0 with q' = 0, by Newton's method on r(q) = m_ff
+/// q''.
 ///
-/// The frame moves as the scene and the loads make it. r is a polynomial of low degree in q but for torques; its
-/// derivatives are central differences.
+/// The frame moves as given by the scene and the loads. Except for torques, r is a polynomial of low degree
+/// in q; its derivatives are central differences.
 ///
 /// # Errors
-/// FB540 where there is no equilibrium near the undeformed body, or the body leaves it by itself.
+/// FB540 if there is no equilibrium near the undeformed body, or if the equilibrium is unstable.
 pub(super) fn settle(
     body: &FlexBody,
     scene: &Scene,
@@ -58,7 +62,7 @@ pub(super) fn settle(
     Ok(())
 }
 
-/// The forces on the modes of a body that does not vibrate, r(q).
+/// Modal forces r(q) of a body that does not vibrate.
 struct Balance<'a> {
     equations: &'a EquationsOfMotion,
     forces: &'a SceneForces<'a>,
@@ -66,8 +70,8 @@ struct Balance<'a> {
     mass: DMatrix<f64>,
     stiffness: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
-    /// Largest norm, in K_ff^-1, of forces that inertia and gravity could make of the whole mass: what is small beside
-    /// it is rounding.
+    /// Upper bound, in the norm of K_ff^-1, of inertia and gravity forces on the whole mass; forces that
+    /// are small compared with it are rounding.
     of_mass: f64,
 }
 
@@ -95,8 +99,8 @@ impl<'a> Balance<'a> {
         Some(balance)
     }
 
-    /// sqrt(m) (|a| + r |omega|^2 + r |alpha|) / Omega_1 at the start, with the acceleration a of the origin and gravity,
-    /// and the radius of gyration r.
+    /// Returns sqrt(m) (|a| + r |omega|^2 + r |alpha|) / Omega_1 at the start, with the acceleration a of
+    /// the origin and gravity, and the radius of gyration r.
     fn largest_load(&self, body: &FlexBody) -> f64 {
         let (mut motion, state) = Motion::new(self.equations, self.forces, &self.start);
         let Ok(rates) = motion.accelerations(0.0, &state) else { return 0.0 };
@@ -109,7 +113,7 @@ impl<'a> Balance<'a> {
         mass.sqrt() * (acceleration + radius * turning) / lowest.sqrt()
     }
 
-    /// r(q) = m_ff q''.
+    /// Returns r(q) = m_ff q''.
     fn residual(&mut self, q: &DVector<f64>) -> Outcome<DVector<f64>> {
         self.start.q.copy_from_slice(q.as_slice());
         let (mut motion, state) = Motion::new(self.equations, self.forces, &self.start);
@@ -117,19 +121,19 @@ impl<'a> Balance<'a> {
         Ok(&self.mass * DVector::from_column_slice(self.equations.split(rates).2))
     }
 
-    /// |f| in the norm of K_ff^-1.
+    /// Returns |f| in the norm of K_ff^-1.
     fn norm(&self, force: &DVector<f64>) -> f64 {
         force.dot(&self.factor.solve(force)).max(0.0).sqrt()
     }
 
-    /// The largest summand of the equilibrium at q with the residual r: elastic forces, all others, and what the mass
-    /// could make.
+    /// Returns the largest summand of the equilibrium at q with the residual r: elastic forces, all other
+    /// forces, and the bound of forces on the whole mass.
     fn scale(&self, q: &DVector<f64>, residual: &DVector<f64>) -> f64 {
         let elastic = &self.stiffness * q;
         self.norm(&elastic).max(self.norm(&(residual + elastic))).max(self.of_mass)
     }
 
-    /// dr/dq by central differences.
+    /// Returns dr/dq by central differences.
     fn derivative(&mut self, q: &DVector<f64>, size: f64) -> Outcome<DMatrix<f64>> {
         let n = q.len();
         let mut derivative = DMatrix::zeros(n, n);
@@ -167,11 +171,11 @@ impl<'a> Balance<'a> {
         Err("what acts on the deformed body leads away from it".to_owned())
     }
 
-    /// The first of q + step, q + step / 2, ... whose residual is smaller than `left`.
+    /// Returns the first of q + step, q + step / 2, ... with a residual smaller than `left`.
     fn shortened(&mut self, q: &DVector<f64>, step: &DVector<f64>, left: f64) -> Outcome<Option<Trial>> {
         for halvings in 0..MAX_HALVINGS {
             let moved = q + step * 0.5f64.powi(halvings as i32);
-            // A state that has no motion lies too far.
+            // A state without accelerations is too far away.
             let Ok(rest) = self.residual(&moved) else { continue };
             if self.norm(&rest) < left {
                 return Ok(Some((moved, rest)));
@@ -180,7 +184,7 @@ impl<'a> Balance<'a> {
         Ok(None)
     }
 
-    /// Keeps the equilibrium q if the body does not leave it by itself: all motions q'' = m_ff^-1 (dr/dq) q vibrate.
+    /// Accepts the equilibrium q if it is stable: all motions q'' = m_ff^-1 (dr/dq) q oscillate.
     fn accept(&mut self, q: &DVector<f64>, scale: f64) -> Outcome<()> {
         let size = if scale > 0.0 { scale } else { 1.0 };
         let derivative = self.derivative(q, size)?;
@@ -188,7 +192,7 @@ impl<'a> Balance<'a> {
         let lower = self.factor.l();
         let half = lower.solve_lower_triangular(&-derivative).expect("a factor");
         let relative = lower.solve_lower_triangular(&half.transpose()).expect("a factor");
-        // Relative to K_ff, whose own eigenvalues are then 1.
+        // Relative to K_ff, whose eigenvalues become 1.
         let relative = Mat::from_fn(relative.nrows(), relative.ncols(), |i, j| relative[(i, j)]);
         let eigenvalues = relative.eigenvalues();
         let stable = eigenvalues.is_ok_and(|values| values.iter().all(|value| value.re > 0.0));

@@ -1,4 +1,5 @@
-//! How far a motion is from that of a reference: the errors that tolerances of a scene are about.
+//! Error measures: the distance of a motion from a reference motion, in the quantities that have tolerances
+//! in a scene.
 
 use super::lively::{LivelyNodes, along_principal_directions, longest};
 use super::peak::Peak;
@@ -9,84 +10,87 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::{larger, not_negative};
 use nalgebra::{DMatrix, DVector, Vector3};
 
-/// Torques, relative to the energy of the motion, that are none: rounding.
+/// Torque, relative to the energy of the motion, below which it counts as rounding.
 const NO_TORQUE: f64 = 1e-10;
 
-/// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not looked at.
+/// Part of the centrifugal torque w^2 I, or force w^2 m r, below which reactions are not compared.
 pub const LEAST_REACTION: f64 = 1e-3;
 
-/// Part of the largest force times the radius of gyration below which torques are not looked at, and of the largest
-/// torque over this radius for forces: the torque of a bar that is shaken along its axis is what rounding makes of it.
+/// Part of the largest force times the radius of gyration below which torques are not compared, and of the
+/// largest torque over this radius for forces. Example: the torque of a bar that is shaken along its axis
+/// is rounding.
 const LEAST_BESIDE: f64 = 1e-2;
 
-/// Errors of the second half of a run over those of the first, beyond the growth of the motion, from which on
-/// they are said to grow.
+/// Ratio of the errors in the second half of a run to those in the first, relative to the growth of the
+/// motion, above which the errors are reported as growing.
 const GROWING: f64 = 1.8;
 
-/// Errors below this part of their tolerance do not matter yet, though they grow.
+/// Part of the tolerance below which growing errors are not reported.
 const MATTERS: f64 = 0.1;
 
 /// Force and torque.
 type Reaction = (Vector3<f64>, Vector3<f64>);
 
-/// Largest errors over the continuous motion. `None`: the reference has nothing of it. There is always an attitude.
+/// Largest errors over the continuous motion. `None` if the quantity does not occur in the reference; the
+/// attitude always occurs.
 pub type OutputErrors = PerQuantity<Option<f64>>;
 
 impl OutputErrors {
-    /// The largest ratio of error to tolerance.
+    /// Returns the largest ratio of error to tolerance.
     pub fn worst(&self, tolerance: &Tolerance) -> f64 {
         let ratio = |(error, allowed): (Option<f64>, f64)| error.map_or(0.0, |error| error / allowed);
         let ratios = self.zip(tolerance.errors).map(ratio).named();
         ratios.into_iter().fold(0.0, |largest, (_, ratio)| larger(largest, ratio))
     }
 
-    /// The output whose error is largest beside its tolerance: its name, the error, and the tolerance.
+    /// Returns the quantity with the largest ratio of error to tolerance: its name, the error, and the
+    /// tolerance.
     pub fn decisive(&self, tolerance: &Tolerance) -> (&'static str, f64, f64) {
         let all = self.zip(tolerance.errors).named().into_iter();
         let there = all.filter_map(|(name, (error, allowed))| Some((name, error?, allowed)));
-        // NaN is the largest of all.
+        // total_cmp orders NaN above all numbers.
         let ratio = |(_, error, allowed): &(&str, f64, f64)| error / allowed;
         there.max_by(|a, b| ratio(a).total_cmp(&ratio(b))).expect("an attitude is always there")
     }
 
-    /// The larger of each error of two motions.
+    /// Returns the larger error of two motions for each quantity.
     pub fn larger_of(self, other: Self) -> Self {
         self.zip(other).map(|(a, b)| a.into_iter().chain(b).reduce(larger))
     }
 
-    /// Whether every error is within its tolerance.
+    /// Returns true if every error is within its tolerance.
     pub fn within(&self, tolerance: &Tolerance) -> bool {
         self.worst(tolerance) <= 1.0
     }
 }
 
-/// The errors along the motion, as [`OutputErrors`] has the largest of them.
+/// Errors as functions of time; [`OutputErrors`] holds their largest values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorHistory {
-    /// Where the motion was looked at.
+    /// Times at which the motion was sampled.
     pub time: Vec<f64>,
-    /// Errors of each quantity there.
+    /// Errors of each quantity at these times.
     pub errors: PerQuantity<Option<Vec<f64>>>,
 }
 
 impl ErrorHistory {
-    /// The largest errors, also between the places where the motion was looked at.
+    /// Returns the largest errors, including those between the sampled times.
     pub fn largest(&self) -> OutputErrors {
         let peak = |history: &[f64]| Peak::of(&self.time, history.iter().copied()).value;
         self.errors.as_ref().map(|history| history.as_deref().map(peak))
     }
 
-    /// How much more the errors grow from the first half of the run to the second than `motion`, that of the
-    /// reference, does: about 1 for errors that stay in step with the motion, 2 and more where phases run
-    /// apart. `None` where they do not grow so much that it is worth a word (`GROWING`), or where those of
-    /// the second half do not matter yet (`MATTERS`).
+    /// Returns the growth of the errors from the first half of the run to the second, relative to the
+    /// growth of `motion`, the reference: about 1 for errors in step with the motion, 2 and more if phases
+    /// drift apart. Returns `None` if the growth is too small to report (`GROWING`), or if the errors of
+    /// the second half are far below their tolerances (`MATTERS`).
     pub fn growth(&self, motion: &Trace, tolerance: &Tolerance) -> Option<f64> {
         let growth = |(first, second): (f64, f64), allowed: f64| {
             (first > 0.0 && second > MATTERS * allowed).then(|| second / first)
         };
         let energies: Vec<f64> = motion.elastic.iter().map(|energy| not_negative(*energy).sqrt()).collect();
         let motion = growth(self.halves(&energies), 0.0)?;
-        // The attitude has no amplitude: it grows when it grows.
+        // The attitude has no amplitude to compare with: its own growth counts.
         let own = |(errors, allowed): (&Option<Vec<f64>>, f64)| {
             errors.as_ref().and_then(|errors| growth(self.halves(errors), allowed))
         };
@@ -97,7 +101,7 @@ impl ErrorHistory {
         most.filter(|growth| *growth > GROWING)
     }
 
-    /// The largest of `values` along the motion in the first half of the run, and in the second.
+    /// Returns the largest of `values` in the first half of the run, and in the second.
     pub fn halves(&self, values: &[f64]) -> (f64, f64) {
         let end = self.time.last().copied().unwrap_or(0.0);
         let (first, second) = values.split_at(self.time.partition_point(|&time| time <= 0.5 * end));
@@ -105,23 +109,23 @@ impl ErrorHistory {
     }
 }
 
-/// How far apart the deformations of two motions are, along the motion.
+/// Difference of the deformations of two motions, as functions of time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Apart {
     /// Elastic energy of the difference.
     pub energy: Vec<f64>,
-    /// Largest difference of the deflections of any node that is looked at.
+    /// Largest difference of the deflections of the compared nodes.
     pub deflection: Vec<f64>,
-    /// Largest of their deflections in the reference.
+    /// Largest deflection of the compared nodes in the reference.
     pub largest_deflection: f64,
 }
 
 impl ErrorHistory {
-    /// The errors of `candidate`, whose deformation is `apart` from that of `reference`. What the nodes have
-    /// to say counts where no points are watched.
+    /// Computes the errors of `candidate`, whose deformation differs by `apart` from that of `reference`.
+    /// Node deflections are used if no points are watched.
     ///
     /// # Panics
-    /// When the motions were not looked at in the same places.
+    /// When the motions were sampled at different times.
     pub fn new(reference: &Trace, candidate: &Trace, apart: &Apart) -> Self {
         assert!(reference.time == candidate.time, "motions that were looked at in the same places");
         let attitudes = reference.attitude.iter().zip(&candidate.attitude);
@@ -141,13 +145,13 @@ impl ErrorHistory {
     }
 }
 
-/// `values` relative to `scale`; nothing without a scale.
+/// Returns `values` relative to `scale`; `None` if the scale is zero.
 fn relative(values: Vec<f64>, scale: f64) -> Option<Vec<f64>> {
     (scale > 0.0).then(|| values.into_iter().map(|value| value / scale).collect())
 }
 
-/// Differences of deflections along the motion, and the largest deflection of the reference: of the watched
-/// points, without any of the nodes that `apart` looked at.
+/// Returns the differences of deflections over time, and the largest deflection of the reference: for the
+/// watched points or, without any, for the nodes compared by `apart`.
 fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>, f64) {
     if reference.deflections.is_empty() {
         return (apart.deflection.clone(), apart.largest_deflection);
@@ -159,14 +163,14 @@ fn deflections(reference: &Trace, candidate: &Trace, apart: &Apart) -> (Vec<f64>
     ((0..reference.time.len()).map(at).collect(), largest.fold(0.0, larger))
 }
 
-/// Errors of the force and the torque that prescribed motion takes, the larger of both.
+/// Returns the errors of the force and the torque of prescribed motion, the larger of both.
 fn reactions(reference: &Trace, candidate: &Trace) -> Option<Vec<f64>> {
     let both = [reference.reactions.as_deref()?, candidate.reactions.as_deref()?];
     reaction_errors(&reference.time, both, reference.size, &reference.extremes)
 }
 
-/// The same for reactions at times: those of the reference, whose mass, radius of gyration and largest
-/// motion are given, and of what is held to it.
+/// Returns the errors of reactions over time. The first reactions are those of the reference, whose mass,
+/// radius of gyration and largest motion are given; the second are compared with them.
 pub fn reaction_errors(
     time: &[f64],
     [a, b]: [&[Reaction]; 2],
@@ -178,11 +182,11 @@ pub fn reaction_errors(
     let levers = [radius, 1.0];
     let of_part = |k: usize| {
         let (part, lever) = (parts[k], levers[k]);
-        // Forces that are rounding are no forces, however small the least that counts.
+        // Forces below rounding count as zero for any limit.
         if largest[k] <= NO_TORQUE * extremes.internal / lever {
             return None;
         }
-        // Force and torque in units of torque: each counts from a part of the other.
+        // Force and torque in units of torque: each is compared only above a part of the other.
         let beside = LEAST_BESIDE * largest[1 - k] * levers[1 - k];
         let least = (LEAST_REACTION * mass * (extremes.spin * radius).powi(2)).max(beside) / lever;
         let differences = a.iter().zip(b).map(|(a, b)| (part(a) - part(b)).norm()).collect();
@@ -196,7 +200,7 @@ pub fn reaction_errors(
     }
 }
 
-/// The angle between two attitudes.
+/// Returns the angle between two attitudes.
 fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
     let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (a.0, b.0);
     let (a, b) = (Vector3::new(a1, a2, a3), Vector3::new(b1, b2, b3));
@@ -205,22 +209,22 @@ fn angle(a: &EulerParameters, b: &EulerParameters) -> f64 {
     2.0 * vector.norm().atan2(scalar.abs())
 }
 
-/// The motion of a body that others are measured against.
+/// Reference motion of a body, against which other motions are measured.
 #[derive(Debug, Clone)]
 pub struct Measure<'r> {
     body: &'r FlexBody,
     trace: &'r Trace,
-    /// Nodes that are looked at where no points are watched.
+    /// Nodes to compare if no points are watched.
     nodes: Vec<usize>,
     rows: LivelyNodes,
     largest_deflection: f64,
 }
 
 impl<'r> Measure<'r> {
-    /// Measures against `trace`, a motion of `body`.
+    /// Creates a measure against `trace`, a motion of `body`.
     ///
     /// # Panics
-    /// When the motion has another number of modes.
+    /// When the motion has another number of modes than the body.
     pub fn new(body: &'r FlexBody, trace: &'r Trace) -> Self {
         assert!(trace.q.iter().all(|q| q.len() == body.n_modes()), "a motion of the body");
         let nodes = if trace.deflections.is_empty() { along_principal_directions(body) } else { Vec::new() };
@@ -229,20 +233,21 @@ impl<'r> Measure<'r> {
         Self { body, trace, nodes, rows, largest_deflection }
     }
 
-    /// The body.
+    /// Returns the body.
     pub fn body(&self) -> &'r FlexBody {
         self.body
     }
 
-    /// The motion of the reference.
+    /// Returns the motion of the reference.
     pub fn trace(&self) -> &'r Trace {
         self.trace
     }
 
-    /// Errors of the motion of a body that has the modes `kept` (from 0) of the reference, in this order.
+    /// Returns the errors of the motion of a body that has the modes `kept` (from 0) of the reference, in
+    /// this order.
     ///
     /// # Panics
-    /// When the reference has no such modes, or the motions were not looked at in the same places.
+    /// When the reference does not have these modes, or the motions were sampled at different times.
     pub fn of_subset(&self, candidate: &Trace, kept: &[usize]) -> ErrorHistory {
         let energy = self.body.invariants().modal_stiffness();
         let apart = self.apart(candidate, |reference, own| {
@@ -254,10 +259,10 @@ impl<'r> Measure<'r> {
         ErrorHistory::new(self.trace, candidate, &apart)
     }
 
-    /// Errors of the motion of a body with other modes of the same model.
+    /// Returns the errors of the motion of a body with other modes of the same model.
     ///
     /// # Panics
-    /// When the motions were not looked at in the same places.
+    /// When the motions were sampled at different times.
     pub fn of_other(&self, candidate: &Trace, modes: &OtherModes<'_>) -> ErrorHistory {
         let (energy, rows) =
             (self.body.invariants().modal_stiffness(), LivelyNodes::new(modes.body, &self.nodes));
@@ -279,14 +284,15 @@ impl<'r> Measure<'r> {
     }
 }
 
-/// Modes of a candidate, seen from those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K
+/// Modes of a candidate expressed in those of the reference: with both stiffnesses L_c, L_r and G = Psi_c'K
 /// Psi_r
 ///
 /// ```text
 /// V(Psi_c q_c - Psi_r q_r) = d'L_r d / 2 + q_c'(L_c - G L_r^-1 G') q_c / 2,    d = L_r^-1 G' q_c - q_r
 /// ```
 ///
-/// a part within the reference, and one outside of it, without the cancellation of the sum of squares.
+/// The first term lies within the span of the reference, the second outside of it; the formula avoids the
+/// cancellation of a difference of squares.
 #[derive(Debug, Clone)]
 pub struct OtherModes<'c> {
     body: &'c FlexBody,
@@ -297,11 +303,12 @@ pub struct OtherModes<'c> {
 }
 
 impl<'c> OtherModes<'c> {
-    /// The modes of `candidate` seen from those of `reference`, with `shared` = G (nc x nr); `None` where the
-    /// bodies are not of one model, or the stiffness of the reference is not positive definite.
+    /// Expresses the modes of `candidate` in those of `reference`, with `shared` = G (nc x nr). Returns
+    /// `None` if the bodies do not belong to one model, or if the stiffness of the reference is not
+    /// positive definite.
     pub fn new(candidate: &'c FlexBody, reference: &FlexBody, shared: MatRef<'_, f64>) -> Option<Self> {
         let (nc, nr) = (candidate.n_modes(), reference.n_modes());
-        // The centre of mass of a lumped mass is another point: deflections do not depend on it.
+        // A lumped mass may have another centre of mass, which does not affect deflections.
         let same =
             candidate.n_nodes() == reference.n_nodes() && candidate.frame().axes == reference.frame().axes;
         if !same || (shared.nrows(), shared.ncols()) != (nc, nr) {
@@ -315,7 +322,7 @@ impl<'c> OtherModes<'c> {
     }
 }
 
-/// x'A x of a matrix that is not negative.
+/// Returns x'A x of a positive semidefinite matrix.
 fn quadratic(a: MatRef<'_, f64>, x: &[f64]) -> f64 {
     let column =
         |(j, xj): (usize, &f64)| xj * x.iter().enumerate().map(|(i, xi)| a[(i, j)] * xi).sum::<f64>();

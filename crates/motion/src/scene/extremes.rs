@@ -1,4 +1,4 @@
-//! The largest of everything over a continuous motion.
+//! Largest values of all quantities over a continuous motion.
 
 use super::lively::{LivelyNodes, longest_of_all};
 use super::peak::Peak;
@@ -7,58 +7,59 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::{larger, not_negative};
 use nalgebra::Vector3;
 
-/// Differences of energies up to so many roundings of the largest total energy are rounding.
+/// Number of roundings of the largest total energy below which differences of energies count as rounding.
 const ROUNDINGS: f64 = 16.0;
 
-/// The largest of everything over a continuous motion: at the steps of the integration, between them, and
-/// between the places where they are looked at. It does not depend on which instants are written.
+/// Largest values of all quantities over a continuous motion: at the steps of the integration, at points
+/// within them, and between these points. The values do not depend on the output times of the scene.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Extremes {
-    /// Deflection of any node, relative to the largest extent of the body, and when it is largest.
+    /// Largest deflection of any node, relative to the largest extent of the body, and its time.
     pub deflection: Peak,
-    /// Deflections of the watched points, and when each is largest. Unit: length.
+    /// Largest deflection of each watched point, and its time. Unit: length.
     pub watched: Vec<Peak>,
-    /// |q| of every mode.
+    /// Largest |q| of every mode.
     pub amplitudes: Vec<f64>,
-    /// Elastic energy.
+    /// Largest elastic energy.
     pub elastic: f64,
-    /// Kinetic energy without that of flight, and elastic energy.
+    /// Largest internal energy: kinetic energy without that of translation, plus elastic energy.
     pub internal: f64,
-    /// Angular velocity |omega|.
+    /// Largest angular velocity |omega|.
     pub spin: f64,
-    /// Components |omega_k| of it along the body axes.
+    /// Largest components |omega_k| of the angular velocity along the body axes.
     pub spin_about: Vector3<f64>,
-    /// Angular velocities that are largest about axes that are apart, body axes.
+    /// Largest angular velocities about distinct axes, body axes.
     pub spins: Vec<Vector3<f64>>,
-    /// Force and torque that the prescribed motion takes; zero without.
+    /// Largest force and torque of the prescribed motion; zero without.
     pub reaction: (f64, f64),
-    /// How well what cannot change did not.
+    /// Drift of conserved quantities.
     pub drift: Drift,
 }
 
-/// How well what cannot change did not: largest differences over the motion, dimensionless.
+/// Drift of conserved quantities: largest differences over the motion, dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Drift {
-    /// Of energy less work, relative to the largest internal energy E (that of flight left out) or work.
+    /// Drift of energy minus work, relative to the largest internal energy E (without that of translation)
+    /// or work.
     pub energy: f64,
-    /// Of linear momentum less impulse, relative to the largest of both and of sqrt(2 m E).
+    /// Drift of linear momentum minus impulse, relative to the largest of both and of sqrt(2 m E).
     pub linear: f64,
-    /// Of angular momentum less angular impulse, relative to the largest of both and of r sqrt(2 m E), r
-    /// being the radius of gyration.
+    /// Drift of angular momentum minus angular impulse, relative to the largest of both and of r sqrt(2 m
+    /// E), where r is the radius of gyration.
     pub angular: f64,
 }
 
-/// Sees a motion go by.
+/// Observer that collects the extremes of a motion.
 pub(super) struct Survey<'b> {
     body: &'b FlexBody,
     watched: &'b [BodyPoint],
     nodes: LivelyNodes,
-    /// Deflection among `nodes`, and where it was largest.
+    /// Deflection among `nodes`, and the time of its largest value.
     deflection: Peak,
     bulges: Bulges,
     paths: Vec<Peak>,
     amplitudes: Vec<Peak>,
-    /// Roots of the energies: they grow like displacements do.
+    /// Roots of the energies, which grow like displacements.
     elastic: Peak,
     internal: Peak,
     spin: Peak,
@@ -88,7 +89,7 @@ impl<'b> Survey<'b> {
         }
     }
 
-    /// Sees the deformation at a place of the motion.
+    /// Takes the deformation at a time of the motion.
     pub(super) fn see_shape(&mut self, time: f64, q: &[f64], elastic: f64) {
         let deflection = self.nodes.longest(q);
         self.deflection.see(time, deflection);
@@ -100,13 +101,13 @@ impl<'b> Survey<'b> {
         self.amplitudes.iter_mut().zip(q).for_each(|(peak, q)| peak.see(time, q.abs()));
     }
 
-    /// Sees what the prescribed motion takes.
+    /// Takes force and torque of the prescribed motion.
     pub(super) fn see_reaction(&mut self, time: f64, (force, torque): &(Vector3<f64>, Vector3<f64>)) {
         self.reaction[0].see(time, force.norm());
         self.reaction[1].see(time, torque.norm());
     }
 
-    /// Sees energies and momenta at the end of a step.
+    /// Takes energies and momenta at the end of a step.
     pub(super) fn see_balance(&mut self, time: f64, balance: &Balance, omega: &Vector3<f64>) {
         let internal = balance.kinetic - balance.flight + balance.elastic;
         self.internal.see(time, internal.max(0.0).sqrt());
@@ -116,10 +117,10 @@ impl<'b> Survey<'b> {
         self.differences.see(balance);
     }
 
-    /// The extremes of what was seen.
+    /// Returns the extremes.
     ///
     /// * `size`: mass and radius of gyration of the body.
-    /// * `least_energy`: energies below it are rounding.
+    /// * `least_energy`: energy below which energies count as rounding.
     pub(super) fn extremes(self, size: (f64, f64), least_energy: f64) -> Extremes {
         let deflection = self.bulges.largest(self.body, self.deflection.value);
         let internal = self.internal.value.powi(2);
@@ -138,11 +139,12 @@ impl<'b> Survey<'b> {
     }
 }
 
-/// Angular velocities about so many axes are kept, whose angles have cosines below the other number.
+/// Largest number of stored angular velocities.
 const AXES: usize = 32;
+/// Cosine between two axes from which on they count as one axis.
 const SAME_AXIS: f64 = 0.95;
 
-/// The largest angular velocities about axes that are apart.
+/// Largest angular velocities about distinct axes.
 #[derive(Debug, Clone, Default)]
 struct Spins(Vec<Vector3<f64>>);
 
@@ -160,18 +162,19 @@ impl Spins {
     }
 }
 
-/// How many deformations are kept whose nodes are all looked at in the end.
+/// Number of deformations that are kept to evaluate all nodes at the end. A larger number finds the largest
+/// deflection more reliably and takes more memory.
 const KEPT: usize = 16;
 
-/// The deformations at which the nodes that the modes move most are deflected most. Another node may be
-/// deflected more then, or at another of these times.
+/// Deformations with the largest deflections among the nodes that the modes move most. Another node may
+/// deflect more then, or at another of these times.
 #[derive(Debug, Clone, Default)]
 struct Bulges {
-    /// Time, deflection and modal coordinates, the largest deflection first.
+    /// Time, deflection and modal coordinates; the largest deflection first.
     kept: Vec<(f64, f64, Vec<f64>)>,
-    /// The last one that was seen.
+    /// Last deformation.
     last: (f64, f64, Vec<f64>),
-    /// Whether the deflection grew until then.
+    /// True if the deflection grew up to the last deformation.
     grows: bool,
 }
 
@@ -180,14 +183,14 @@ impl Bulges {
         if deflection < self.last.1 {
             self.keep_last();
         }
-        // Not a number is not less than anything, and nothing is less than it.
+        // Comparisons with NaN are false: treat NaN as growth.
         self.grows = self.last.2.is_empty() || deflection.is_nan() || deflection >= self.last.1;
         (self.last.0, self.last.1) = (time, deflection);
         self.last.2.clear();
         self.last.2.extend_from_slice(q);
     }
 
-    /// Keeps the last deformation where the deflection grew until then and it is one of the largest.
+    /// Keeps the last deformation if the deflection grew up to it and it is one of the largest.
     fn keep_last(&mut self) {
         let at = self.kept.partition_point(|kept| kept.1 >= self.last.1);
         if self.grows && at < KEPT {
@@ -196,8 +199,9 @@ impl Bulges {
         }
     }
 
-    /// The largest deflection of any node relative to the extent of `body`. What the peak of the nodes that
-    /// the modes move most has beyond what was seen of them holds for the others.
+    /// Returns the largest deflection of any node relative to the extent of `body`. The ratio of the
+    /// interpolated peak to the largest sampled value, known for the nodes that the modes move most, is
+    /// applied to all nodes.
     fn largest(mut self, body: &FlexBody, peak: f64) -> Peak {
         self.keep_last();
         let seen = self.kept.first().map_or(0.0, |kept| kept.1);
@@ -214,7 +218,7 @@ impl Bulges {
     }
 }
 
-/// Largest differences of what is conserved.
+/// Largest differences of conserved quantities.
 #[derive(Debug, Clone, Copy, Default)]
 struct Differences {
     first: Option<Balance>,
@@ -245,7 +249,7 @@ impl Differences {
     fn drift(&self, internal: f64, (mass, radius): (f64, f64), least_energy: f64) -> Drift {
         let energy = internal.max(self.work).max(least_energy);
         let momentum = (2.0 * mass * energy).sqrt();
-        // A body at rest, or one that only flies, has no energy that rounding could be relative to.
+        // A body at rest, or in pure translation, has no internal energy as reference for rounding.
         let difference = not_negative(self.energy - ROUNDINGS * f64::EPSILON * self.total);
         Drift {
             energy: difference / energy,

@@ -1,48 +1,49 @@
-//! Values that change with time.
+//! Scalar functions of time.
 
 use super::samples::{Samples, Sizes};
 use nalgebra::Vector1;
 use std::f64::consts::TAU;
 
-/// A value as a function of time.
+/// Scalar value as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum History {
-    /// One value at all times.
+    /// Constant value.
     Constant(f64),
-    /// Straight lines between points with ascending times; constant before the first and after the last.
+    /// Straight lines between points with ascending times; constant before the first and after the last
+    /// point.
     Table {
         /// Times.
         times: Vec<f64>,
-        /// As many values.
+        /// Values at these times.
         values: Vec<f64>,
     },
     /// amplitude sin(2 pi frequency t + phase).
     Sine {
         /// Amplitude.
         amplitude: f64,
-        /// Oscillations per time.
+        /// Frequency in oscillations per time.
         frequency: f64,
         /// Phase in radians.
         phase: f64,
     },
-    /// Smoothly from one value to another: with x from 0 to 1 within the duration, from + (to - from) (x -
-    /// sin(2 pi x) / (2 pi)); two continuous derivatives.
+    /// Smooth transition from one value to another with two continuous derivatives: from + (to - from) (x -
+    /// sin(2 pi x) / (2 pi)), with x from 0 to 1 within the duration.
     Ramp {
         /// Value before.
         from: f64,
         /// Value after.
         to: f64,
-        /// When it begins.
+        /// Start time of the ramp.
         start: f64,
         /// Duration of the ramp.
         duration: f64,
     },
-    /// Given at many times.
+    /// Values given at many times.
     Samples(Samples<1>),
 }
 
 impl History {
-    /// The value and its rate at a time. The rate at a kink is that after it.
+    /// Returns the value and its rate at a time. At a kink the rate is that after it.
     pub fn at(&self, time: f64) -> (f64, f64) {
         match self {
             Self::Constant(value) => (*value, 0.0),
@@ -73,7 +74,7 @@ impl History {
         }
     }
 
-    /// The integral from time zero to a time.
+    /// Returns the integral from time zero to a time.
     pub fn integral(&self, time: f64) -> f64 {
         match self {
             Self::Constant(value) => value * time,
@@ -104,7 +105,7 @@ impl History {
         }
     }
 
-    /// The second derivative at a time, of a history that is smooth: zero of a table between its points.
+    /// Returns the second derivative at a time, for a smooth history; zero for a table.
     pub fn curvature(&self, time: f64) -> f64 {
         match self {
             Self::Constant(_) | Self::Table { .. } => 0.0,
@@ -117,7 +118,8 @@ impl History {
         }
     }
 
-    /// The largest magnitude of the value and of the rate from time zero to a time; of a sine at any time.
+    /// Returns the largest magnitude of the value and of the rate from time zero to a time; for a sine
+    /// those over all times.
     pub fn largest_until(&self, end: f64) -> (f64, f64) {
         if let Self::Samples(samples) = self {
             let Sizes { largest, rate, .. } = samples.sizes_until(end);
@@ -132,7 +134,7 @@ impl History {
         }
         match self {
             Self::Sine { amplitude, frequency, .. } => (amplitude.abs(), amplitude.abs() * TAU * frequency),
-            // Half way up it rises at twice the mean rate.
+            // The middle of the ramp has twice the mean rate.
             Self::Ramp { start, duration, .. } if 0.0 < start + duration && *start < end => {
                 let middle = (start + 0.5 * duration).clamp(0.0, end);
                 (value, rate.max(self.at(middle).1.abs()))
@@ -141,7 +143,7 @@ impl History {
         }
     }
 
-    /// Whether it is zero from time zero to a time.
+    /// Returns true if the history is zero from time zero to a time.
     pub fn is_zero_until(&self, end: f64) -> bool {
         match self {
             Self::Sine { amplitude, .. } => *amplitude == 0.0,
@@ -154,7 +156,7 @@ impl History {
         }
     }
 
-    /// The history times a factor.
+    /// Returns the history multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         match self {
             Self::Constant(value) => Self::Constant(factor * value),
@@ -172,7 +174,7 @@ impl History {
         }
     }
 
-    /// Times at which it is not smooth.
+    /// Returns the times at which the history is not smooth.
     pub fn breaks(&self) -> Vec<f64> {
         match self {
             Self::Constant(_) | Self::Sine { .. } => Vec::new(),
@@ -182,7 +184,8 @@ impl History {
         }
     }
 
-    /// Whether it has two derivatives everywhere, but for ends outside of which it holds.
+    /// Returns true if the history has two derivatives everywhere, except at ends beyond which it is
+    /// constant.
     pub fn is_smooth(&self) -> bool {
         match self {
             Self::Table { .. } => false,
@@ -191,7 +194,7 @@ impl History {
         }
     }
 
-    /// Oscillations per time from time zero to a time; zero of what does not oscillate.
+    /// Returns the frequency from time zero to a time, in oscillations per time; zero without oscillation.
     pub fn frequency_until(&self, end: f64) -> f64 {
         match self {
             Self::Sine { amplitude, frequency, .. } if *amplitude != 0.0 => frequency.abs(),
@@ -200,7 +203,7 @@ impl History {
         }
     }
 
-    /// Values at ascending times, and what lies between them; as [`Samples::new`].
+    /// Creates a history from values at ascending times with an interpolation (see [`Samples::new`]).
     pub fn samples(times: Vec<f64>, values: &[f64], interpolation: super::Interpolation, held: bool) -> Self {
         let values: Vec<Vector1<f64>> = values.iter().map(|&value| Vector1::new(value)).collect();
         Self::Samples(Samples::new(times, &values, interpolation, held))

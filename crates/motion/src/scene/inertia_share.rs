@@ -1,18 +1,19 @@
-//! How much the stiffness of inertia is of the stiffness of a body in a scene.
+//! Ratio of the stiffness of inertia to the stiffness of a body in a scene.
 
 use super::{Scene, Stage, instants, trace};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 
-/// Largest part of the stiffness of any motion of `body` that its stiffness of inertia has along the motion of
-/// `scene`, an upper bound over the directions of spin and acceleration; `None` where it has none.
+/// Returns the largest ratio of the stiffness of inertia to the stiffness against any deformation of `body`
+/// during the motion of `scene`: an upper bound over the directions of spin and acceleration. Returns
+/// `None` if the body has no stiffness of inertia.
 ///
-/// The bound at an instant is |omega|^2 s_w + |omega'| s_alpha + |a| s_a with the shares s of
+/// The bound at one time is |omega|^2 s_w + |omega'| s_alpha + |a| s_a with the shares s of
 /// [`InertiaShares`](flexbody_body::invariants::InertiaShares) and a = V' + omega x V - g.
 ///
 /// # Errors
-/// As [`simulate`](super::simulate).
+/// The errors of [`simulate`](super::simulate).
 pub fn inertia_share(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<Option<f64>> {
     let stage = Stage::new(body, scene)?;
     let Some(inertia) = stage.body.inertia_stiffness() else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! The complete state of a motion at some instants: what the equations of all nodes are evaluated with.
+//! Complete state of a motion at given times, for evaluations of the equations of all nodes.
 
 use super::prepared::{Prepared, damped};
 use super::{Scene, Stage};
@@ -8,19 +8,19 @@ use flexbody_base::error::Result;
 use flexbody_body::flex_body::FlexBody;
 use nalgebra::Vector3;
 
-/// State, accelerations and loads of a body at an instant. Vectors are along the axes of the frame of the
+/// State, accelerations and loads of a body at one time. Vectors are along the axes of the frame of the
 /// [`Stage`], about its origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
-    /// When.
+    /// Time of the state.
     pub time: f64,
-    /// V, the velocity of the frame's origin.
+    /// Velocity V of the origin of the frame.
     pub velocity: Vector3<f64>,
-    /// The rates of the components of V.
+    /// Rates of the components of V.
     pub velocity_rate: Vector3<f64>,
-    /// omega, the angular velocity of the frame.
+    /// Angular velocity omega of the frame.
     pub omega: Vector3<f64>,
-    /// The rates of the components of omega.
+    /// Rates of the components of omega.
     pub omega_rate: Vector3<f64>,
     /// Modal coordinates (nf).
     pub q: Vec<f64>,
@@ -28,17 +28,17 @@ pub struct Instant {
     pub qd: Vec<f64>,
     /// Accelerations of the modal coordinates (nf).
     pub qdd: Vec<f64>,
-    /// The acceleration of gravity.
+    /// Acceleration of gravity.
     pub gravity: Vector3<f64>,
-    /// Force and torque of every load of the scene; the torque as it works on the rotation vector of its
-    /// point.
+    /// Force and torque of every load of the scene; the torque as generalised force on the rotation vector
+    /// of its point.
     pub loads: Vec<(Vector3<f64>, Vector3<f64>)>,
 }
 
-/// The motion of `body` in `scene` at the instants `times`, ascending from 0 to the end of the scene.
+/// Computes the motion of `body` in `scene` at `times`, ascending from 0 to the end of the scene.
 ///
 /// # Errors
-/// As [`simulate`](super::simulate).
+/// The errors of [`simulate`](super::simulate).
 pub fn instants(body: &FlexBody, scene: &Scene, times: &[f64]) -> Result<Vec<Instant>> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;

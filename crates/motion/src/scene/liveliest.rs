@@ -1,15 +1,15 @@
-//! How fast the modes move that count in a motion.
+//! Frequency of the modes that contribute to a motion.
 
 use super::{Scene, Trace};
 use flexbody_body::flex_body::FlexBody;
 
-/// Distances of places that differ by more than this are not of one stretch: the places stand at a break.
+/// Ratio of neighbouring intervals above which differences are not taken: the samples are at a break.
 const UNEVEN: f64 = 8.0;
 
-/// The largest circular frequency of the modes that count in the motion, whose root of the elastic energy is
-/// not below this `part` of the tolerances; those of a body that is carried are not above those of the free
-/// body. A mode that follows slow forces has no motion of its own, however high it is: what counts is the
-/// amplitude q'' / omega^2 that its acceleration has at its own frequency.
+/// Returns the largest circular frequency of the modes that contribute to the motion: modes whose root of
+/// the elastic energy is at least this `part` of the tolerances. For a carried body the frequencies are not
+/// above those of the free body. A mode that follows slow forces has no motion of its own at any frequency;
+/// the criterion is therefore the amplitude q'' / omega^2 of its acceleration at its own frequency.
 pub fn liveliest_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64) -> f64 {
     let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|lambda| lambda.sqrt()).collect();
     let roots = rates.iter().zip(&motion.extremes.amplitudes).map(|(rate, amplitude)| rate * amplitude.abs());
@@ -20,7 +20,7 @@ pub fn liveliest_rate(body: &FlexBody, scene: &Scene, motion: &Trace, part: f64)
     (0..rates.len()).rev().find(counts).map_or(0.0, |last| rates[last])
 }
 
-/// The largest |q''| of every mode, by differences between places that are about as far from each other.
+/// Returns the largest |q''| of every mode, by differences between samples with similar spacing.
 fn accelerations(motion: &Trace, modes: usize) -> Vec<f64> {
     let mut largest = vec![0.0f64; modes];
     for (times, q) in motion.time.windows(3).zip(motion.q.windows(3)) {

@@ -1,4 +1,4 @@
-//! The load cases of a scene, from its file to the verdict about a body.
+//! Load cases of a scene file.
 
 use super::read_cases::read_cases;
 use super::{Scene, Tolerance};
@@ -7,7 +7,7 @@ use flexbody_base::error::{Error, Result};
 use std::ops::Deref;
 use std::path::Path;
 
-/// Load cases that one body has to serve: one or more scenes, in the order of their file.
+/// Load cases of one body: one or more scenes, in the order of their file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoadCases(Vec<Scene>);
 
@@ -31,13 +31,14 @@ impl LoadCases {
         (!cases.is_empty()).then_some(Self(cases))
     }
 
-    /// Reads the load cases of a scene file: the one of the given name, or with `None` all of them. A file without
-    /// `[[case]]` is a single scene.
+    /// Reads the load cases of a scene file: the case with the given name, or all for `None`. A file
+    /// without `[[case]]` is a single scene.
     ///
     /// # Errors
-    /// FB101, FB106 when the scene file or a file of its histories cannot be read; FB211 for syntax, unknown, missing
-    /// or mistyped keys and values that cannot be; FB213 for contradictions; FB215 to FB217 for errors in files of
-    /// histories: all of them, in the order of lines. FB219 when the scene has no case of that name.
+    /// FB101, FB106 if the scene file or a file of its histories cannot be read; FB211 for syntax errors,
+    /// for unknown, missing or mistyped keys, and for impossible values; FB213 for contradictions; FB215 to
+    /// FB217 for errors in files of histories; one diagnostic per finding, in the order of lines. FB219 if
+    /// the scene has no case of that name.
     pub fn read(path: impl AsRef<Path>, case: Option<&str>) -> Result<Self> {
         let path = path.as_ref();
         let mut cases = read_cases(path)?;
@@ -49,10 +50,11 @@ impl LoadCases {
         }
     }
 
-    /// Reads the load case of the given name from a scene file, or with `None` a scene without load cases.
+    /// Reads the load case with the given name from a scene file or, for `None`, a scene without load
+    /// cases.
     ///
     /// # Errors
-    /// Errors of [`LoadCases::read`]; FB219 when the scene has load cases and none is named.
+    /// The errors of [`LoadCases::read`]; FB219 if the scene has load cases and none is named.
     pub fn read_single(path: impl AsRef<Path>, case: Option<&str>) -> Result<Scene> {
         let mut cases = Self::read(&path, case)?;
         let names = names(&cases);
@@ -65,7 +67,7 @@ impl LoadCases {
     /// Returns the only load case.
     ///
     /// # Errors
-    /// FB219 when there are several.
+    /// FB219 if there are several.
     pub fn single(&self) -> Result<&Scene> {
         match &self.0[..] {
             [scene] => Ok(scene),
@@ -73,18 +75,18 @@ impl LoadCases {
         }
     }
 
-    /// Name of the scene that the load cases belong to; of a single load case its full name.
+    /// Returns the name of the scene that the load cases belong to; for a single load case its full name.
     pub fn name(&self) -> &str {
         let first = &self.0[0];
         first.case.as_ref().filter(|_| self.len() > 1).map_or(&first.name, |case| &case.scene)
     }
 
-    /// Name of a load case (from 0) among several; `None` for a scene alone.
+    /// Returns the name of a load case (from 0) if there are several; `None` for a single scene.
     pub fn case_name(&self, at: usize) -> Option<&str> {
         (self.len() > 1).then(|| self.0[at].short_name())
     }
 
-    /// Adds the name of a load case (from 0) to an error, where there are several.
+    /// Adds the name of a load case (from 0) to an error if there are several.
     pub fn about(&self, at: usize, error: Error) -> Error {
         match self.case_name(at) {
             Some(name) => error.about(format!("case `{name}`")),
@@ -92,7 +94,8 @@ impl LoadCases {
         }
     }
 
-    /// The least tolerance of each quantity in any load case, with the least deflection that counts in the first.
+    /// Returns the smallest tolerance of each quantity over all load cases, with the smallest compared
+    /// deflection of the first case.
     pub fn least_tolerance(&self) -> Tolerance {
         self[1..].iter().fold(self[0].requirements.tolerance, |least, scene| {
             let own = scene.requirements.tolerance.errors;
@@ -101,7 +104,7 @@ impl LoadCases {
     }
 }
 
-/// Names of the load cases of a scene file; empty for a scene without.
+/// Returns the names of the load cases of a scene file; empty for a scene without cases.
 fn names(cases: &[Scene]) -> Vec<&str> {
     cases.iter().filter_map(Scene::case_name).collect()
 }

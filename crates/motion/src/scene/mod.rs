@@ -1,4 +1,4 @@
-//! What a body is to do: the scene file, and its simulation.
+//! Scenes: the scene file, and its simulation.
 
 mod axes;
 mod conditions;

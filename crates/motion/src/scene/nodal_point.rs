@@ -1,4 +1,4 @@
-//! Places of a scene among the nodes of a model.
+//! Points of a scene among the nodes of a model.
 
 use super::Point;
 use crate::dynamics::NodalPoint;
@@ -6,11 +6,11 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_model::FeModel;
 
-/// `point` among the nodes of `model`; `None` where the model has no such node, or no such interface with a
-/// reference point.
+/// Finds `point` among the nodes of `model`. Returns `None` if the model has no such node, or no such
+/// interface with a reference point.
 ///
 /// # Errors
-/// [`InterfaceNode`](Code::InterfaceNode).
+/// [`InterfaceNode`](Code::InterfaceNode) if the model has no interfaces.
 pub fn find_nodal_point(model: &FeModel, point: &Point) -> Result<Option<NodalPoint>> {
     match point {
         Point::Interface(name) => NodalPoint::interface(model, name),
@@ -21,7 +21,7 @@ pub fn find_nodal_point(model: &FeModel, point: &Point) -> Result<Option<NodalPo
     }
 }
 
-/// The same, which is to be there.
+/// Finds `point` among the nodes of `model`, which must exist.
 ///
 /// # Errors
 /// FB212 when the model has no such node, or no such interface with a reference point.

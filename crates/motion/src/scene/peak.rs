@@ -1,26 +1,26 @@
-//! The largest value of a smooth function that is seen at instants.
+//! Largest value of a smooth function sampled at some times.
 
-/// Intervals whose lengths differ by more than this are not of one parabola: the instants stand at a break.
+/// Ratio of neighbouring intervals above which no parabola is fitted: the samples are at a break.
 const UNEVEN: f64 = 8.0;
 
-/// The largest value of a function f >= 0 of time that is seen at ascending instants, and where it lies.
+/// Largest value of a function f >= 0 of time sampled at ascending times, and its time.
 ///
-/// Between instants f^2 is taken for the parabola through a largest value and its neighbours: sizes of
-/// vectors have smooth squares. With twenty instants in the period of a vibration a peak is found to within
-/// 9e-4 of it, with sixty to within 1.2e-5. Six and a half, 0.06 off, are what there is of a mode whose
-/// vibration an explicit step can only just follow; error control does not let such a mode move much.
+/// Between the samples f^2 is approximated by the parabola through a largest value and its neighbours,
+/// since vector lengths have smooth squares. With twenty samples per period of a vibration a peak is found
+/// within 9e-4, with sixty within 1.2e-5. At the stability limit of the explicit method a mode has six and
+/// a half samples per period (error 0.06); error control keeps the motion of such a mode small.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Peak {
-    /// The largest value.
+    /// Largest value.
     pub value: f64,
     /// Time of the largest value.
     pub time: f64,
-    /// Times and squares of the last two instants, the earlier first.
+    /// Times and squares of the last two samples, the earlier first.
     last: [Option<(f64, f64)>; 2],
 }
 
 impl Peak {
-    /// Sees `value` at `time`.
+    /// Takes the sample `value` at `time`.
     pub fn see(&mut self, time: f64, value: f64) {
         self.offer(time, value);
         let now = (time, value * value);
@@ -32,19 +32,19 @@ impl Peak {
         self.last = [self.last[1], Some(now)];
     }
 
-    /// A value that is not a number is the largest of all.
+    /// Keeps the larger value; NaN counts as the largest of all.
     fn offer(&mut self, time: f64, value: f64) {
         if value > self.value || value.is_nan() {
             (self.value, self.time) = (value, time);
         }
     }
 
-    /// A known peak.
+    /// Creates a known peak.
     pub fn at(time: f64, value: f64) -> Self {
         Self { value, time, ..Self::default() }
     }
 
-    /// The peak of `values` at `times`.
+    /// Returns the peak of `values` at `times`.
     pub fn of(times: &[f64], values: impl IntoIterator<Item = f64>) -> Self {
         let mut peak = Self::default();
         times.iter().zip(values).for_each(|(&time, value)| peak.see(time, value));
@@ -52,7 +52,8 @@ impl Peak {
     }
 }
 
-/// Where the parabola through three points is largest, if the middle one is the largest of them.
+/// Returns time and value of the maximum of the parabola through three points, if the middle one is the
+/// largest of them.
 fn vertex(a: (f64, f64), b: (f64, f64), c: (f64, f64)) -> Option<(f64, f64)> {
     let (before, after) = (b.0 - a.0, c.0 - b.0);
     let (largest, even) = (b.1 >= a.1 && b.1 >= c.1, before < UNEVEN * after && after < UNEVEN * before);

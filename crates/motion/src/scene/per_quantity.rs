@@ -1,25 +1,26 @@
-//! The quantities of a motion that a scene bounds.
+//! Quantities of a motion that have tolerances in a scene.
 
-/// A value for each quantity of a motion that a scene bounds.
+/// One value for each quantity of a motion that has a tolerance in a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
 pub struct PerQuantity<T> {
-    /// Attitude of the frame. Errors: the angle between the frames. Unit: rad.
+    /// Attitude of the frame. The error is the angle between the frames. Unit: rad.
     pub attitude: T,
-    /// Deflection of the watched points in body axes. Errors: relative to the largest deflection of any of them or to
-    /// the least that counts ([`Resolution`](super::Resolution)). Without watched points: of the nodes that move most
-    /// in some mode along some axis.
+    /// Deflection of the watched points in body axes. The error is relative to the largest deflection of
+    /// any of them, or to the smallest one that is compared ([`Resolution`](super::Resolution)). Without
+    /// watched points, the nodes that move most in some mode along some axis are compared.
     pub deflection: T,
-    /// Stress, as far as a body without stress recovery knows it. Errors: sqrt(V(u - u_ref) / max V(u_ref)), V being
-    /// the elastic energy of a deformation; the least energy that counts instead of the largest where that is less.
+    /// Stress, estimated without stress recovery. The error is sqrt(V(u - u_ref) / max V(u_ref)), where V
+    /// is the elastic energy of a deformation; the smallest energy that is compared replaces a smaller
+    /// maximum.
     pub stress: T,
-    /// Force F and torque T that the prescribed motion takes. Errors: relative to the largest force, or torque, or to a
-    /// thousandth of w^2 m r, or w^2 I, with the radius of gyration r and I = m r^2, or to a hundredth of the largest
-    /// T / r, or F r.
+    /// Force F and torque T of the prescribed motion. The error is relative to the largest force or torque,
+    /// or to one thousandth of w^2 m r or w^2 I, with the radius of gyration r and I = m r^2, or to one
+    /// hundredth of the largest T / r or F r.
     pub reaction: T,
 }
 
 impl<T> PerQuantity<T> {
-    /// The value of each quantity, changed by `change`.
+    /// Returns the values changed by `change`, which is called once for each quantity.
     pub fn map<U>(self, mut change: impl FnMut(T) -> U) -> PerQuantity<U> {
         PerQuantity {
             attitude: change(self.attitude),
@@ -29,7 +30,7 @@ impl<T> PerQuantity<T> {
         }
     }
 
-    /// The values of each quantity in both.
+    /// Returns the pairs of values of both.
     pub fn zip<U>(self, other: PerQuantity<U>) -> PerQuantity<(T, U)> {
         PerQuantity {
             attitude: (self.attitude, other.attitude),
@@ -39,7 +40,7 @@ impl<T> PerQuantity<T> {
         }
     }
 
-    /// References to the values.
+    /// Returns references to the values.
     pub fn as_ref(&self) -> PerQuantity<&T> {
         PerQuantity {
             attitude: &self.attitude,
@@ -49,7 +50,7 @@ impl<T> PerQuantity<T> {
         }
     }
 
-    /// The values with the names of their quantities.
+    /// Returns the values with the names of their quantities.
     pub fn named(self) -> [(&'static str, T); 4] {
         [
             ("attitude", self.attitude),

@@ -1,4 +1,4 @@
-//! A scene made ready to be integrated.
+//! Preparation of a scene for its integration.
 
 use super::effort::{Effort, longest_step};
 use super::equilibrium::settle;
@@ -15,11 +15,11 @@ use flexbody_body::flex_body::FlexBody;
 use nalgebra::Vector3;
 use std::borrow::Cow;
 
-/// Parts of an explicit step that a motion is looked at: no step is longer than the period of any mode by
-/// much, or it would not be stable.
+/// Number of parts of an explicit step at which the motion is sampled. Stability keeps steps from being
+/// much longer than the period of any mode, so that every oscillation is resolved.
 pub(super) const PARTS: usize = 6;
 
-/// A body, with the damping of its scene, in this scene; both in one frame and ready to be integrated.
+/// Body with the damping of its scene, and this scene, in one frame and ready for integration.
 pub(super) struct Prepared<'a> {
     pub body: &'a FlexBody,
     pub scene: &'a Scene,
@@ -28,30 +28,30 @@ pub(super) struct Prepared<'a> {
     pub equations: EquationsOfMotion,
     pub start: Configuration,
     pub duration: f64,
-    /// With the step that is taken.
+    /// Integration scheme, with the actual step length.
     pub scheme: Scheme,
 }
 
-/// What an integration leaves besides what was shown.
+/// Results of an integration besides the observed states.
 pub(super) struct Finished {
     pub work: Work,
     /// Mass and radius of gyration of the body.
     pub size: (f64, f64),
-    /// Energy that is rounding.
+    /// Energy below which energies count as rounding.
     pub least_energy: f64,
 }
 
-/// Force and torque about the origin of the frame, axes of the body, that a prescribed motion takes.
+/// Force and torque of a prescribed motion about the origin of the frame, axes of the body.
 pub(super) type Reaction = (Vector3<f64>, Vector3<f64>);
 
 /// Reasons for an integration to end early.
 pub(super) enum Stop {
     Failed(Failure),
-    /// There is no memory for more of the motion than until then.
+    /// The memory was full at `time`.
     Memory {
         time: f64,
     },
-    /// It took all steps that it may take until then.
+    /// The limit of the number of steps was reached at `time`.
     Steps {
         time: f64,
     },
@@ -64,10 +64,10 @@ impl From<Failure> for Stop {
 }
 
 impl<'a> Prepared<'a> {
-    /// The equations of motion, loads, start and integration scheme of `body` in `scene`.
+    /// Creates the equations of motion, loads, start and integration scheme of `body` in `scene`.
     ///
     /// # Errors
-    /// FB212 where the scene does not fit the body; FB550 and FB551, before any work.
+    /// FB212 if the scene does not fit the body; FB550 and FB551 before any work.
     pub(super) fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         let Some(duration) = scene.run.duration else {
             let diagnostic = Diagnostic::new(Code::SceneBody, "the scene does not say how long it lasts");
@@ -84,11 +84,11 @@ impl<'a> Prepared<'a> {
         Ok(Self { scene, forces, watched, equations, start, duration, scheme, body })
     }
 
-    /// Shows a place of the motion, between those that are written, to `survey`. Answers the reaction there
-    /// where something is prescribed.
+    /// Passes a sampled state of the motion to `survey`. Returns the reaction there if motion is
+    /// prescribed.
     ///
     /// # Errors
-    /// Where the body has no motion at this state.
+    /// Failures of the equations of motion at this state.
     pub(super) fn survey(
         &self,
         survey: &mut Survey<'_>,
@@ -111,10 +111,11 @@ impl<'a> Prepared<'a> {
         Ok(self.scene.prescribes().then_some(reaction))
     }
 
-    /// Integrates over `instants` and shows the motion, at so many parts of every explicit step.
+    /// Integrates over `instants` and passes the motion to `show`, also at `parts` points of every explicit
+    /// step.
     ///
     /// # Errors
-    /// FB540 when the integration cannot go on, FB550 when it takes more steps than it may, FB601 when `show`
+    /// FB540 if the integration cannot go on, FB550 if it needs more steps than allowed, FB601 if `show`
     /// has no memory left.
     pub(super) fn integrate<E: From<Failure> + Into<Stop>>(
         &self,
@@ -149,19 +150,20 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// The body, in the frame of the scene, with the damping of the scene where the scene states one.
+/// Returns the body, in the frame of the scene, with the damping of the scene if the scene states one.
 ///
 /// # Errors
-/// [`SceneDamping`](Code::SceneDamping) when both state one and the scene does not replace that of the body; those of
-/// [`FlexBody::new`].
+/// [`SceneDamping`](Code::SceneDamping) if both state damping and the scene does not replace that of the
+/// body; the errors of [`FlexBody::new`].
 pub fn damped<'b>(body: &'b FlexBody, scene: &Scene) -> Result<Cow<'b, FlexBody>> {
     scene.requirements.damped(body, &format!("scene `{}`", scene.name))
 }
 
-/// The body with the damping of the scene, and the scene without: what looks at the pair again adds none.
+/// Returns the body with the damping of the scene, and the scene without damping, so that further
+/// processing does not add it twice.
 ///
 /// # Errors
-/// As [`damped`].
+/// The errors of [`damped`].
 pub fn damped_once<'b, 's>(
     body: Cow<'b, FlexBody>,
     scene: Cow<'s, Scene>,
@@ -175,7 +177,7 @@ pub fn damped_once<'b, 's>(
     Ok((body, Cow::Owned(scene)))
 }
 
-/// The state at time zero. What is prescribed replaces what the scene says of it.
+/// Returns the state at time zero. Prescribed motion overrides the initial state of the scene.
 fn start(body: &FlexBody, scene: &Scene, forces: &SceneForces<'_>) -> Configuration {
     let initial = &scene.initial;
     let (mut q, mut qd) = (vec![0.0; body.n_modes()], vec![0.0; body.n_modes()]);
@@ -225,7 +227,7 @@ fn stopped(scene: &Scene, method: &Method, stop: Stop) -> Error {
     }
 }
 
-/// Whether a run ended for a reason of its own: other models of the same scene may go on.
+/// Returns true if `code` ends a single run: runs with other models of the scene may go on.
 pub fn ends_a_run(code: Code) -> bool {
     matches!(code, Code::SimulationStopped | Code::RunTooLong)
 }

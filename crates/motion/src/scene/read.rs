@@ -1,4 +1,4 @@
-//! Reads a scene of `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
+//! Reader of a scene from `scene.toml`. Its machine-readable contract is `schemas/scene.schema.json`.
 
 use super::contradictions::contradictions;
 use super::read_attitude::turning;
@@ -28,20 +28,20 @@ const LOAD: &[&str] =
     &["node", "interface", "force", "torque", "force_from", "torque_from", "axes", "history"];
 const SPIN: &[&str] = &["axis", "axes", "rate", "angular_velocity_from", "attitude_from", "hold"];
 const WATCH: &[&str] = &["node", "interface"];
-/// Instants recorded unless said.
+/// Default number of output times.
 const OUTPUTS: i64 = 500;
 
-/// More than anybody plots, and less than memory holds.
+/// Largest number of output times: more than a plot can show, and small enough for the memory.
 const MOST_OUTPUTS: i64 = 1_000_000;
 
-/// Tolerance of the adaptive method unless said: trajectories of some ten turns to 1e-7.
+/// Default tolerance of the adaptive method: paths over some ten turns are accurate to 1e-7.
 const TOLERANCE: f64 = 1e-9;
 
-/// Tolerances that rounding leaves a meaning.
+/// Range of tolerances that are meaningful in double precision.
 const TOLERANCES: Range<f64> = 1e-14..0.1;
 
-/// A scene without cases, named `stem` where it has no name. `None` only with something in `found`, as
-/// everything here.
+/// Reads a scene without cases; `stem` is its name if the file has none. As in this whole module, a result
+/// `None` comes with a diagnostic in `found`.
 pub(super) fn scene(walk: &mut Walk<'_>, top: &TomlTable, stem: String) -> Option<Scene> {
     let required = read_requirements::TABLES.map(|(name, _)| name);
     walk.known_keys(top, "the scene", &[TOP, &required].concat());
@@ -220,7 +220,7 @@ fn initial(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Initial> {
     })
 }
 
-/// Whether `deformation` is static.
+/// Reads `deformation`; returns true if it is static.
 fn settled(walk: &mut Walk<'_>, value: &Value) -> Option<bool> {
     let settled = match value.get_ref() {
         DeValue::String(text) if text == "static" => Some(true),

@@ -1,4 +1,5 @@
-//! Reads a rotation: a rate about one axis, three components of an angular velocity, or attitudes over time.
+//! Reader of rotations: a rate about one axis, three components of an angular velocity, or attitudes over
+//! time.
 
 use super::read_columns::{FromFile, HistoryFiles, columns_history, four_columns, tell};
 use super::read_values::{EVERY, axes, direction, history};
@@ -9,31 +10,31 @@ use flexbody_base::text::walk::{TomlTable, Walk};
 use nalgebra::{Vector3, Vector4};
 use std::ops::Range;
 
-/// Keys of attitudes in a file: their values hold nowhere but between its rows, and have no unit.
+/// Keys of attitudes in a file. Their values are not continued outside the rows, and they have no unit.
 pub(super) const ATTITUDE: &[&str] = &["file", "time", "columns", "time_scale", "time_zero"];
 
-/// The three ways to say how something turns.
+/// Keys of the three ways to give a rotation.
 const WAYS: [&str; 3] = ["rate", "angular_velocity_from", "attitude_from"];
 
-/// How far the length of Euler parameters may be from one: what two digits after the point leave.
+/// Largest deviation of the length of Euler parameters from one: the rounding of two decimals.
 const LENGTH: f64 = 0.01;
 
-/// Largest angle between two rows, radians: beyond it the way from one to the other is a guess.
+/// Largest angle between two rows in radians; larger rotations between rows are ambiguous.
 const LARGEST_TURN: f64 = std::f64::consts::FRAC_PI_2;
 
-/// Largest angle, radians, that the interpolated angular velocity may lead away from the attitudes in the
-/// file: the tolerance of the attitude that scenes have unless they say otherwise.
+/// Largest angle in radians between the integrated angular velocity and the attitudes in the file: the
+/// default tolerance of the attitude in scenes.
 const LARGEST_LOSS: f64 = 1e-3;
 
-/// How something turns.
+/// A rotation as read from a scene.
 pub(super) struct Turning {
     pub velocity: VectorHistory,
     pub axes: Axes,
-    /// The attitude at time zero, where the file has that.
+    /// Attitude at time zero, if the file contains it.
     pub start: Option<RotationVector>,
 }
 
-/// Reads the rotation in `table`, called `place`. `None` only with something in `found`.
+/// Reads the rotation in `table`, called `place`. A result `None` comes with a diagnostic in `found`.
 pub(super) fn turning(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -74,7 +75,7 @@ pub(super) fn turning(
             Some(Turning { velocity, axes: axes?, start: None })
         }
         _ => {
-            // Of whose frame the attitudes are.
+            // The attitudes are those of the model or of the body frame.
             let axes = axes(walk, table, &[Axes::Model, Axes::Body], Axes::Model);
             let read = four_columns(walk, files, way, value, ATTITUDE)?;
             match Attitudes::new(&read).and_then(|attitudes| attitudes.followed(&read, files.end())) {
@@ -92,7 +93,7 @@ pub(super) fn turning(
     }
 }
 
-/// The axis of a rotation.
+/// Reads the axis of a rotation.
 fn axis_of(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Vector3<f64>> {
     if table.contains_key("axis") { direction(walk, table, "axis") } else { Some(Vector3::z()) }
 }
@@ -134,12 +135,13 @@ impl Attitudes {
         Ok(Self { parameters })
     }
 
-    /// The angular velocity that follows the attitudes, along their axes, and the attitude at time zero.
+    /// Returns the angular velocity that follows the attitudes, along their axes, and the attitude at time
+    /// zero.
     ///
-    /// With the cubic spline s through the Euler parameters, which leaves unit length a little between the
-    /// rows, p = s / |s| turns with omega = G(p) p' = G(s) s' / |s|^2, since G(s) s = 0. At the rows s' has
-    /// one order more than elsewhere; the cubic spline through omega there has a continuous second
-    /// derivative.
+    /// The cubic spline s through the Euler parameters deviates slightly from unit length between the rows.
+    /// p = s / |s| turns with omega = G(p) p' = G(s) s' / |s|^2, since G(s) s = 0. At the rows s' is
+    /// accurate to one order more than elsewhere; the cubic spline through omega at the rows has a
+    /// continuous second derivative.
     fn followed(&self, read: &FromFile, end: Option<f64>) -> Result<(Samples<3>, RotationVector)> {
         let splined = Samples::new(read.times.clone(), &self.parameters, Interpolation::Cubic, false);
         let omega = |time: f64| {
@@ -153,9 +155,10 @@ impl Attitudes {
         Ok((velocity, start.into()))
     }
 
-    /// Refuses rows that are so far apart that the angular velocity through them leads elsewhere until `end`:
-    /// it is integrated from row to row by the method of Magnus of order four, Omega = h (w_1 + w_2) / 2 +
-    /// sqrt(3) h^2 / 12 w_1 x w_2 at the two Gauss points, along axes that turn.
+    /// Returns an error if the rows are so far apart that the angular velocity through them leads to other
+    /// attitudes until `end`. The angular velocity is integrated from row to row by the Magnus method of
+    /// order four, Omega = h (w_1 + w_2) / 2 + sqrt(3) h^2 / 12 w_1 x w_2 at the two Gauss points, along
+    /// turning axes.
     fn refuse_loss(&self, read: &FromFile, velocity: &Samples<3>, end: f64) -> Result<()> {
         let axes = |row: usize| EulerParameters(self.parameters[row].into()).axes();
         let mut own = axes(0);

@@ -1,4 +1,4 @@
-//! Reads the table of a scene that says what carries the body.
+//! Reader of the table of a scene about the carrier of the body.
 
 use super::read_attitude::turning;
 use super::read_columns::{HistoryFiles, columns_history};
@@ -21,7 +21,7 @@ pub(super) const TRANSLATION: &[&str] = &[
     "acceleration_from",
 ];
 
-/// `None` only with something in `found`, as everything here.
+/// Reads the carrier. As in this whole module, a result `None` comes with a diagnostic in `found`.
 pub(super) fn carried(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -32,7 +32,7 @@ pub(super) fn carried(
     let by = place(walk, table, span);
     let mut part = |key: &str| {
         let found = walk.table(table, key);
-        // What is there and no table was complained about.
+        // The key exists but is no table; a diagnostic reports it.
         if found.is_none() && table.contains_key(key) { Err(()) } else { Ok(found) }
     };
     let (spin_table, translation_table) = (part("spin"), part("translation"));
@@ -59,11 +59,11 @@ fn spin(
     })
 }
 
-/// Makes a drive of a history.
+/// Function that makes a drive of a history.
 type Driven = fn(VectorHistory) -> Drive;
 
-/// The derivatives that a translation can be given by: the key of a history along a direction, that of three
-/// columns, and what it makes.
+/// Derivatives that can define a translation: the key of a history along a direction, the key of three
+/// columns, and the constructor of the drive.
 const DERIVATIVES: [(&str, &str, Driven); 3] = [
     ("displacement", "displacement_from", Drive::Displacement),
     ("velocity", "velocity_from", Drive::Velocity),
@@ -108,7 +108,7 @@ fn translation(
         }
         let direction = direction(walk, table, "direction");
         let factor = history(walk, files, key, value)?;
-        // Without a direction there is still something to say of the history.
+        // Check the history even if the direction is invalid.
         has_direction = direction.is_some();
         VectorHistory::Along { direction: direction.unwrap_or_default(), factor }
     };

@@ -1,5 +1,5 @@
-//! Reads the load cases of a scene file: what stands outside `[[case]]` is common, a case adds to it or takes
-//! its place.
+//! Reader of the load cases of a scene file: keys outside `[[case]]` are common, and a case adds to them or
+//! replaces them.
 
 use super::read::{TOP, scene};
 use super::{CaseName, Scene, read_requirements};
@@ -11,14 +11,14 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::DeValue;
 
-/// Tables of settings that are independent of each other: a case replaces their keys one by one. Every other
-/// table is replaced as a whole.
+/// Tables of independent settings: a case replaces their keys one by one. Every other table is replaced as
+/// a whole.
 const BY_KEY: &[&str] = &["run", "initial", "motion", "attachment", "limits", "tolerance"];
 
 /// Lists whose items a case adds to those of the scene.
 const ADDED: &[&str] = &["load", "watch"];
 
-/// What a body is made with belongs to all cases.
+/// Keys that may only appear at the top level, not in a `[[case]]`.
 const ONLY_COMMON: &[&str] = &["case", "cost"];
 
 /// Reads the load cases of a scene file in its order, one or more; a file without `[[case]]` is a single scene.
@@ -30,7 +30,7 @@ pub(super) fn read_cases(path: &Path) -> Result<Vec<Scene>> {
     })
 }
 
-/// `None` only with something in `found`, as everything here.
+/// Reads the cases. As in this whole module, a result `None` comes with a diagnostic in `found`.
 fn cases(walk: &mut Walk<'_>, top: &TomlTable<'_>, list: &Value<'_>, stem: String) -> Option<Vec<Scene>> {
     let whole = if top.contains_key("name") { walk.string(top, "name") } else { Some(stem) };
     let tables = tables(walk, list)?;
@@ -59,7 +59,7 @@ fn cases(walk: &mut Walk<'_>, top: &TomlTable<'_>, list: &Value<'_>, stem: Strin
     Some(scenes)
 }
 
-/// The tables of the list of cases, and where they stand.
+/// Returns the tables of the list of cases, and their positions in the file.
 fn tables<'t, 'i>(
     walk: &mut Walk<'_>,
     list: &'t Value<'i>,
@@ -79,7 +79,7 @@ fn tables<'t, 'i>(
     tables
 }
 
-/// The names of the cases; where one is wrong, that was complained about.
+/// Returns the names of the cases; adds a diagnostic for each invalid name.
 fn names(walk: &mut Walk<'_>, tables: &[(&TomlTable<'_>, Range<usize>)]) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for (table, span) in tables {
@@ -96,7 +96,7 @@ fn names(walk: &mut Walk<'_>, tables: &[(&TomlTable<'_>, Range<usize>)]) -> Vec<
             );
             walk.wrong(value.span(), message);
         }
-        // Some file systems do not tell capital letters from others.
+        // Names become file names, and some file systems ignore case.
         if !name.is_empty() && names.iter().any(|other| other.eq_ignore_ascii_case(&name)) {
             walk.complain(Code::SceneContradicts, value.span(), format!("case `{name}` is there twice"));
         }
@@ -105,15 +105,14 @@ fn names(walk: &mut Walk<'_>, tables: &[(&TomlTable<'_>, Range<usize>)]) -> Vec<
     names
 }
 
-/// Keys of a case.
+/// Returns the keys that are allowed in a case.
 pub(super) fn known_keys() -> Vec<&'static str> {
     let required = read_requirements::TABLES.map(|(name, _)| name);
     TOP.iter().chain(&required).copied().filter(|key| !ONLY_COMMON.contains(key)).collect()
 }
 
-/// The scene that a case is: what is `common`, with the tables of [`BY_KEY`] key by key and the lists of
-/// [`ADDED`] item by item joined by those of the case, and everything else of the case instead of what is
-/// common.
+/// Returns the table of a case: the `common` table, with the tables of [`BY_KEY`] merged key by key, the
+/// lists of [`ADDED`] extended by the items of the case, and all other keys replaced by those of the case.
 fn merged<'t>(common: &TomlTable<'t>, case: &TomlTable<'t>) -> TomlTable<'t> {
     let mut merged = common.clone();
     merged.remove("case");
@@ -150,7 +149,7 @@ fn joined<'t>(name: &str, common: &Value<'t>, case: &Value<'t>) -> Value<'t> {
     Spanned::new(case.span(), joined)
 }
 
-/// Findings that all cases have once, for they are about what is common; others with the name of their case.
+/// Returns findings about common keys once, and all others with the name of their case.
 fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
     let is_common = |one: &Diagnostic| found.iter().all(|own| own.contains(one));
     let mut told = Vec::new();
@@ -166,7 +165,8 @@ fn each_once(found: Vec<Vec<Diagnostic>>, names: &[String]) -> Vec<Diagnostic> {
     told
 }
 
-/// A body is chosen by motion or by ranges, not by both.
+/// Adds a diagnostic if only some cases have a duration: a body is chosen by motion or by ranges, not by
+/// both.
 fn refuse_some_without_run(walk: &mut Walk<'_>, scenes: &[Scene], names: &[String], spans: &[Range<usize>]) {
     if scenes.iter().all(|scene| scene.run.duration.is_none()) {
         return;

@@ -1,6 +1,6 @@
-//! Reads histories that stand in the columns of other files.
+//! Reader of histories in the columns of other files.
 //!
-//! Every function gives `None` only with something in `found`.
+//! A function that returns `None` has added a diagnostic to `found`.
 
 use super::read_numbers::{finite, positive};
 use super::{History, Interpolation, Run, Samples, SeriesFile, VectorHistory};
@@ -14,18 +14,19 @@ use std::cell::RefCell;
 use std::ops::Range;
 use toml::de::DeValue;
 
-/// Keys of the table of one column, and of one of several columns.
+/// Keys of the table of one column, and of a table of several columns.
 pub(super) const COLUMN: &[&str] =
     &["file", "time", "value", "scale", "time_scale", "time_zero", "interpolation", "outside"];
 pub(super) const COLUMNS: &[&str] =
     &["file", "time", "columns", "scale", "time_scale", "time_zero", "interpolation", "outside"];
 
-/// How far a file may end before the run, relative to its duration: times are written with some six digits.
+/// Time by which a file may end before the run, relative to the duration: times are often written with
+/// about six digits.
 const ROUNDING: f64 = 1e-6;
 
-/// What the histories of a scene are read for, and the files that they were read from.
+/// Time span that the histories of a scene must cover, and the files read so far.
 pub(super) struct HistoryFiles {
-    /// Until when a history has to be known.
+    /// Time span that a history must cover.
     needed: Needed,
     read: RefCell<Vec<SeriesFile>>,
 }
@@ -33,14 +34,14 @@ pub(super) struct HistoryFiles {
 #[derive(Clone, Copy)]
 enum Needed {
     Until(f64),
-    /// The scene does not say how long it lasts.
+    /// The scene does not state its duration.
     NotSaid,
-    /// What it says is wrong, and was complained about.
+    /// The stated duration is wrong, and a diagnostic reports it.
     NotKnown,
 }
 
 impl HistoryFiles {
-    /// For a scene with this `run`; `None` where that is wrong.
+    /// Creates the reader for a scene with this `run`; `None` if the run is invalid.
     pub(super) fn new(run: Option<&Run>) -> Self {
         let needed = match run.map(|run| run.duration) {
             Some(Some(duration)) => Needed::Until(duration),
@@ -50,12 +51,12 @@ impl HistoryFiles {
         Self { needed, read: RefCell::default() }
     }
 
-    /// The files that were read.
+    /// Returns the files that were read.
     pub(super) fn into_files(self) -> Vec<SeriesFile> {
         self.read.into_inner()
     }
 
-    /// Until when a history has to be known, where the scene says it.
+    /// Returns the end of the time span that a history must cover, if the scene states it.
     pub(super) fn end(&self) -> Option<f64> {
         match self.needed {
             Needed::Until(end) => Some(end),
@@ -63,7 +64,7 @@ impl HistoryFiles {
         }
     }
 
-    /// Opens a file beside the scene.
+    /// Opens a file in the folder of the scene.
     fn open(&self, walk: &mut Walk<'_>, table: &TomlTable, span: &Range<usize>) -> Option<InputFile> {
         if !table.contains_key("file") {
             walk.wrong(span.clone(), "key `file` is missing".to_owned());
@@ -94,7 +95,7 @@ impl HistoryFiles {
         Some(file)
     }
 
-    /// Complains where the `name`d file with these first and last times does not cover the run.
+    /// Adds a diagnostic if the file `name` with these first and last times does not cover the run.
     fn check_covered(
         &self,
         walk: &mut Walk<'_>,
@@ -121,14 +122,14 @@ impl HistoryFiles {
 /// Columns of a file in times of the scene.
 pub(super) struct FromFile {
     pub times: Vec<f64>,
-    /// Scaled.
+    /// Columns with the scale applied.
     pub columns: Vec<Vec<f64>>,
-    /// Lines that the rows stand in.
+    /// Line number of each row.
     pub lines: Vec<usize>,
     pub file: InputFile,
 }
 
-/// What a table says of its columns besides which they are.
+/// Options in a table of columns.
 struct ColumnOptions {
     scale: f64,
     time_scale: f64,
@@ -164,7 +165,7 @@ impl ColumnOptions {
     }
 }
 
-/// How a history goes on between its rows.
+/// Reads the interpolation between rows.
 pub(super) fn interpolation(
     walk: &mut Walk<'_>,
     table: &TomlTable,
@@ -174,7 +175,7 @@ pub(super) fn interpolation(
     one_of(walk, table, "interpolation", &known, default)
 }
 
-/// The meaning of a word under `key`.
+/// Returns the meaning of the word under `key`.
 fn one_of<T: Copy>(
     walk: &mut Walk<'_>,
     table: &TomlTable,
@@ -194,7 +195,7 @@ fn one_of<T: Copy>(
     given
 }
 
-/// A column by its name or number.
+/// Reads a column given by its name or number.
 fn column(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<ColumnKey> {
     let column = match value.get_ref() {
         DeValue::String(name) if !name.trim().is_empty() => Some(ColumnKey::Name(name.trim().to_owned())),
@@ -209,7 +210,7 @@ fn column(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<ColumnKey> {
     column
 }
 
-/// The columns that `table` names by `keys`, over the run.
+/// Reads the columns `keys` of the file named by `table`, over the run.
 fn series(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -246,7 +247,7 @@ fn series(
     Some(FromFile { times, columns, lines, file })
 }
 
-/// Several histories may be of one file: what is wrong with it is told once.
+/// Adds diagnostics that are not yet reported: several histories may come from one file.
 pub(super) fn tell(walk: &mut Walk<'_>, found: Vec<Diagnostic>) {
     for diagnostic in found {
         if !walk.found.contains(&diagnostic) {
@@ -255,7 +256,7 @@ pub(super) fn tell(walk: &mut Walk<'_>, found: Vec<Diagnostic>) {
     }
 }
 
-/// The history in one column.
+/// Reads a history from one column.
 pub(super) fn column_history(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -275,7 +276,7 @@ pub(super) fn column_history(
     Some(History::samples(read.times, &read.columns[0], reading.interpolation, reading.held))
 }
 
-/// The `count` columns of a list.
+/// Reads the keys of a list of `count` columns.
 fn column_list(
     walk: &mut Walk<'_>,
     table: &TomlTable,
@@ -292,7 +293,8 @@ fn column_list(
     list.iter().map(|value| column(walk, "columns", value)).collect()
 }
 
-/// The vector in three columns under `key`, interpolated in this way unless the table says otherwise.
+/// Reads a vector from the three columns under `key`, with the interpolation `default` unless the table
+/// states another.
 pub(super) fn columns_history(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -310,7 +312,7 @@ pub(super) fn columns_history(
     Some(VectorHistory::Columns(Samples::new(read.times, &rows, reading.interpolation, reading.held)))
 }
 
-/// The four columns of Euler parameters under `key`, as they are.
+/// Reads the four columns of Euler parameters under `key` without scaling.
 pub(super) fn four_columns(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -325,7 +327,7 @@ pub(super) fn four_columns(
     series(walk, files, table, &span, keys, &reading)
 }
 
-/// The table of columns under `key`.
+/// Returns the table of columns under `key`.
 fn table_of_columns<'t, 'i>(
     walk: &mut Walk<'_>,
     key: &str,

@@ -1,11 +1,11 @@
-//! Reads the numbers of a scene.
+//! Readers of numbers in a scene.
 //!
-//! Every function gives `None` only with something in `found`.
+//! A function that returns `None` has added a diagnostic to `found`.
 
 use flexbody_base::text::walk::{TomlTable, Walk};
 use std::ops::Range;
 
-/// A finite number that must be there.
+/// Reads a required finite number.
 pub(super) fn finite(walk: &mut Walk<'_>, table: &TomlTable, key: &str, span: &Range<usize>) -> Option<f64> {
     let number = walk.number(table, key, span)?;
     if !number.is_finite() {
@@ -15,7 +15,7 @@ pub(super) fn finite(walk: &mut Walk<'_>, table: &TomlTable, key: &str, span: &R
     Some(number)
 }
 
-/// A positive number that must be there.
+/// Reads a required positive number.
 pub(super) fn positive(
     walk: &mut Walk<'_>,
     table: &TomlTable,
@@ -30,7 +30,7 @@ pub(super) fn positive(
     Some(number)
 }
 
-/// Where the value of `key` stands; `span` is that of its table.
+/// Returns the position of the value of `key` in the file; `span` is that of its table.
 pub(super) fn place_of(table: &TomlTable, key: &str, span: &Range<usize>) -> Range<usize> {
     table.get(key).map_or_else(|| span.clone(), |value| value.span())
 }

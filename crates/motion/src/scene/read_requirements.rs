@@ -1,4 +1,4 @@
-//! Reads the tables of a scene that say what is demanded of the body.
+//! Reader of the tables of a scene with the requirements for the body.
 
 use super::Axes;
 use super::PerQuantity;
@@ -10,7 +10,7 @@ use flexbody_model::{DampingRatios, damping_bands};
 use nalgebra::{Matrix3, Vector3};
 use toml::de::DeValue;
 
-/// The tables, for the list of known ones.
+/// Tables with their keys, also for the list of known tables.
 pub(super) const TABLES: [(&str, &[&str]); 7] = [
     ("motion", &["angular_velocity", "angular_acceleration", "axes"]),
     ("attachment", &["kind", "inertia", "axes", "first_frequency"]),
@@ -23,7 +23,7 @@ pub(super) const TABLES: [(&str, &[&str]); 7] = [
 
 const LIMITED_MODE: &[&str] = &["number", "amplitude"];
 
-/// `None` only with something in `found`.
+/// Reads the requirements. A result `None` comes with a diagnostic in `found`.
 pub(super) fn requirements(walk: &mut Walk<'_>, top: &TomlTable) -> Option<Requirements> {
     let mut requirements = Requirements::default();
     let mut complete = true;
@@ -34,14 +34,14 @@ pub(super) fn requirements(walk: &mut Walk<'_>, top: &TomlTable) -> Option<Requi
                 let mut section = Section { walk, table, span };
                 complete &= section.read(name, &mut requirements).is_some();
             }
-            // What is there and no table was complained about.
+            // The key exists but is no table; a diagnostic reports it.
             None => complete &= !top.contains_key(name),
         }
     }
     complete.then_some(requirements)
 }
 
-/// One of the tables.
+/// One of the tables, while it is read.
 struct Section<'s, 'w> {
     walk: &'s mut Walk<'w>,
     table: &'s TomlTable<'s>,
@@ -65,7 +65,7 @@ impl Section<'_, '_> {
         Some(())
     }
 
-    /// A positive number that may be there.
+    /// Reads an optional positive number.
     fn optional(&mut self, key: &str) -> Option<Option<f64>> {
         match self.table.contains_key(key) {
             true => positive(self.walk, self.table, key, &self.span).map(Some),
@@ -93,7 +93,7 @@ impl Section<'_, '_> {
         })
     }
 
-    /// One ratio, or ratios by frequency.
+    /// Reads one ratio, or ratios by frequency.
     fn damping_ratios(&mut self) -> Option<DampingRatios> {
         match (self.table.get("bands"), self.table.contains_key("ratio")) {
             (None, _) => positive(self.walk, self.table, "ratio", &self.span).map(DampingRatios::from),
@@ -140,12 +140,12 @@ impl Section<'_, '_> {
     }
 }
 
-/// Axes that turn with the body.
+/// Reads axes that turn with the body.
 fn turning_axes(walk: &mut Walk<'_>, table: &TomlTable) -> Option<Axes> {
     axes(walk, table, &[Axes::Model, Axes::Body], Axes::Model)
 }
 
-/// A number that is not negative, or three of them.
+/// Reads a number that is not negative, or three of them.
 fn range(walk: &mut Walk<'_>, table: &TomlTable, key: &str) -> Option<Option<Range>> {
     let Some(value) = table.get(key) else { return Some(None) };
     if let DeValue::Array(_) = value.get_ref() {

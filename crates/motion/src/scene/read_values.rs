@@ -1,6 +1,7 @@
-//! Values that several tables of a scene have: numbers, vectors, axes, places, histories, lists.
+//! Readers of values that occur in several tables of a scene: numbers, vectors, axes, points, histories,
+//! lists.
 //!
-//! Every function gives `None` only with something in `found`.
+//! A function that returns `None` has added a diagnostic to `found`.
 
 use super::read_columns::{COLUMN, HistoryFiles, column_history, interpolation};
 use super::read_numbers::{finite, positive};
@@ -22,7 +23,7 @@ pub(super) const HISTORIES: [(&str, &[&str]); 4] = [
     ("a ramp", &["from", "to", "start", "duration"]),
 ];
 
-/// What is not there is no mistake; what is there and wrong is.
+/// Swaps the options: a missing key is allowed, an invalid value is an error.
 pub(super) fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
     match value {
         Some(read) => read.map(Some),
@@ -30,7 +31,7 @@ pub(super) fn transposed<T>(value: Option<Option<T>>) -> Option<Option<T>> {
     }
 }
 
-/// The number of a mode, from 0.
+/// Reads the number of a mode, returned from 0.
 pub(super) fn mode_number(
     walk: &mut Walk<'_>,
     table: &TomlTable,
@@ -48,7 +49,7 @@ pub(super) fn mode_number(
     Some(number? - 1)
 }
 
-/// One of the axes `known` under the key `axes`.
+/// Reads the key `axes`, which must be one of `known`.
 pub(super) fn axes(walk: &mut Walk<'_>, table: &TomlTable, known: &[Axes], default: Axes) -> Option<Axes> {
     let Some(value) = table.get("axes") else { return Some(default) };
     let given = match value.get_ref() {
@@ -62,7 +63,7 @@ pub(super) fn axes(walk: &mut Walk<'_>, table: &TomlTable, known: &[Axes], defau
     given
 }
 
-/// A vector of length one along that of `key`, which must be there.
+/// Reads the required vector under `key` and returns it with length one.
 pub(super) fn direction(walk: &mut Walk<'_>, table: &TomlTable, key: &str) -> Option<Vector3<f64>> {
     let value = table.get(key)?;
     let unit = vector(walk, key, value)?.try_normalize(0.0);
@@ -72,7 +73,7 @@ pub(super) fn direction(walk: &mut Walk<'_>, table: &TomlTable, key: &str) -> Op
     unit
 }
 
-/// A node or an interface.
+/// Reads a node or an interface.
 pub(super) fn place(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<Point> {
     match (table.get("node"), table.contains_key("interface")) {
         (Some(value), false) => {
@@ -94,7 +95,7 @@ pub(super) fn place(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) 
     }
 }
 
-/// A number, or a table of one of the kinds of histories.
+/// Reads a number, or a table of one of the kinds of histories.
 pub(super) fn history(
     walk: &mut Walk<'_>,
     files: &HistoryFiles,
@@ -112,7 +113,7 @@ pub(super) fn history(
             return number.map(History::Constant);
         }
     };
-    // The kind that most of the keys belong to, the first of several.
+    // Choose the kind that most of the keys belong to, the first of several.
     let fitting = |kind: usize| HISTORIES[kind].1.iter().filter(|key| table.contains_key(**key)).count();
     let kind = (0..HISTORIES.len()).rev().max_by_key(|&kind| fitting(kind)).filter(|&kind| fitting(kind) > 0);
     let Some(kind) = kind else {
@@ -141,7 +142,7 @@ pub(super) fn history(
     }
 }
 
-/// A table of points.
+/// Reads a table of points.
 fn points(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<History> {
     let mut numbers = |key: &str| {
         let list: Option<Vec<f64>> = table.get(key).and_then(|value| match value.get_ref() {
@@ -176,7 +177,7 @@ fn points(walk: &mut Walk<'_>, table: &TomlTable, span: Range<usize>) -> Option<
     None
 }
 
-/// The tables `[[key]]`.
+/// Reads the tables `[[key]]`.
 pub(super) fn list<T>(
     walk: &mut Walk<'_>,
     table: &TomlTable,
@@ -205,7 +206,7 @@ pub(super) fn list<T>(
     all
 }
 
-/// Three finite numbers.
+/// Reads three finite numbers.
 pub(super) fn vector(walk: &mut Walk<'_>, key: &str, value: &Value) -> Option<Vector3<f64>> {
     let components: Option<Vec<f64>> = match value.get_ref() {
         DeValue::Array(list) => list.iter().map(|item| real(item).filter(|v| v.is_finite())).collect(),

@@ -1,4 +1,4 @@
-//! What a simulation leaves.
+//! Results of a simulation.
 
 use super::{Drift, Extremes, Scene, Scheme};
 use crate::dynamics::{Balance, Configuration, Orientation, RotationVector};
@@ -6,38 +6,38 @@ use crate::integration::Work;
 use flexbody_body::flex_body::FlexBody;
 use nalgebra::Vector3;
 
-/// The motion of a body at the instants that its scene writes. Numbers are in the units of the body.
+/// Motion of a body at the output times of its scene. Numbers are in the units of the body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     /// Name of the scene.
     pub scene: String,
-    /// Name of the body's model.
+    /// Name of the model of the body.
     pub body: String,
-    /// How it was integrated; with the step that was taken.
+    /// Integration scheme, with the actual step length.
     pub scheme: Scheme,
-    /// Instants.
+    /// Output times.
     pub time: Vec<f64>,
-    /// The state at every instant.
+    /// State at every output time.
     pub states: Vec<Configuration>,
-    /// Energies, momenta, work and impulses at every instant.
+    /// Energies, momenta, work and impulses at every output time.
     pub balances: Vec<Balance>,
-    /// The frame that the numbers refer to, and what the body is exposed to.
+    /// Frame of the numbers, and the conditions that the body is exposed to.
     pub setting: Setting,
-    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes;
-    /// none without.
+    /// Force and torque of the prescribed motion about the origin of the frame, axes of the model; `None`
+    /// without prescribed motion.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
-    /// Torque about the origin of the frame, axes of the model, that the reference conditions carry; their
-    /// force is zero. None where the frame is not a mean one: `reactions` are then all that there are.
+    /// Torque of the reference conditions about the origin of the frame, axes of the model; their force is
+    /// zero. `None` if the frame is no mean-axis frame: `reactions` then contain everything.
     pub conditions: Option<Vec<Vector3<f64>>>,
     /// Paths of the watched points.
     pub paths: Vec<Path>,
     /// Steps and evaluations of the integration.
     pub work: Work,
-    /// The largest of everything, also between the instants.
+    /// Extremes of the motion, including times between the output times.
     pub extremes: Extremes,
 }
 
-/// What a recording is about: its frame, and what the body is exposed to.
+/// Frame of a recording, and the conditions that the body is exposed to.
 ///
 /// The frame of a recording is that of the scene ([`Stage`](super::Stage)). Its axes are those of the model
 /// and turn with the body.
@@ -45,17 +45,17 @@ pub struct Recording {
 pub struct Setting {
     /// Name of the interface or node that carries the body.
     pub carrier: Option<String>,
-    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the reference
-    /// point of what carries it.
+    /// Origin of the frame in model coordinates: the centre of mass of the undeformed body, or the
+    /// reference point of the carrier.
     pub origin: Vector3<f64>,
     /// Gravity at the start, axes of the model.
     pub gravity: Option<Vector3<f64>>,
-    /// Eigenvalues of the body as it is carried; empty where nothing carries it. Unit: 1/time^2.
+    /// Eigenvalues of the carried body; empty without a carrier. Unit: 1/time^2.
     pub eigenvalues: Vec<f64>,
 }
 
 impl Setting {
-    /// The setting of a body that is on its stage.
+    /// Creates the setting of a body on its stage.
     pub(super) fn new(body: &FlexBody, scene: &Scene) -> Self {
         let start = RotationVector(scene.initial.rotation).axes();
         let carrier = scene.carried.as_ref().map(|carried| carried.by.to_string());
@@ -68,7 +68,7 @@ impl Setting {
         }
     }
 
-    /// What the origin of the frame is, in words.
+    /// Returns a description of the origin of the frame.
     pub fn origin_in_words(&self) -> String {
         match &self.carrier {
             Some(carrier) => format!("reference point of {carrier}"),
@@ -77,22 +77,23 @@ impl Setting {
     }
 }
 
-/// The least deformation that counts: errors are relative to the largest of the motion, or to this where that
-/// is less.
+/// Smallest deformation that is compared: errors are relative to the largest deformation of the motion, but
+/// at least to this one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resolution {
-    /// Deflection.
+    /// Smallest deflection. Unit: length.
     pub deflection: f64,
-    /// Root of the elastic energy: that of the mode which takes least of it for this deflection of some node.
+    /// Root of the smallest elastic energy: the energy of the mode that needs least of it to deflect some
+    /// node by `deflection`.
     pub root_energy: f64,
 }
 
 impl Resolution {
-    /// Part of the largest extent of a body that its least deflection is unless said: 10 micrometres per
+    /// Default of the smallest deflection, relative to the largest extent of the body: 10 micrometres per
     /// metre.
     const LEAST: f64 = 1e-5;
 
-    /// For `body`; `least`: the deflection, where it is given.
+    /// Creates the resolution for `body`; `least` is the smallest deflection, if given.
     pub fn new(body: &FlexBody, least: Option<f64>) -> Self {
         let deflection = least.unwrap_or(Self::LEAST * body.extent());
         let modes = &body.modes().eigenvalue;
@@ -103,31 +104,31 @@ impl Resolution {
     }
 }
 
-/// The path of a point.
+/// Path of a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     /// Name of the point in the scene.
     pub name: String,
-    /// Place at every instant, world axes.
+    /// Position at every output time, world axes.
     pub place: Vec<Vector3<f64>>,
     /// Deflection from the undeformed body, axes of the model.
     pub deflection: Vec<Vector3<f64>>,
-    /// Velocity at every instant, world axes: that of the place.
+    /// Velocity of the position at every output time, world axes.
     pub velocity: Vec<Vector3<f64>>,
-    /// Acceleration at every instant, world axes: that of the place. Where a load or motion jumps, that after
-    /// it.
+    /// Acceleration of the position at every output time, world axes; where a load or motion jumps, the
+    /// value after the jump.
     pub acceleration: Vec<Vector3<f64>>,
 }
 
 impl Recording {
-    /// The drift of energy and momenta.
+    /// Returns the drift of energy and momenta.
     pub fn drift(&self) -> Drift {
         self.extremes.drift
     }
 }
 
 impl Path {
-    /// A path without a place yet.
+    /// Creates a path without positions.
     pub(super) fn new(name: String) -> Self {
         let none = Vec::new;
         Self { name, place: none(), deflection: none(), velocity: none(), acceleration: none() }

@@ -1,4 +1,4 @@
-//! What a scene demands of a body, and what it says about motion that nobody simulates. All of it is
+//! Requirements of a scene for a body, and data about motion that is not simulated. All of them are
 //! optional.
 
 use super::{Axes, PerQuantity};
@@ -9,35 +9,36 @@ use flexbody_model::{Damping, DampingRatios, FeModel};
 use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
 
-/// What decides which terms and modes a body needs.
+/// Requirements that decide which terms and modes a body needs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Requirements {
-    /// Motion beyond that of the run.
+    /// Motion beyond that of the simulation.
     pub motion: MotionRange,
-    /// How the body is joined to others.
+    /// Attachment of the body to others.
     pub attachment: Attachment,
     /// Largest deflections, stresses and modal amplitudes.
     pub limits: Limits,
-    /// Highest frequency of interest, oscillations per time.
+    /// Highest frequency of interest, in oscillations per time.
     pub band: Option<f64>,
-    /// Damping ratios of the modes of the body in this scene; none: those of the body.
+    /// Damping ratios of the modes in this scene; `None`: those of the body.
     pub damping: Option<DampingRatios>,
-    /// True if `damping` takes the place of that of the body; else a body with damping of its own is refused.
+    /// True if `damping` replaces the damping of the body; otherwise a body with damping of its own is an
+    /// error.
     pub replaces_damping: bool,
-    /// Largest errors.
+    /// Largest allowed errors.
     pub tolerance: Tolerance,
-    /// Multiplications that an evaluation of the equations of motion may take: instead of tolerances.
+    /// Largest number of multiplications per evaluation of the equations of motion, in place of tolerances.
     pub multiplications: Option<usize>,
 }
 
 impl Requirements {
-    /// `body` with this damping, where there is one.
+    /// Returns `body` with the damping of the scene, if there is one.
     ///
-    /// * `by`: what states it.
+    /// * `by`: source of the damping, for messages.
     ///
     /// # Errors
-    /// [`SceneDamping`](Code::SceneDamping) when the body has one of its own that this does not replace; those of
-    /// [`FlexBody::new`].
+    /// [`SceneDamping`](Code::SceneDamping) if the body has damping of its own that the scene does not
+    /// replace; the errors of [`FlexBody::new`].
     pub fn damped<'b>(&self, body: &'b FlexBody, by: &str) -> Result<Cow<'b, FlexBody>> {
         let Some(ratios) = &self.damping else { return Ok(Cow::Borrowed(body)) };
         if body.damping().norm_max() > 0.0 {
@@ -46,12 +47,12 @@ impl Requirements {
         Ok(Cow::Owned(body.with_damping_ratios(ratios)?))
     }
 
-    /// Refuses damping beside that of a body or model, unless it takes the place of that.
+    /// Returns an error for damping in addition to that of a body or model, unless it replaces the latter.
     ///
-    /// * `of`: what has the other damping. `by`: what states this one.
+    /// * `of`: owner of the other damping. `by`: source of this damping.
     ///
     /// # Errors
-    /// [`SceneDamping`](Code::SceneDamping).
+    /// [`SceneDamping`](Code::SceneDamping) for two kinds of damping.
     fn refuse_second_damping(&self, of: &str, by: &str) -> Result<()> {
         match &self.damping {
             Some(ratios) if !self.replaces_damping => {
@@ -63,10 +64,10 @@ impl Requirements {
         }
     }
 
-    /// Refuses damping beside that of a model that bodies are made of, before that is done.
+    /// Returns an error for damping in addition to that of a model, before bodies are made of it.
     ///
     /// # Errors
-    /// [`SceneDamping`](Code::SceneDamping).
+    /// [`SceneDamping`](Code::SceneDamping) for two kinds of damping.
     pub fn refuse_damping_beside(&self, model: &FeModel, scene: &str) -> Result<()> {
         match model.damping() {
             None | Some(Damping::Ratio(0.0)) => Ok(()),
@@ -75,28 +76,28 @@ impl Requirements {
     }
 }
 
-/// Largest rotation of the body frame; `None`: what the run shows.
+/// Largest rotation of the body frame; `None`: the largest of the simulation.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MotionRange {
     /// Angular velocity.
     pub angular_velocity: Option<Range>,
     /// Angular acceleration.
     pub angular_acceleration: Option<Range>,
-    /// Axes of components, which turn with the body: not those of the world.
+    /// Axes of the components, which turn with the body: not those of the world.
     pub axes: Axes,
 }
 
 /// Largest magnitude of a vector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Range {
-    /// In any direction.
+    /// Magnitude in any direction.
     Any(f64),
-    /// Of the components along axes that turn with the body.
+    /// Magnitudes of the components along axes that turn with the body.
     Axes(Vector3<f64>),
 }
 
 impl Range {
-    /// Largest length of a vector within the range.
+    /// Returns the largest length of a vector within the range.
     pub fn length(&self) -> f64 {
         match self {
             Self::Any(length) => *length,
@@ -105,33 +106,33 @@ impl Range {
     }
 }
 
-/// How a body is joined to others.
+/// Attachment of a body to others.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Attachment {
-    /// Kind.
+    /// Kind of attachment.
     pub kind: AttachmentKind,
     /// Inertia that joints attach to the body; zero is the conservative default.
     pub inertia: Matrix3<f64>,
-    /// Its axes, which turn with the body: not those of the world.
+    /// Axes of the inertia, which turn with the body: not those of the world.
     pub axes: Axes,
-    /// First frequency of the assembled machine, oscillations per time.
+    /// First frequency of the assembled machine, in oscillations per time.
     pub first_frequency: Option<f64>,
 }
 
 /// Kinds of attachment, the most sensitive first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AttachmentKind {
-    /// Nothing holds the body: its rotation is its own. The conservative default.
+    /// No attachment: the rotation of the body is free. The conservative default.
     #[default]
     Free,
     /// Compliant joints.
     Soft,
-    /// Joints that prescribe its rotation.
+    /// Joints that prescribe the rotation of the body.
     Stiff,
 }
 
 impl AttachmentKind {
-    /// Name in files.
+    /// Returns the name in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Free => "free",
@@ -141,30 +142,31 @@ impl AttachmentKind {
     }
 }
 
-/// Largest deflections and stresses of a body; from them follow the largest modal amplitudes.
+/// Largest deflections and stresses of a body, which bound the modal amplitudes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Limits {
     /// Largest deflection of a node.
     pub deflection: Option<f64>,
-    /// Largest stress, and that of every mode at unit amplitude.
+    /// Largest stress, and the stress of every mode at unit amplitude.
     pub stress: Option<(f64, Vec<f64>)>,
     /// Largest amplitudes of modes (numbers from 0).
     pub modes: Vec<(usize, f64)>,
 }
 
-/// Largest errors of what a simulation is asked for.
+/// Largest allowed errors of the results of a simulation.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Tolerance {
     /// Largest error of each quantity, at any time.
     #[serde(flatten)]
     pub errors: PerQuantity<f64>,
-    /// Least deflection that counts ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent of the
-    /// body.
+    /// Smallest deflection that is compared ([`Resolution`](super::Resolution)); `None`: 1e-5 of the extent
+    /// of the body.
     pub least_deflection: Option<f64>,
 }
 
 impl Default for Tolerance {
-    /// A thousandth of a radian and one per cent: below what material data and damping are known to.
+    /// Returns the default tolerance: one thousandth of a radian and one per cent, below the uncertainty of
+    /// material data and damping.
     fn default() -> Self {
         Self { errors: PerQuantity { attitude: 1e-3, ..PerQuantity::all(0.01) }, least_deflection: None }
     }

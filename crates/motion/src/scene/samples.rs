@@ -1,40 +1,42 @@
-//! Values at many times, and what lies between them.
+//! Functions of time given by samples, with interpolation.
 
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// Parts that a cubic piece is cut into where its largest value is bounded: the bound is then above the
-/// largest value by less than 1/64 of what it would be of the whole piece.
+/// Number of parts that a cubic piece is split into to bound its largest value: the bound is then too large
+/// by less than 1/64 of the excess for the whole piece.
 const PARTS: usize = 8;
 
-/// Changes of a rate that together are below this part of the largest value are rounding, and no oscillation.
+/// Total change of a rate, relative to the largest value, below which the change is rounding and no
+/// oscillation.
 const STEADY: f64 = 1e-9;
 
-/// What lies between two rows.
+/// Interpolation between two rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Interpolation {
     /// Straight lines: a kink at every row.
     Linear,
-    /// The cubic spline with two continuous derivatives, whose third is continuous at the second and the last
-    /// but one row too (not-a-knot). Of three rows the parabola, of two the line.
+    /// Cubic spline with two continuous derivatives, whose third derivative is continuous at the second and
+    /// the last but one row too (not-a-knot). Three rows give a parabola, two rows a line.
     Cubic,
 }
 
-/// A function of time with N components, given at rows. Copies share the rows.
+/// Function of time with N components, given at rows. Copies share the rows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Samples<const N: usize>(Arc<Spline<N>>);
 
 #[derive(Debug, Clone, PartialEq)]
 struct Spline<const N: usize> {
-    /// Ascending, two at least.
+    /// Times of the rows, ascending, at least two.
     times: Vec<f64>,
-    /// Of every piece between two rows.
+    /// Polynomial between each two rows.
     pieces: Vec<SplinePiece<N>>,
-    /// Integral from the first row to every row.
+    /// Integral from the first row to each row.
     integrals: Vec<SVector<f64, N>>,
     interpolation: Interpolation,
-    /// Whether the first and the last value hold outside; else the first and the last piece go on.
+    /// True if the first and the last value hold outside of the rows; otherwise the first and the last
+    /// piece continue.
     held: bool,
 }
 
@@ -42,38 +44,38 @@ struct Spline<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct SplinePiece<const N: usize>([SVector<f64, N>; 4]);
 
-/// A function at a time.
+/// Value and derivatives of a function at a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample<const N: usize> {
-    /// Its value.
+    /// Value of the function.
     pub value: SVector<f64, N>,
-    /// The first derivative; at a kink that after it.
+    /// First derivative; at a kink the derivative after it.
     pub rate: SVector<f64, N>,
-    /// The second derivative, likewise.
+    /// Second derivative; at a kink the derivative after it.
     pub second: SVector<f64, N>,
 }
 
-/// Bounds of a function from time zero to a time, in the Euclidean norm of its components. They hold for
-/// certain, and are above what they bound by a small part of what the function does between two rows.
+/// Upper bounds of a function from time zero to an end time, in the Euclidean norm of its components. The
+/// bounds are guaranteed, and too large by only a small part of the change between two rows.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sizes {
-    /// The value at time zero.
+    /// Value at time zero.
     pub start: f64,
-    /// The largest value.
+    /// Largest value.
     pub largest: f64,
     /// Total variation.
     pub total: f64,
-    /// The largest rate.
+    /// Largest rate.
     pub rate: f64,
-    /// Total variation of the rate, jumps included.
+    /// Total variation of the rate, including jumps.
     pub rate_total: f64,
 }
 
 impl<const N: usize> Samples<N> {
-    /// The function with these values at ascending times.
+    /// Creates the function with these values at ascending times.
     ///
     /// # Panics
-    /// With fewer than two times, or another number of values.
+    /// When there are fewer than two times, or another number of values.
     pub fn new(
         times: Vec<f64>,
         values: &[SVector<f64, N>],
@@ -96,20 +98,20 @@ impl<const N: usize> Samples<N> {
         Self(Arc::new(Spline { times, pieces, integrals, interpolation, held }))
     }
 
-    /// The piece of a time, and the time since its beginning.
+    /// Returns the piece that contains a time, and the time since the beginning of the piece.
     fn piece_at(&self, time: f64) -> (usize, f64) {
         let Spline { times, pieces, .. } = &*self.0;
         let piece = times.partition_point(|&t| t <= time).saturating_sub(1).min(pieces.len() - 1);
         (piece, time - times[piece])
     }
 
-    /// First and last time.
+    /// Returns the first and the last time.
     pub fn ends(&self) -> (f64, f64) {
         let times = &self.0.times;
         (times[0], times[times.len() - 1])
     }
 
-    /// Value and derivatives at a time.
+    /// Returns value and derivatives at a time.
     pub fn at(&self, time: f64) -> Sample<N> {
         let (first, last) = self.ends();
         if self.0.held && (time < first || time >= last) {
@@ -120,7 +122,7 @@ impl<const N: usize> Samples<N> {
         self.0.pieces[piece].at(since)
     }
 
-    /// The value at a row.
+    /// Returns the value at a row.
     fn row(&self, row: usize) -> SVector<f64, N> {
         let Spline { times, pieces, .. } = &*self.0;
         match pieces.get(row) {
@@ -129,12 +131,12 @@ impl<const N: usize> Samples<N> {
         }
     }
 
-    /// Times and values of the rows.
+    /// Returns times and values of the rows.
     pub fn rows(&self) -> impl Iterator<Item = (f64, SVector<f64, N>)> + '_ {
         self.0.times.iter().enumerate().map(|(row, &time)| (time, self.row(row)))
     }
 
-    /// The integral from time zero to a time.
+    /// Returns the integral from time zero to a time.
     pub fn integral(&self, time: f64) -> SVector<f64, N> {
         self.since_first_row(time) - self.since_first_row(0.0)
     }
@@ -152,8 +154,8 @@ impl<const N: usize> Samples<N> {
         self.0.integrals[piece] + self.0.pieces[piece].integral(since)
     }
 
-    /// Times at which it is not smooth: the rows of straight lines, and the ends where it stays what it is
-    /// outside.
+    /// Returns the times at which the function is not smooth: the rows of straight lines, and the ends if
+    /// the values hold outside.
     pub fn breaks(&self) -> Vec<f64> {
         let Spline { times, interpolation, held, .. } = &*self.0;
         let last = times.len() - 1;
@@ -165,21 +167,22 @@ impl<const N: usize> Samples<N> {
         first.into_iter().chain(inner.iter().copied()).chain(last).collect()
     }
 
-    /// Whether its second derivative exists everywhere between the first and the last row.
+    /// Returns true if the second derivative exists everywhere between the first and the last row.
     pub fn is_smooth(&self) -> bool {
         self.0.interpolation == Interpolation::Cubic
     }
 
-    /// The shortest time between two rows where the function is smooth there; none of straight lines, whose
-    /// rows are breaks.
+    /// Returns the shortest time between two rows if the function is smooth there; `None` for straight
+    /// lines, whose rows are breaks.
     pub fn smooth_spacing(&self) -> Option<f64> {
         let spacings = self.0.times.windows(2).map(|ends| ends[1] - ends[0]);
         self.is_smooth().then(|| spacings.fold(f64::INFINITY, f64::min))
     }
 
-    /// Oscillations per time of its fastest part, about: the largest second derivative over the largest
-    /// deviation of the rate from its mean from time zero to `end`, over 2 pi. A sine has its frequency, a
-    /// pulse some 1.6 over its width. Zero of straight lines, whose kinks say where they change.
+    /// Estimates the frequency of the fastest part, in oscillations per time: the largest second derivative
+    /// over the largest deviation of the rate from its mean from time zero to `end`, over 2 pi. A sine
+    /// gives its frequency, a pulse about 1.6 over its width. Returns zero for straight lines, whose kinks
+    /// are breaks.
     pub fn frequency_until(&self, end: f64) -> f64 {
         let may_oscillate = self.is_smooth() && end > 0.0 && end.is_finite();
         if !may_oscillate {
@@ -198,7 +201,8 @@ impl<const N: usize> Samples<N> {
         if rate * end <= STEADY * value { 0.0 } else { second / rate / TAU }
     }
 
-    /// The pieces from time zero to `end`: from when to when, since their beginning.
+    /// Returns the pieces from time zero to `end`, each with its first and last time since the beginning of
+    /// the piece.
     fn pieces_until<'p>(&'p self, end: f64) -> impl Iterator<Item = (&'p SplinePiece<N>, f64, f64)> + 'p {
         let Spline { times, pieces, held, .. } = &*self.0;
         let last = pieces.len() - 1;
@@ -212,7 +216,7 @@ impl<const N: usize> Samples<N> {
         pieces.iter().enumerate().filter_map(span)
     }
 
-    /// Bounds from time zero to `end`.
+    /// Returns upper bounds from time zero to `end`.
     pub fn sizes_until(&self, end: f64) -> Sizes {
         let end = if end.is_finite() { end } else { self.ends().1.max(0.0) };
         let start = self.at(0.0);
@@ -227,24 +231,24 @@ impl<const N: usize> Samples<N> {
                 piece.bound(at(part), at(part + 1), &mut sizes);
             }
         }
-        // What holds outside has no rate.
+        // A value that holds outside has no rate.
         let after = self.at(end);
         sizes.largest = sizes.largest.max(after.value.norm());
         sizes.rate_total += (after.rate - before).norm();
         sizes
     }
 
-    /// Whether it is zero from time zero to `end`.
+    /// Returns true if the function is zero from time zero to `end`.
     pub fn is_zero_until(&self, end: f64) -> bool {
         self.sizes_until(end).largest == 0.0
     }
 
-    /// The function times a factor.
+    /// Returns the function multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         self.turned(&(SMatrix::identity() * factor))
     }
 
-    /// Linear combinations of the components.
+    /// Returns linear combinations of the components.
     pub fn turned<const M: usize>(&self, matrix: &SMatrix<f64, M, N>) -> Samples<M> {
         let Spline { times, pieces, integrals, interpolation, held } = &*self.0;
         Samples(Arc::new(Spline {
@@ -256,7 +260,7 @@ impl<const N: usize> Samples<N> {
         }))
     }
 
-    /// One component.
+    /// Returns one component.
     pub fn component(&self, component: usize) -> Samples<1> {
         let mut row = SMatrix::<f64, 1, N>::zeros();
         row[component] = 1.0;
@@ -270,7 +274,7 @@ impl<const N: usize> SplinePiece<N> {
         Self([values[0], slope, SVector::zeros(), SVector::zeros()])
     }
 
-    /// With these values and slopes at its ends.
+    /// Creates a piece with these values and slopes at its ends.
     fn cubic(times: &[f64], values: &[SVector<f64, N>], slopes: &[SVector<f64, N>]) -> Self {
         let length = times[1] - times[0];
         let mean = (values[1] - values[0]) / length;
@@ -293,9 +297,9 @@ impl<const N: usize> SplinePiece<N> {
         (a + (b / 2.0 + (c / 3.0 + d * (t / 4.0)) * t) * t) * t
     }
 
-    /// Raises `sizes` to what the piece does between two times. A polynomial lies within the convex hull of
+    /// Raises `sizes` to bounds of the piece between two times. A polynomial lies within the convex hull of
     /// its control points, and the integral of |f| over a length h is at most the root of h times that of
-    /// |f|^2, which Gauss and Simpson give exactly.
+    /// |f|^2, which Gauss and Simpson quadrature give exactly.
     fn bound(&self, from: f64, to: f64, sizes: &mut Sizes) {
         let (a, b, h) = (self.at(from), self.at(to), to - from);
         let inner = [a.value + a.rate * (h / 3.0), b.value - b.rate * (h / 3.0)];
@@ -315,9 +319,9 @@ impl<const N: usize> SplinePiece<N> {
     }
 }
 
-/// Slopes at the rows of the cubic spline with two continuous derivatives and the conditions not-a-knot at
-/// its ends (de Boor, A Practical Guide to Splines, chapter IV): tridiagonal equations whose elimination
-/// needs no pivoting.
+/// Returns the slopes at the rows of the cubic spline with two continuous derivatives and not-a-knot
+/// conditions at its ends (de Boor, A Practical Guide to Splines, chapter IV). The equations are
+/// tridiagonal, and their elimination needs no pivoting.
 fn slopes<const N: usize>(times: &[f64], values: &[SVector<f64, N>]) -> Vec<SVector<f64, N>> {
     let last = times.len() - 1;
     let h: Vec<f64> = times.windows(2).map(|ends| ends[1] - ends[0]).collect();
@@ -331,7 +335,7 @@ fn slopes<const N: usize>(times: &[f64], values: &[SVector<f64, N>]) -> Vec<SVec
         }
         _ => (),
     }
-    // Of every row the pivot, the entry right of it and the right side, after elimination.
+    // Pivot, entry right of it, and right side of each row after elimination.
     let ends = h[0] + h[1];
     let mut pivots = vec![h[1]];
     let mut right = vec![ends];
@@ -360,7 +364,7 @@ mod tests {
     use super::*;
     use nalgebra::{Vector1, Vector3};
 
-    /// Ascending times from 0 to 1 that are not even.
+    /// Returns ascending times from 0 to 1 with uneven spacing.
     fn uneven(count: usize) -> Vec<f64> {
         let at = |i: usize| i as f64 / (count - 1) as f64;
         (0..count).map(|i| at(i) + 0.08 * (TAU * at(i)).sin()).collect()
@@ -427,8 +431,8 @@ mod tests {
         }
     }
 
-    /// Two derivatives do not jump at rows, values outside are held or not, and integrals are those of the
-    /// values.
+    /// Two derivatives are continuous at rows, values outside are held or continued, and integrals are
+    /// those of the values.
     #[test]
     fn a_spline_is_smooth_and_stays_where_it_is_told() {
         let times = uneven(12);
@@ -456,8 +460,7 @@ mod tests {
         assert_eq!(lines.at(times[3]).value, values[3]);
     }
 
-    /// Sampled densely, no function does more than its bounds say, and the bounds are close where the rows
-    /// are.
+    /// Dense samples of a function never exceed its bounds, and the bounds are close if the rows are.
     #[test]
     fn bounds_hold_and_are_close() {
         for (count, close, interpolation) in [

@@ -1,4 +1,4 @@
-//! Rotation whose result still changes with the steps of the integration.
+//! Check of a rotation rate for changes with finer integration steps.
 
 use super::{Recording, Scene, Scheme, Stage, simulate};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -7,40 +7,43 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use nalgebra::{Matrix3, Vector3};
 
-/// Largest error that the momentum may make of a rate, relative to the largest rate, before the run is repeated with finer
-/// steps. The bound is 1e4 times the error of a needle of 1:1e5, so that few bodies are simulated twice for nothing:
-/// with the default tolerance those beyond 1:1000.
+/// Largest relative error of a rate due to the error of the momentum, above which the run is repeated with
+/// finer steps. The limit is 1e4 times the error of a needle of 1:1e5, so that few bodies are simulated
+/// twice without need: with the default tolerance those beyond 1:1000.
 const SUSPECT: f64 = 1e-3;
 
-/// Error of the momentum per step of the conserving method, relative to the momentum: it conserves the whole, not its part
-/// about one axis of the body.
+/// Error of the momentum per step of the conserving method, relative to the momentum: the method conserves
+/// the whole momentum, but not its component about an axis of the body.
 const CONSERVING_ERROR: f64 = 1e-9;
 
-/// Change of a rate by finer steps that is told, relative to the largest of this rate.
+/// Change of a rate by finer steps, relative to the largest value of this rate, above which a warning
+/// reports it.
 const UNSETTLED: f64 = 1e-2;
 
-/// Part of the largest rate about any axis below which a change is not told: a body that turns across its axis has a rate
-/// about it that is rounding.
+/// Rate, relative to the largest rate about any axis, below which changes are not reported: a body that
+/// turns about a perpendicular axis has a rate about this axis that is rounding.
 const SMALL_RATE: f64 = 1e-3;
 
-/// Part of the tolerance, and of the step, that the finer run has.
+/// Tolerance of the finer run, relative to that of the scene.
 const FINER_TOLERANCE: f64 = 1e-2;
+/// Step length of the finer run, relative to that of the scene.
 const FINER_STEP: f64 = 0.5;
 
-/// Finest tolerance that the adaptive method is asked for.
+/// Finest tolerance requested from the adaptive method.
 const FINEST_TOLERANCE: f64 = 1e-13;
 
-/// A warning where the rate about the axis of least inertia changes by more than 1 % with finer steps.
+/// Returns a warning if the rate about the axis of least inertia changes by more than 1 % with finer steps.
 ///
-/// A rate is a momentum over an inertia. The momentum about each axis has the error of the whole, and about the axis of a
-/// needle this is divided by an inertia that is ten decades smaller. Only where the error of a step could matter so much
-/// the run is repeated with finer steps, and the rates of both are compared at the instants of `recording`.
+/// A rate is a momentum over an inertia. The momentum about each axis has the error of the whole momentum,
+/// and for the axis of a needle this error is divided by an inertia that may be ten decades smaller. The
+/// run is repeated with finer steps only if the error of a step could be significant. The rates of both
+/// runs are compared at the output times of `recording`.
 ///
 /// * `recording`: the motion of `body` in `scene`.
-/// * `context`: its memory bounds another recording.
+/// * `context`: its memory limits the second recording.
 ///
 /// # Errors
-/// Those of [`Stage::new`]. A finer run that takes too long is none: then nothing is told.
+/// The errors of [`Stage::new`]. If the finer run would take too long, the result is `None`.
 pub fn unsettled_rate(
     body: &FlexBody,
     scene: &Scene,
@@ -57,7 +60,8 @@ pub fn unsettled_rate(
     Ok(change(&inertia, recording, &finer))
 }
 
-/// The scene with finer steps, if an error of a step could be told from the rate about the axis of least inertia.
+/// Returns the scene with finer steps, if the error of a step could be significant for the rate about the
+/// axis of least inertia.
 fn finer(inertia: &Matrix3<f64>, scene: &Scene, scheme: Scheme) -> Option<Scene> {
     let principal = inertia.symmetric_eigenvalues();
     let (least, most) = (principal.min(), principal.max());
@@ -78,7 +82,7 @@ fn finer(inertia: &Matrix3<f64>, scene: &Scene, scheme: Scheme) -> Option<Scene>
     })
 }
 
-/// What finer steps change of the rate about the axis of least inertia, if it counts.
+/// Returns a warning if finer steps change the rate about the axis of least inertia significantly.
 fn change(inertia: &Matrix3<f64>, recording: &Recording, finer: &Recording) -> Option<Diagnostic> {
     let eigen = inertia.symmetric_eigen();
     let axis: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();

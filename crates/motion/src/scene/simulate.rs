@@ -14,26 +14,27 @@ use flexbody_linalg::context::Context;
 use flexbody_model::LoadKind;
 use nalgebra::Vector3;
 
-/// Deflections up to this part of the extent of the body are those of linear elasticity.
+/// Deflection, relative to the extent of the body, up to which linear elasticity holds.
 const LINEAR_RANGE: f64 = 0.1;
 
-/// Bytes that a recorded number takes: itself, and as text of a table.
+/// Bytes per recorded number: the number, and its text in a table.
 const BYTES: f64 = 8.0 + 25.0;
 
-/// Numbers of an instant besides modes and watched points.
+/// Number of values per output time besides modes and watched points.
 const NUMBERS: usize = 47;
 
-/// Numbers of an instant of a watched point: place, deflection, velocity and acceleration.
+/// Number of values per output time and watched point: position, deflection, velocity and acceleration.
 const WATCHED: usize = 12;
 
-/// The motion of `body` in `scene` at the instants that it writes, with warnings and notes about it.
+/// Simulates `body` in `scene` and returns the motion at the output times, with warnings and notes about
+/// it.
 ///
-/// * `context`: its memory bounds the recording and the tables of it; its listener hears the fraction of the duration that
-///   is done.
+/// * `context`: its memory limits the recording and its tables; its listener gets the finished fraction of
+///   the duration.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body; FB550, before any work, when the run takes more steps than it
-/// may, and FB601, when the recording does not fit the memory; FB540 when the integration cannot go on.
+/// FB212 if the scene does not fit the body; FB550, before any work, if the run needs more steps than
+/// allowed, and FB601 if the recording does not fit the memory; FB540 if the integration cannot go on.
 pub fn simulate(
     body: &FlexBody,
     scene: &Scene,
@@ -63,12 +64,12 @@ pub fn simulate(
     Ok((recording, found))
 }
 
-/// A recording that is filled instant by instant.
+/// Recording under construction.
 struct Recorder<'r> {
     recording: Recording,
     watched: &'r [BodyPoint],
     conditions: Option<MeanAxes>,
-    /// Places of the watched points in the undeformed body.
+    /// Positions of the watched points in the undeformed body.
     rest: Vec<Vector3<f64>>,
 }
 
@@ -128,7 +129,7 @@ impl<'r> Recorder<'r> {
 }
 
 /// # Errors
-/// FB601 when the recording does not fit the memory.
+/// FB601 if the recording does not fit the memory.
 fn refuse_too_much(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<()> {
     let numbers = NUMBERS + 2 * body.n_modes() + WATCHED * scene.watched.len();
     let instants = scene.run.outputs + 1;
@@ -136,7 +137,7 @@ fn refuse_too_much(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Res
     refuse_beyond(context.memory, needed, &format!("recording {instants} instants"), "record fewer `outputs`")
 }
 
-/// Warnings about a motion with these extremes: where it leaves the range in which the model holds.
+/// Returns warnings about a motion with these extremes that leaves the range of validity of the model.
 pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Vec<Diagnostic> {
     let (mut found, unit) = (Vec::new(), body.units().time.name());
     let deflection = extremes.deflection;
@@ -156,7 +157,7 @@ pub(super) fn remarks(body: &FlexBody, scene: &Scene, extremes: &Extremes) -> Ve
     found
 }
 
-/// A warning where spin takes more than a hundredth of the stiffness of some motion.
+/// Returns a warning if spin takes more than one hundredth of the stiffness of some motion.
 fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
     if extremes.spins.is_empty() {
         return None;
@@ -179,7 +180,7 @@ fn softening(body: &FlexBody, extremes: &Extremes) -> Option<Diagnostic> {
     })
 }
 
-/// Four digits are enough to find a place.
+/// Returns the value rounded to four digits, for messages.
 fn rounded(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }

@@ -1,9 +1,8 @@
-//! A scene and its body in one frame: axes of the model, origin at the centre of mass or at what carries the
-//! body.
+//! A scene and its body in one frame: axes of the model, origin at the centre of mass or at the carrier.
 //!
-//! A flex-body file has its frame where the conversion put it, along the axes of the model or others. What a scene
-//! means does not depend on that: everything is computed in this frame, and vectors of the results are along
-//! its axes, which are those of the model.
+//! The conversion chooses the frame of a flex-body file, along the axes of the model or others. The meaning
+//! of a scene does not depend on this choice: everything is computed in the frame defined here, and vectors
+//! of the results are along its axes, which are those of the model.
 
 use super::{Axes, Load, Point, Range, Scene, VectorHistory};
 use crate::dynamics::{Orientation, RotationVector};
@@ -13,33 +12,34 @@ use flexbody_body::flex_body::{Carrier, FlexBody};
 use nalgebra::{Matrix3, Vector3};
 use std::borrow::Cow;
 
-/// Centres of mass within this part of the extent of the body from the origin are at the origin.
+/// Distance of the centre of mass from the origin, relative to the extent of the body, below which both
+/// coincide.
 const AT_ORIGIN: f64 = 1e-10;
 
-/// How far a prescribed rotation may be above what the scene allows, by rounding.
+/// Relative excess of a prescribed rotation over the limits of the scene that counts as rounding.
 const ROUNDING: f64 = 1e-6;
 
-/// Coupling of acceleration and modes below this part of its bound is rounding.
+/// Coupling of acceleration and modes, relative to its bound, that counts as rounding.
 pub(super) const UNCOUPLED: f64 = 1e-8;
 
-/// A body in the frame of a scene, that scene, and warnings and notes about the two.
+/// Body in the frame of a scene, the scene, and diagnostics about both.
 #[derive(Debug, Clone)]
 pub struct Stage<'a> {
-    /// The body, in the frame of the scene.
+    /// Body in the frame of the scene.
     pub body: Cow<'a, FlexBody>,
-    /// The scene, with all vectors along the axes of this frame or of the world.
+    /// Scene with all vectors along the axes of this frame or of the world.
     pub scene: Cow<'a, Scene>,
-    /// Warnings.
+    /// Warnings and notes.
     pub found: Vec<Diagnostic>,
 }
 
 impl<'a> Stage<'a> {
-    /// Brings `body` and `scene` together; a scene that was resolved already, and the body that it was
-    /// resolved for, stay.
+    /// Transforms `body` and `scene` to one frame. A scene that is resolved already, and the body that it
+    /// was resolved for, do not change.
     ///
     /// # Errors
-    /// FB212 and FB214 where the body has not what the scene carries it by; FB213 for a prescribed motion
-    /// beyond what the scene allows.
+    /// FB212 and FB214 if the body lacks the carrier of the scene; FB213 for a prescribed motion beyond the
+    /// limits of the scene.
     pub fn new(body: &'a FlexBody, scene: &'a Scene) -> Result<Self> {
         if scene.resolved {
             return Ok(Self { body: Cow::Borrowed(body), scene: Cow::Borrowed(scene), found: Vec::new() });
@@ -70,7 +70,8 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Refuses a start of modes by their numbers for a body that is simulated in mean axes, where it has other modes.
+/// Returns an error for initial values of modes by number if the body is simulated in mean axes, where it
+/// has other modes.
 fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
     if body.conditions().is_mean() || scene.initial.modes.is_empty() {
         return Ok(());
@@ -83,7 +84,7 @@ fn refuse_numbered_modes(body: &FlexBody, scene: &Scene) -> Result<()> {
     Err(Diagnostic::new(Code::SceneContradicts, message).with_help(help).into())
 }
 
-/// The carrier of a body that hangs from `point`.
+/// Returns the carrier at `point`.
 fn carrier(point: &Point) -> Carrier {
     match point {
         Point::Node(number) => Carrier::Node(*number),
@@ -91,7 +92,7 @@ fn carrier(point: &Point) -> Carrier {
     }
 }
 
-/// The body in mean axes along the axes of the model, with its origin at the centre of mass.
+/// Returns the body in mean axes along the axes of the model, with its origin at the centre of mass.
 fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
     let mean = body.in_mean_axes()?;
     let invariants = mean.invariants();
@@ -103,8 +104,8 @@ fn centred(body: &FlexBody) -> Result<Cow<'_, FlexBody>> {
     Ok(Cow::Owned(mean.in_model_axes(shift)?))
 }
 
-/// The scene with its vectors along the axes of the model; `axes` are those of the body in the model,
-/// `origin` is that of its frame.
+/// Returns the scene with its vectors along the axes of the model; `axes` are those of the body in the
+/// model, `origin` is that of its frame.
 fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene {
     let mut scene = scene.clone();
     start_with_the_motion(&mut scene, axes);
@@ -122,7 +123,7 @@ fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene 
     in_model(&mut initial.angular_velocity, &mut initial.axes);
     let turn = |velocity: &mut VectorHistory, given: &mut Axes| match given {
         Axes::Model => (),
-        // The axes of columns stay where they are in space, however the body turns.
+        // World axes of a history given in columns stay fixed in space.
         Axes::World if velocity.direction().is_none() => (),
         Axes::Body => (*velocity, *given) = (velocity.turned(axes), Axes::Model),
         Axes::World => (*velocity, *given) = (velocity.turned(&attitude.transpose()), Axes::Model),
@@ -156,7 +157,7 @@ fn resolved(scene: &Scene, axes: &Matrix3<f64>, origin: &Vector3<f64>) -> Scene 
     scene
 }
 
-/// The attitude at time zero is that of the prescribed motion, where that has one; `axes` are those of the
+/// Sets the attitude at time zero to that of the prescribed motion, if it has one; `axes` are those of the
 /// body in the model.
 fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
     let carried = scene.carried.as_mut().and_then(|carried| carried.spin.as_mut());
@@ -169,8 +170,8 @@ fn start_with_the_motion(scene: &mut Scene, axes: &Matrix3<f64>) {
     };
 }
 
-/// Refuses a start or a prescribed rotation beyond what [motion] allows; `axes` are those of the body in the
-/// model.
+/// Returns errors for an initial or prescribed rotation beyond the limits of [motion]; `axes` are those of
+/// the body in the model.
 fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     let motion = &scene.requirements.motion;
     let mut found = Vec::new();
@@ -191,8 +192,8 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
                 |range: &Option<Range>, length: f64, components: fn(&VectorHistory, f64) -> Vector3<f64>| {
                     let any_direction = matches!(range, Some(Range::Any(_)));
                     match (history.direction(), kind) {
-                        // Which components a rotation about axes of the world has in the body is known when
-                        // it has run.
+                        // The components in body axes of a rotation about world axes are known only after
+                        // the simulation: compare its length.
                         (None, Axes::World) => {
                             range.is_some_and(|range| length > range.length() * (1.0 + ROUNDING))
                         }
@@ -226,7 +227,7 @@ fn refuse_beyond_range(scene: &Scene, axes: &Matrix3<f64>) -> Result<()> {
     if found.is_empty() { Ok(()) } else { Err(Error::new(found)) }
 }
 
-/// Columns that are `given` along axes that turn with the body, along those of the ranges in [motion].
+/// Transforms a history `given` along axes that turn with the body to the axes of the ranges in [motion].
 fn in_range_axes(scene: &Scene, axes: &Matrix3<f64>, history: &VectorHistory, given: Axes) -> VectorHistory {
     match (given, scene.requirements.motion.axes) {
         (Axes::Body, Axes::Model | Axes::World) => history.turned(axes),
@@ -235,7 +236,7 @@ fn in_range_axes(scene: &Scene, axes: &Matrix3<f64>, history: &VectorHistory, gi
     }
 }
 
-/// A vector that is `given` along some axes, along those of the ranges in [motion].
+/// Transforms a vector `given` along some axes to the axes of the ranges in [motion].
 fn along_range(scene: &Scene, axes: &Matrix3<f64>, vector: &Vector3<f64>, given: Axes) -> Vector3<f64> {
     let in_model = match given {
         Axes::Body => axes * vector,
@@ -245,7 +246,7 @@ fn along_range(scene: &Scene, axes: &Matrix3<f64>, vector: &Vector3<f64>, given:
     if scene.requirements.motion.axes == Axes::Body { axes.tr_mul(&in_model) } else { in_model }
 }
 
-/// Whether a vector leaves a range by more than rounding.
+/// Returns true if a vector exceeds a range by more than rounding.
 fn is_beyond(range: &Option<Range>, vector: Vector3<f64>) -> bool {
     match range {
         None => false,
@@ -257,7 +258,7 @@ fn is_beyond(range: &Option<Range>, vector: Vector3<f64>) -> bool {
     }
 }
 
-/// Warnings about loads that do nothing.
+/// Returns warnings about loads without effect.
 fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     let mut tell = |message: String, help: Option<&str>| {
@@ -290,7 +291,7 @@ fn idle(body: &FlexBody, scene: &Scene) -> Vec<Diagnostic> {
     found
 }
 
-/// Whether accelerations of the frame excite no mode.
+/// Returns true if accelerations of the frame excite no mode.
 pub(super) fn is_uncoupled(body: &FlexBody) -> bool {
     let (invariants, modal) = (body.invariants(), body.invariants().modal_mass());
     (0..body.n_modes()).all(|j| {

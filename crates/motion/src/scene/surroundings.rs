@@ -16,11 +16,11 @@ pub(super) struct SceneForces<'a> {
 }
 
 impl<'a> SceneForces<'a> {
-    /// Resolves the names of `scene`; and the points that it watches.
+    /// Resolves the names in `scene`; also returns the watched points.
     ///
     /// # Errors
-    /// FB212 for nodes, interfaces and modes that the body has not, for torques where it has no orientation,
-    /// and for vectors that leave the plane of a plane body. All of them.
+    /// FB212 for nodes, interfaces and modes that the body does not have, for torques at points without an
+    /// orientation, and for vectors that leave the plane of a plane body; one diagnostic per finding.
     pub(super) fn new(body: &FlexBody, scene: &'a Scene) -> Result<(Self, Vec<BodyPoint>)> {
         let mut found = Vec::new();
         let mut wrong = |message: String| found.push(Diagnostic::new(Code::SceneBody, message));
@@ -55,17 +55,17 @@ impl<'a> SceneForces<'a> {
     }
 }
 
-/// Where the loads of a scene act on `body`, and the points that it watches.
+/// Returns the points of application of the loads of a scene on `body`, and the watched points.
 ///
 /// # Errors
-/// FB212 where the scene does not fit the body.
+/// FB212 if the scene does not fit the body.
 pub fn points_of(body: &FlexBody, scene: &Scene) -> Result<(Vec<BodyPoint>, Vec<BodyPoint>)> {
     let (forces, watched) = SceneForces::new(body, scene)?;
     Ok((forces.loads.into_iter().map(|(point, _)| point).collect(), watched))
 }
 
-/// A node or the reference point of an interface of `body`, with geometric stiffness where `terms` have it;
-/// or why there is no such point.
+/// Returns a node or the reference point of an interface of `body`, with geometric stiffness if `terms`
+/// contain it; or the reason why there is no such point.
 pub fn body_point(body: &FlexBody, terms: Terms, place: &Point) -> std::result::Result<BodyPoint, String> {
     match place {
         Point::Node(number) => {
@@ -85,7 +85,7 @@ pub fn body_point(body: &FlexBody, terms: Terms, place: &Point) -> std::result::
     }
 }
 
-/// Vectors of a scene that a plane body cannot follow.
+/// Returns the vectors of a scene that leave the plane of a plane body.
 fn leaving_the_plane(scene: &Scene) -> Vec<String> {
     let in_plane = |v: &Vector3<f64>| v.z == 0.0;
     let about_normal = |v: &Vector3<f64>| v.x == 0.0 && v.y == 0.0;
@@ -93,7 +93,7 @@ fn leaving_the_plane(scene: &Scene) -> Vec<String> {
     let turns_about_normal = |v: &VectorHistory| !v.has_component(0) && !v.has_component(1);
     let initial = &scene.initial;
     let mut checks = vec![
-        // The start of a frame that is turned out of the plane tells nothing of where the model was put.
+        // If the initial rotation leaves the plane, the position says nothing: report the rotation only.
         (in_plane(&initial.origin) || !about_normal(&initial.rotation), "`origin`".to_owned()),
         (in_plane(&initial.velocity), "`velocity`".to_owned()),
         (about_normal(&initial.rotation), "`rotation`".to_owned()),
@@ -122,17 +122,17 @@ fn leaving_the_plane(scene: &Scene) -> Vec<String> {
 }
 
 impl SceneForces<'_> {
-    /// Gravity along the axes of the body.
+    /// Returns gravity along the axes of the body.
     pub(super) fn gravity(&self, place: &Place) -> Vector3<f64> {
         self.gravity.map_or_else(Vector3::zeros, |gravity| place.axes.tr_mul(&gravity))
     }
 
-    /// Magnitude of the acceleration of gravity.
+    /// Returns the magnitude of the acceleration of gravity.
     pub(super) fn gravity_size(&self) -> f64 {
         self.gravity.map_or(0.0, |gravity| gravity.norm())
     }
 
-    /// Force and torque of every load along the axes of the body, with the point where it acts.
+    /// Returns force and torque of every load along the axes of the body, with its point of application.
     pub(super) fn acting(
         &self,
         time: f64,
@@ -143,7 +143,7 @@ impl SceneForces<'_> {
             let (force, torque) = load.at_time(time);
             match load.axes {
                 Axes::World => (point, axes.tr_mul(&force), axes.tr_mul(&torque)),
-                // The frame of the body is that of the scene.
+                // The frame of the body is the frame of the scene.
                 Axes::Model | Axes::Body => (point, force, torque),
             }
         })

@@ -1,4 +1,4 @@
-//! A continuous motion, as errors are measured along it.
+//! Continuous motion along which errors are measured.
 
 use super::extremes::Survey;
 use super::prepared::{Finished, PARTS, Prepared, Reaction, Stop, damped};
@@ -13,14 +13,15 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::context::Context;
 use nalgebra::Vector3;
 
-/// The continuous motion of a body: at the ends of the steps of its integration, at both sides of every
-/// break, and at places within the steps that are so close that a parabola through three of them finds every
-/// extreme. Which instants a scene writes has no part in it. Numbers are in the units of the body.
+/// Continuous motion of a body: sampled at the ends of the integration steps, at both sides of every break,
+/// and at points within the steps that are close enough for a parabola through three of them to find every
+/// extreme. The samples do not depend on the output times of the scene. Numbers are in the units of the
+/// body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trace {
-    /// How it was integrated; with the step that was taken.
+    /// Integration scheme, with the actual step length.
     pub scheme: Scheme,
-    /// Where the motion was looked at, ascending.
+    /// Sample times, ascending.
     pub time: Vec<f64>,
     /// Attitude of the frame.
     pub attitude: Vec<EulerParameters>,
@@ -28,45 +29,47 @@ pub struct Trace {
     pub q: Vec<Vec<f64>>,
     /// Elastic energy.
     pub elastic: Vec<f64>,
-    /// Force and torque about the origin of the frame, axes of the model, that the prescribed motion takes;
-    /// none without.
+    /// Force and torque of the prescribed motion about the origin of the frame, axes of the model; `None`
+    /// without prescribed motion.
     pub reactions: Option<Vec<(Vector3<f64>, Vector3<f64>)>>,
     /// Deflections of every watched point from the undeformed body, axes of the model.
     pub deflections: Vec<Vec<Vector3<f64>>>,
-    /// The state at the start.
+    /// State at the start.
     pub start: Configuration,
-    /// The largest of everything.
+    /// Extremes of the motion.
     pub extremes: Extremes,
     /// Steps and evaluations of the integration.
     pub work: Work,
     /// Mass of the body, and its radius of gyration about the centre of mass, sqrt(tr(I) / 2m).
     pub size: (f64, f64),
-    /// What is small enough not to count.
+    /// Smallest deformation that is compared.
     pub resolution: Resolution,
 }
 
 impl Trace {
-    /// Bytes of such a motion of a body with `modes` modes.
+    /// Returns the number of bytes of this motion for a body with `modes` modes.
     pub fn bytes(&self, modes: usize) -> f64 {
         self.time.len() as f64 * Self::bytes_of_instant(modes, self.deflections.len())
     }
 
-    /// Bytes that an instant takes of a body with `modes` modes in a scene with `watched` points.
+    /// Returns the number of bytes per sample for a body with `modes` modes in a scene with `watched`
+    /// points.
     fn bytes_of_instant(modes: usize, watched: usize) -> f64 {
         const NUMBER: f64 = 8.0;
-        /// Time, attitude, energy, reaction, and the head of the vector of modal coordinates.
+        /// Number of values besides q and deflections: time, attitude, energy, reaction, and the header of
+        /// the vector of modal coordinates.
         const PLAIN: usize = 1 + 4 + 1 + 6 + 3;
-        // Vectors that grow are up to twice as long as what is in them.
+        // Growing vectors reserve up to twice their length.
         2.0 * NUMBER * (PLAIN + modes + 3 * watched) as f64
     }
 }
 
-/// The continuous motion of `body` in `scene`, with warnings and notes about it.
+/// Computes the continuous motion of `body` in `scene`, with warnings and notes about it.
 ///
-/// * `context`: as for [`simulate`](super::simulate).
+/// * `context`: limits and observers, with the meaning of [`simulate`](super::simulate).
 ///
 /// # Errors
-/// As [`simulate`](super::simulate).
+/// The errors of [`simulate`](super::simulate).
 pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(Trace, Vec<Diagnostic>)> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
@@ -94,14 +97,14 @@ pub fn trace(body: &FlexBody, scene: &Scene, context: &Context<'_>) -> Result<(T
     Ok((tracer.finish(finished, extremes), found))
 }
 
-/// The motion of `body` in `scene` where another motion was looked at, to be compared with it. Of the
-/// extremes there are none.
+/// Computes the motion of `body` in `scene` at the sample times of another motion, for comparison with it.
+/// Extremes are not computed.
 ///
-/// * `times`: ascending, from 0 to the end of the scene.
-/// * `context`: its memory bounds the motion.
+/// * `times`: sample times, ascending, from 0 to the end of the scene.
+/// * `context`: its memory limits the motion.
 ///
 /// # Errors
-/// As [`simulate`](super::simulate).
+/// The errors of [`simulate`](super::simulate).
 pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context<'_>) -> Result<Trace> {
     let stage = Stage::new(body, scene)?;
     let body = &*damped(&stage.body, &stage.scene)?;
@@ -126,7 +129,7 @@ pub fn trace_at(body: &FlexBody, scene: &Scene, times: &[f64], context: &Context
     Ok(tracer.finish(finished, Extremes::default()))
 }
 
-/// Collects a [`Trace`].
+/// Observer that collects a [`Trace`].
 struct Tracer<'r> {
     run: &'r Prepared<'r>,
     trace: Trace,
@@ -152,7 +155,7 @@ impl<'r> Tracer<'r> {
         Self { run, trace }
     }
 
-    /// Keeps the motion at a place.
+    /// Stores a sample of the motion.
     fn see(&mut self, time: f64, state: &[f64], motion: &Motion<'_>, reaction: Option<Reaction>) {
         let (attitude, q) = motion.shape(state);
         let trace = &mut self.trace;

@@ -1,4 +1,4 @@
-//! Vectors that change with time.
+//! Vector functions of time.
 
 use super::samples::Samples;
 use super::{History, Sizes};
@@ -7,11 +7,11 @@ use nalgebra::{Matrix3, Vector3};
 /// A vector as a function of time.
 #[derive(Debug, Clone, PartialEq)]
 pub enum VectorHistory {
-    /// A direction that does not change, times a value that does.
+    /// Constant direction times a history of its value.
     Along {
-        /// The direction, of any length.
+        /// Direction, of any length.
         direction: Vector3<f64>,
-        /// The value over time.
+        /// Value over time.
         factor: History,
     },
     /// Three components, each with a history of its own.
@@ -22,17 +22,17 @@ pub enum VectorHistory {
 type Derivatives = [Vector3<f64>; 3];
 
 impl VectorHistory {
-    /// Nothing at any time.
+    /// Returns the zero vector at all times.
     pub fn nothing() -> Self {
         Self::constant(Vector3::zeros())
     }
 
-    /// The same at all times.
+    /// Returns a constant vector.
     pub fn constant(direction: Vector3<f64>) -> Self {
         Self::Along { direction, factor: History::Constant(1.0) }
     }
 
-    /// Whether it is zero at all times.
+    /// Returns true if the vector is zero at all times.
     pub fn is_nothing(&self) -> bool {
         match self {
             Self::Along { direction, .. } => *direction == Vector3::zeros(),
@@ -40,7 +40,7 @@ impl VectorHistory {
         }
     }
 
-    /// The vector and its rate at a time. The rate at a kink is that after it.
+    /// Returns the vector and its rate at a time. At a kink the rate is that after it.
     pub fn at(&self, time: f64) -> (Vector3<f64>, Vector3<f64>) {
         match self {
             Self::Along { direction, .. } if *direction == Vector3::zeros() => (*direction, *direction),
@@ -55,7 +55,7 @@ impl VectorHistory {
         }
     }
 
-    /// The vector, its rate and its second derivative at a time, of one that is smooth.
+    /// Returns the vector, its rate and its second derivative at a time, for a smooth history.
     pub fn derivatives(&self, time: f64) -> Derivatives {
         match self {
             Self::Along { direction, factor } => {
@@ -69,7 +69,7 @@ impl VectorHistory {
         }
     }
 
-    /// The integral from time zero to a time.
+    /// Returns the integral from time zero to a time.
     pub fn integral(&self, time: f64) -> Vector3<f64> {
         match self {
             Self::Along { direction, factor } => direction * factor.integral(time),
@@ -77,7 +77,7 @@ impl VectorHistory {
         }
     }
 
-    /// Times at which it is not smooth.
+    /// Returns the times at which the history is not smooth.
     pub fn breaks(&self) -> Vec<f64> {
         match self {
             Self::Along { factor, .. } => factor.breaks(),
@@ -85,7 +85,7 @@ impl VectorHistory {
         }
     }
 
-    /// The direction that it always has; none where that may change.
+    /// Returns the constant direction; `None` if the direction may change.
     pub fn direction(&self) -> Option<&Vector3<f64>> {
         match self {
             Self::Along { direction, .. } => Some(direction),
@@ -93,7 +93,8 @@ impl VectorHistory {
         }
     }
 
-    /// A direction that it has: where there are several, that of its longest row; none of what is zero.
+    /// Returns a direction of the vector: the constant one, or that of the longest row. Returns `None` for
+    /// a zero vector.
     pub fn main_direction(&self) -> Option<Vector3<f64>> {
         let longest = match self {
             Self::Along { direction, .. } => *direction,
@@ -105,8 +106,8 @@ impl VectorHistory {
         longest.try_normalize(0.0)
     }
 
-    /// Directions that all of its values are combinations of: its own, or those of the components that are
-    /// not always zero.
+    /// Returns directions that span all values: the constant direction, or the axes of the components that
+    /// are not always zero.
     pub fn directions(&self) -> Vec<Vector3<f64>> {
         match self {
             Self::Along { direction, .. } => vec![*direction],
@@ -116,7 +117,7 @@ impl VectorHistory {
         }
     }
 
-    /// Whether a component is not always zero.
+    /// Returns true if a component is not always zero.
     pub fn has_component(&self, component: usize) -> bool {
         match self {
             Self::Along { direction, .. } => direction[component] != 0.0,
@@ -124,7 +125,7 @@ impl VectorHistory {
         }
     }
 
-    /// The largest length of the vector and of its rate from time zero to a time.
+    /// Returns the largest length of the vector and of its rate from time zero to a time.
     pub fn largest_until(&self, end: f64) -> (f64, f64) {
         match self {
             Self::Along { direction, factor } => {
@@ -138,7 +139,7 @@ impl VectorHistory {
         }
     }
 
-    /// The largest magnitudes of the components, and of their rates, from time zero to a time.
+    /// Returns the largest magnitudes of the components, and of their rates, from time zero to a time.
     pub fn components_until(&self, end: f64) -> (Vector3<f64>, Vector3<f64>) {
         match self {
             Self::Along { direction, factor } => {
@@ -152,7 +153,7 @@ impl VectorHistory {
         }
     }
 
-    /// Whether it is zero from time zero to a time.
+    /// Returns true if the vector is zero from time zero to a time.
     pub fn is_zero_until(&self, end: f64) -> bool {
         match self {
             Self::Along { direction, factor } => *direction == Vector3::zeros() || factor.is_zero_until(end),
@@ -160,7 +161,7 @@ impl VectorHistory {
         }
     }
 
-    /// Oscillations per time of the fastest part; zero without any that oscillates.
+    /// Returns the frequency of the fastest part, in oscillations per time; zero without oscillation.
     pub fn frequency_until(&self, end: f64) -> f64 {
         match self {
             Self::Along { factor, .. } => factor.frequency_until(end),
@@ -168,8 +169,8 @@ impl VectorHistory {
         }
     }
 
-    /// Shortest time in which it can do anything between two of its breaks, where that is less than what lies
-    /// between the breaks.
+    /// Returns the shortest spacing of rows between which the history is smooth; `None` if the breaks
+    /// already give the shortest time of change.
     pub fn spacing(&self) -> Option<f64> {
         match self {
             Self::Along { factor: History::Samples(samples), .. } => samples.smooth_spacing(),
@@ -178,7 +179,7 @@ impl VectorHistory {
         }
     }
 
-    /// Whether it has two derivatives everywhere but at its ends.
+    /// Returns true if the history has two derivatives everywhere except at its ends.
     pub fn is_smooth(&self) -> bool {
         match self {
             Self::Along { factor, .. } => factor.is_smooth(),
@@ -186,7 +187,7 @@ impl VectorHistory {
         }
     }
 
-    /// The vector times a matrix.
+    /// Returns the vector multiplied by a matrix.
     pub fn turned(&self, matrix: &Matrix3<f64>) -> Self {
         match self {
             Self::Along { direction, factor } => {
@@ -196,7 +197,7 @@ impl VectorHistory {
         }
     }
 
-    /// The vector times a factor.
+    /// Returns the vector multiplied by a factor.
     pub fn scaled(&self, factor: f64) -> Self {
         match self {
             Self::Along { direction, factor: own } => {

@@ -1,25 +1,25 @@
-//! What ties the frame to the body.
+//! Reference conditions, which tie the frame to the body.
 
 use super::motions::Motions;
 use super::{NodalError, NodalPoint};
 use flexbody_model::{DofLabel, FeModel};
 
-/// The conditions C u = 0 on the displacements, as many as rigid motions, that say where the frame of the
-/// deformed body is.
+/// Conditions C u = 0 on the displacements, as many as rigid motions, that define the frame of the deformed
+/// body.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum ReferenceConditions {
-    /// R'M u = 0 with the rigid motions R (Tisserand): no deformation carries momentum to first order. What
-    /// free-surface modes fulfil.
+    /// R'M u = 0 with the rigid motions R (Tisserand): deformation carries no momentum to first order.
+    /// Free-surface modes fulfil it.
     #[default]
     MeanAxes,
-    /// These degrees of freedom are zero: the frame is fixed to nodes. Six, of a plane body three.
+    /// Degrees of freedom that are zero, which fixes the frame to nodes: six, for a plane body three.
     Held(Vec<DofLabel>),
-    /// This point rests, displacement and rotation: the frame is fixed to it.
+    /// Point at rest in displacement and rotation, which carries the frame.
     AtRest(NodalPoint),
 }
 
 impl ReferenceConditions {
-    /// C', given M R; none of the held rows is without mass.
+    /// Returns C', given M R; all held rows have mass.
     pub(super) fn columns(
         &self,
         model: &FeModel,
@@ -45,7 +45,7 @@ impl ReferenceConditions {
     }
 }
 
-/// C' of a point that rests: its weights.
+/// Returns C' of a point at rest: its weights.
 fn of_point(model: &FeModel, moving: &[usize], point: &NodalPoint) -> Result<Motions, NodalError> {
     let loads = point.unit_loads(model);
     let mut columns = vec![[0.0; 6]; model.rows().len()];
@@ -58,7 +58,7 @@ fn of_point(model: &FeModel, moving: &[usize], point: &NodalPoint) -> Result<Mot
     Ok(columns)
 }
 
-/// Conditions on a row without mass are none on the motion.
+/// Returns an error for a condition on a row without mass, which does not constrain the motion.
 fn refuse_massless(model: &FeModel, row: usize) -> Result<(), NodalError> {
     let pencil = model.pencil();
     match pencil.mass().row(row / pencil.block()).0.is_empty() {

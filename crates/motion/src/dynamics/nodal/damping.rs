@@ -1,13 +1,13 @@
-//! Damping of modes on the nodes.
+//! Damping of modes as forces on nodes.
 
 use faer::Mat;
 use flexbody_body::flex_body::FlexBody;
 use flexbody_model::FeModel;
 use nalgebra::DMatrix;
 
-/// D = W G W' with W = M Psi (N x nf): the damping of the modes of a body, as forces on the nodes of its
-/// model. With G = m_ff^-1 D_ff m_ff^-1 and m_ff = Psi'M Psi, Psi'D Psi = D_ff: for mass-normalised modes D =
-/// sum_j 2 zeta_j omega_j (M psi_j)(M psi_j)'. What is orthogonal to the modes in M is not damped.
+/// Damping matrix D = W G W' with W = M Psi (N x nf): the modal damping of a body as forces on the nodes of
+/// its model. With G = m_ff^-1 D_ff m_ff^-1 and m_ff = Psi'M Psi, Psi'D Psi = D_ff; for mass-normalised
+/// modes D = sum_j 2 zeta_j omega_j (M psi_j)(M psi_j)'. Motions M-orthogonal to the modes are not damped.
 #[derive(Debug, Clone)]
 pub(super) struct ModalDamping {
     /// W.
@@ -16,7 +16,7 @@ pub(super) struct ModalDamping {
     matrix: DMatrix<f64>,
 }
 
-/// Memory for the products of [`ModalDamping`].
+/// Work arrays for the products of [`ModalDamping`].
 #[derive(Debug, Clone, Default)]
 pub(super) struct Amplitudes {
     of_modes: Vec<f64>,
@@ -24,8 +24,8 @@ pub(super) struct Amplitudes {
 }
 
 impl ModalDamping {
-    /// The damping of `body`; nothing where it has none. `None` when the body has other rows than `model`, or
-    /// modes that depend on each other.
+    /// Returns the damping of `body`; the inner option is `None` without damping. Returns `None` if the
+    /// body has other rows than `model`, or modes that depend on each other.
     pub(super) fn new(model: &FeModel, body: &FlexBody) -> Option<Option<Self>> {
         let vectors = body.vectors_of(model)?;
         let damping = body.damping();
@@ -46,7 +46,7 @@ impl ModalDamping {
         Amplitudes { of_modes: zeros(), forces: zeros() }
     }
 
-    /// forces += factor D ud.
+    /// Computes forces += factor D ud.
     pub(super) fn add(&self, factor: f64, ud: &[f64], forces: &mut [f64], room: &mut Amplitudes) {
         for (j, amplitude) in room.of_modes.iter_mut().enumerate() {
             let column = self.weighted.col_as_slice(j);

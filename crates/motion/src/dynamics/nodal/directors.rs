@@ -5,8 +5,8 @@ use flexbody_linalg::multiply_vector;
 use flexbody_model::{DirectorMass, FeModel};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-/// The mass of points and directors, and the rest M_R that it leaves of M, as the kinetic energy of turned nodes
-/// takes them.
+/// Mass of points and directors, and the remainder M_R of M, as they enter the kinetic energy of turned
+/// nodes.
 ///
 /// ```text
 /// T = 1/2 Yd'E Yd + 1/2 y'M_R y + V_c'(omega x s_R + C1_R u'),    s_R = c_R + C1_R u,    C1_R = Phi_t'M_R
@@ -14,17 +14,17 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 /// y:  omega x (x - x_c + u) + u' at displacements, omega + theta' at rotations
 /// ```
 ///
-/// x_c is the centre of mass of the undeformed body and V_c = V + omega x x_c its velocity as a point of the
-/// frame. V multiplies nothing but omega x s + ds/dt of the first moment s(u), so that a constant velocity adds
-/// the rate of a function of the state to T and changes no motion.
+/// x_c is the centre of mass of the undeformed body and V_c = V + omega x x_c its velocity as a point of
+/// the frame. V multiplies only omega x s + ds/dt of the first moment s(u), so that a constant velocity
+/// adds the rate of a function of the state to T and does not change the motion.
 #[derive(Debug, Clone)]
 pub(super) struct Directors<'m> {
     pub mass: &'m DirectorMass,
-    /// Directors of a node: 3, in the plane 2.
+    /// Number of directors of a node: 3, in the plane 2.
     pub dimension: usize,
     /// Number of rows of displacements.
     pub points: usize,
-    /// Rows of the rotations about the three axes, of every node with directors.
+    /// Rows of the rotations about the three axes, for every node with directors.
     pub rotations: Vec<[Option<usize>; 3]>,
     /// E Phi_t at points and directors.
     pub translated: Vec<Vector3<f64>>,
@@ -43,8 +43,8 @@ pub(super) struct Rest {
 }
 
 impl<'m> Directors<'m> {
-    /// The constants of `model` with the rigid motions `rigid` of its rows, R'M R being `rigid_mass`; `None` when
-    /// no rotation carries mass.
+    /// Creates the constants of `model` with the rigid motions `rigid` of its rows and R'M R =
+    /// `rigid_mass`; `None` if no rotation carries mass.
     pub(super) fn new(model: &'m FeModel, rigid: &Motions, rigid_mass: &Matrix6<f64>) -> Option<Self> {
         let mass: &DirectorMass = model.director_mass()?;
         let points = model.rows().displacements();
@@ -66,35 +66,38 @@ impl<'m> Directors<'m> {
         Some(directors)
     }
 
-    /// y = E x of points and directors.
+    /// Computes y = E x of points and directors.
     pub(super) fn weigh(&self, x: &[f64], y: &mut [f64]) {
         multiply_vector(self.mass.scalar(), self.dimension, x, y);
     }
 
-    /// First row of director `a` of the node at `place`.
+    /// Returns the first row of director `a` of the node at `place`.
     pub(super) fn director(&self, place: usize, a: usize) -> usize {
         self.points + self.dimension * (self.dimension * place + a)
     }
 
-    /// First extended row of the rotations of the node at `place`, and the axes that they have.
+    /// Returns the first extended row of the rotations of the node at `place`, and the axes of these
+    /// rotations.
     pub(super) fn rest_rotations(&self, place: usize) -> (usize, std::ops::Range<usize>) {
         let axes = if self.dimension == 2 { 2..3 } else { 0..3 };
         (self.mass.turning_rows() + axes.len() * place, axes)
     }
 
-    /// Rotations of the node at `place` in the rows of the model, zero about axes without a row.
+    /// Returns the rotations of the node at `place` from the rows of the model, zero about axes without a
+    /// row.
     pub(super) fn turn_of(&self, place: usize, x: &[f64]) -> Vector3<f64> {
         Vector3::from_fn(|axis, _| self.rotations[place][axis].map_or(0.0, |row| x[row]))
     }
 
-    /// True if a row of the model turns a node with directors.
+    /// Returns true if a row of the model turns a node with directors.
     pub(super) fn has_rotation(&self, row: usize) -> bool {
         self.rotations.iter().flatten().flatten().any(|&own| own == row)
     }
 }
 
 impl Rest {
-    /// `None` where E is all of the mass. `fields`: translations at points and directors.
+    /// Creates the constants of M_R; `None` if E is the whole mass. `fields`: translations at points and
+    /// directors.
     fn new(
         directors: &Directors<'_>,
         rigid: &Motions,
@@ -109,7 +112,7 @@ impl Rest {
         };
         let weigh = |x: &[f64], y: &mut [f64]| multiply_vector(rest, 1, x, y);
         let translated = translated(&std::array::from_fn(|k| extended(&fields[k])), weigh);
-        // R'M R = [m I, -c~; c~, I0], of a plane body with the last column of c~ alone.
+        // R'M R = [m I, -c~; c~, I0]; for a plane body only the last column of c~ exists.
         let centre = column_of_skew(rigid_mass, directors.dimension) / rigid_mass[(0, 0)];
         let mut coupling = Matrix6::zeros();
         for axis in if directors.dimension == 2 { 2..3 } else { 0..3 } {
@@ -131,13 +134,13 @@ impl Rest {
     }
 }
 
-/// c of the block -c~ in the rows of translation and the columns of rotation.
+/// Returns c of the block -c~ in the rows of translation and the columns of rotation.
 fn column_of_skew(both: &Matrix6<f64>, dimension: usize) -> Vector3<f64> {
     let z = if dimension == 2 { 0.0 } else { both[(0, 4)] };
     Vector3::new(both[(1, 5)], -both[(0, 5)], z)
 }
 
-/// The products of a mass with the three translations, one vector for every row.
+/// Returns the products of a mass with the three translations, one vector per row.
 fn translated(fields: &[Vec<f64>; 3], weigh: impl Fn(&[f64], &mut [f64])) -> Vec<Vector3<f64>> {
     let mut rows = vec![Vector3::zeros(); fields[0].len()];
     let mut product = vec![0.0; rows.len()];
@@ -148,7 +151,7 @@ fn translated(fields: &[Vec<f64>; 3], weigh: impl Fn(&[f64], &mut [f64])) -> Vec
     rows
 }
 
-/// Rows of the rotations about the three axes, of every node with directors.
+/// Returns the rows of the rotations about the three axes, for every node with directors.
 fn rotations(model: &FeModel, mass: &DirectorMass) -> Vec<[Option<usize>; 3]> {
     let mut rotations = vec![[None; 3]; mass.nodes().len()];
     let first = model.rows().displacements();

@@ -1,42 +1,43 @@
-//! Which motion of the frame is given, and the twelve equations for the rest of it.
+//! Prescribed motion of the frame, and the twelve equations for its free part.
 
 use crate::dynamics::Prescribed;
 use crate::integration::Failure;
 use nalgebra::{Const, LU, Matrix6, SMatrix, SVector, Vector6};
 
-/// The deformation is beyond what the conditions can follow.
+/// Failure for a deformation that is too large for the reference conditions to determine the frame.
 pub(super) const LOST: Failure = Failure::Rates {
     reason: "the deformation is so large that the reference conditions do not determine the frame",
 };
 
-/// The multipliers and the motion of the frame together.
+/// Matrix for the multipliers and the motion of the frame together.
 type Both = SMatrix<f64, 12, 12>;
 
-/// Which motion of the frame is given, and the equations for the rest of it.
+/// Prescribed components of the frame motion, and the equations for the free ones.
 #[derive(Debug, Clone)]
 pub(super) struct Drive {
-    /// Of (V, omega).
+    /// True for each prescribed component of (V, omega).
     pub given: [bool; 6],
-    /// \[E, -(B'C')'; B'C', 0\], rows of what is given replaced; of a body whose mass does not turn.
+    /// Factor of \[E, -(B'C')'; B'C', 0\] with the rows of prescribed components replaced; `None` if
+    /// rotations carry mass.
     matrix: Option<LU<f64, Const<12>, Const<12>>>,
-    /// Force and torque that the given motion takes, model axes.
+    /// Force and torque of the prescribed motion, model axes.
     pub reaction: Vector6<f64>,
 }
 
 impl Drive {
-    /// With E = C M^-1 C' and B'C' at a deformation.
+    /// Creates the equations with E = C M^-1 C' and B'C' at a deformation.
     pub(super) fn new(answer: &Matrix6<f64>, conditions: &Matrix6<f64>, given: [bool; 6]) -> Self {
         let matrix = Some(matrix(answer, conditions, given).lu());
         Self { given, matrix, reaction: Vector6::zeros() }
     }
 
-    /// Of a body whose rotations carry mass.
+    /// Creates the equations of a body whose rotations carry mass.
     pub(super) fn of_turned(given: [bool; 6]) -> Self {
         Self { given, matrix: None, reaction: Vector6::zeros() }
     }
 
-    /// Solves (6.16) for right-hand sides of the conditions and of the momenta or, where it is given, the
-    /// motion.
+    /// Solves (6.16) for the right-hand sides of the conditions and of the momenta or, for prescribed
+    /// components, of the motion.
     pub(super) fn solve(
         &self,
         conditions: &Vector6<f64>,
@@ -50,12 +51,12 @@ impl Drive {
     }
 }
 
-/// Components of (V, omega) that are given.
+/// Returns true for each prescribed component of (V, omega).
 pub(super) fn mask(prescribed: &Prescribed) -> [bool; 6] {
     std::array::from_fn(|k| if k < 3 { prescribed.linear.is_some() } else { prescribed.angular.is_some() })
 }
 
-/// \[E, -(B'C')'; B'C', 0\], rows of what is given replaced.
+/// Returns \[E, -(B'C')'; B'C', 0\] with the rows of prescribed components replaced.
 fn matrix(answer: &Matrix6<f64>, conditions: &Matrix6<f64>, given: [bool; 6]) -> Both {
     let mut both = Both::zeros();
     both.fixed_view_mut::<6, 6>(0, 0).copy_from(answer);

@@ -1,4 +1,4 @@
-//! The nodal equations where motion of the frame is given instead of following from forces.
+//! Nodal equations with prescribed motion of the frame.
 
 use super::NodalEvaluation;
 use super::drive::{Drive, mask};
@@ -11,13 +11,14 @@ use crate::integration::Failure;
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEquations<'_> {
-    /// What is given of (V, omega), or of the rates of its components: model axes, zero elsewhere.
+    /// Returns the prescribed components of (V, omega), or of their rates: model axes, zero elsewhere.
     fn given(&self, prescribed: &Prescribed) -> Vector6<f64> {
         let or_zero = |v: Option<AlongFrame>| v.unwrap_or_default().0;
         self.in_model(&or_zero(prescribed.linear), &or_zero(prescribed.angular))
     }
 
-    /// Takes from w what of C'mu makes R'w vanish: of w only what is beside C' counts where motion is given.
+    /// Removes the part C'mu from w that makes R'w vanish. With prescribed motion w is defined only up to
+    /// C'mu.
     pub(super) fn take_conditions(&self, w: &mut [f64]) {
         let part = self.rigid_part.tr_mul(&sums(&self.rigid, w));
         add_motion(&self.conditions, -1.0, &part, w);
@@ -25,10 +26,10 @@ impl NodalEquations<'_> {
 }
 
 impl NodalEvaluation<'_> {
-    /// Goes to a state, without loads, where `velocities` of the frame are given, V and omega in its axes.
+    /// Sets a state without loads, with prescribed `velocities` of the frame, V and omega in its axes.
     ///
-    /// w of the state counts up to C'mu, P as the momentum along what is free; L does not count. With E = C
-    /// M^-1 C' and B'C' at the displacements u,
+    /// w of the state is defined up to C'mu, and P is the momentum along the free components; L is not
+    /// used. With E = C M^-1 C' and B'C' at the displacements u,
     ///
     /// ```text
     /// E mu - C B (V, omega) = -C M^-1 w
@@ -36,10 +37,10 @@ impl NodalEvaluation<'_> {
     /// ```
     ///
     /// # Errors
-    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    /// The error [`Failure::Rates`] of [`NodalEvaluation::set`].
     ///
     /// # Panics
-    /// As [`NodalEvaluation::set`].
+    /// The panics of [`NodalEvaluation::set`].
     pub fn set_driven(&mut self, state: &[f64], velocities: &Prescribed) -> Result<(), Failure> {
         if *velocities == Prescribed::NOTHING {
             return self.set(state);
@@ -69,15 +70,15 @@ impl NodalEvaluation<'_> {
         Ok(())
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), under the loads where `rates` of (V, omega) are
-    /// given: those of the components in the axes of the frame. [`NodalEvaluation::driving_force`] is then
-    /// what they take.
+    /// Computes V' and omega' in the axes of the frame, and u'' (N), under the loads with prescribed
+    /// `rates` of (V, omega): the rates of the components in the axes of the frame. Afterwards
+    /// [`NodalEvaluation::driving_force`] returns the force of the prescribed motion.
     ///
     /// # Errors
-    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    /// The error [`Failure::Rates`] of [`NodalEvaluation::set`].
     ///
     /// # Panics
-    /// When the state was not set with what is given, or `udd` has not N entries.
+    /// When the state was set with other prescribed components, or the length of `udd` is not N.
     pub fn driven_accelerations(
         &mut self,
         rates: &Prescribed,
@@ -115,8 +116,9 @@ impl NodalEvaluation<'_> {
         Ok((to_frame * linear, to_frame * angular))
     }
 
-    /// Force and torque about the origin of the frame, its axes, that the given motion took in the last
-    /// [`NodalEvaluation::driven_accelerations`] beside the loads; zero along what is free.
+    /// Returns force and torque of the prescribed motion in the last
+    /// [`NodalEvaluation::driven_accelerations`], in addition to the loads, about the origin of the frame
+    /// and along its axes; zero along free components.
     pub fn driving_force(&self) -> (Vector3<f64>, Vector3<f64>) {
         let reaction = self.drive.as_ref().map_or_else(Vector6::zeros, |drive| drive.reaction);
         let (force, torque) = halves(&reaction);
@@ -124,13 +126,14 @@ impl NodalEvaluation<'_> {
         (to_frame * force, to_frame * torque)
     }
 
-    /// (p', h') along the axes of the frame, less what forces that drive it make of them.
+    /// Returns (p', h') along the axes of the frame, without the contribution of driving forces.
     pub(super) fn momentum_rates(&self) -> Vector6<f64> {
         let torque = self.torque - self.omega.cross(&self.h) - self.velocity.cross(&self.p);
         joined(&(self.force - self.omega.cross(&self.p)), &torque)
     }
 
-    /// B'w' of a body that nothing drives: (p', h') less what u' makes of B'w.
+    /// Returns B'w' of a body without prescribed motion: (p', h') minus the contribution of u' to the rate
+    /// of B'w.
     pub(super) fn wanted(&self) -> Vector6<f64> {
         let turned = self.equations.moment(&self.ud, &self.w);
         self.momentum_rates() - joined(&Vector3::zeros(), &turned)

@@ -1,4 +1,4 @@
-//! The constants of the nodal equations.
+//! Constants of the nodal equations of motion.
 
 use super::NodalError;
 use super::conditions::ReferenceConditions;
@@ -11,11 +11,12 @@ use flexbody_linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use flexbody_model::{Damping, FeModel, centre_and_length};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-/// Part of the largest that the smallest singular value of C R may be.
+/// Smallest ratio of the smallest to the largest singular value of C R for which the conditions fix the
+/// frame.
 const INDEPENDENT: f64 = 1e-8;
 
-/// The equations of motion of all nodes in a floating frame (theory 6.9 to 6.13; \[ZG19\] eq. 67 to 98 for
-/// solids): nothing is reduced, K and M are the model's.
+/// Equations of motion of all nodes in a floating frame (theory 6.9 to 6.13; \[ZG19\] eq. 67 to 98 for
+/// solids): nothing is reduced, K and M are the matrices of the model.
 ///
 /// ```text
 /// vbar = R (V, omega) + omega x u + u',    w = M vbar,    (p, h) = B'w,    B = [Phi_t, B_x + B(u)],    C u = 0
@@ -23,29 +24,31 @@ const INDEPENDENT: f64 = 1e-8;
 /// p' + omega x p = F,    h' + omega x h + V x p = tau
 /// ```
 ///
-/// u (N) are the displacements of all rows of the model relative to the moving frame, in the rows and axes of
-/// the model; omega x turns displacements. V, omega and what else belongs to the frame are in the axes of
-/// `frame`, as those of a [`FlexBody`](flexbody_body::flex_body::FlexBody) with the same frame. M is any
-/// symmetric positive semidefinite matrix: what it leaves without mass is condensed exactly.
+/// u (N) are the displacements of all rows of the model relative to the moving frame, in the rows and axes
+/// of the model; omega x turns displacements. V, omega and all other frame quantities are in the axes of
+/// `frame`, as for a [`FlexBody`](flexbody_body::flex_body::FlexBody) with an equal frame. M is any
+/// symmetric positive semidefinite matrix; massless motions are condensed exactly.
 ///
-/// Where rotations carry mass, nodes are points and directors d_a = exp(theta~) e_a with the mass E of
-/// [`DirectorMass`](flexbody_model::DirectorMass), at rotations theta of any size. With their velocities Yd,
-/// V + omega x (x + u) + u' and (omega + J(theta) theta') x d_a,
+/// If rotations carry mass, nodes are points and directors d_a = exp(theta~) e_a with the mass E of
+/// [`DirectorMass`](flexbody_model::DirectorMass), for rotations theta of any size. With their velocities
+/// Yd, V + omega x (x + u) + u' and (omega + J(theta) theta') x d_a,
 ///
 /// ```text
 /// T = 1/2 Yd'E Yd + ...,    w = dT/du',    (p, h) = dT/d(V, omega),    w' - dT/du + K u + D u' = f + C'lambda
 /// ```
 ///
-/// where the dots are what E leaves of M, along the axes of the frame. What has no mass but turns a node with
-/// mass is held where K takes it without load: an error of second order of the turns.
+/// where the dots stand for the part of M outside E, along the axes of the frame. A massless motion that
+/// turns a node with mass is held in the position where K has no load along it; the error is of second
+/// order in the rotations.
 ///
-/// [`NodalEvaluation`](super::NodalEvaluation) computes with them, [`NodalMotion`](super::NodalMotion)
+/// [`NodalEvaluation`](super::NodalEvaluation) evaluates the equations, [`NodalMotion`](super::NodalMotion)
 /// integrates them. One evaluation costs a product with K, a solve with a factor of M made here, and a few
-/// dot products: some thousand rows are comfortable. Where rotations carry mass it takes 7 to 30 such solves
-/// and products with E.
+/// dot products, which suits models of some thousand rows. If rotations carry mass it takes 7 to 30 such
+/// solves and products with E.
 ///
 /// ```
-/// # fn check(model: &flexbody_model::FeModel, body: &flexbody_body::flex_body::FlexBody, start: &flexbody_motion::dynamics::Configuration)
+/// # fn check(model: &flexbody_model::FeModel, body: &flexbody_body::flex_body::FlexBody,
+/// # start: &flexbody_motion::dynamics::Configuration)
 /// # -> Result<(), Box<dyn std::error::Error>> {
 /// use flexbody_motion::dynamics::{NodalEquations, NodalModes, NodalMotion, ReferenceConditions};
 /// use flexbody_motion::integration::{Explicit, Failure, Method, integrate};
@@ -63,38 +66,38 @@ const INDEPENDENT: f64 = 1e-8;
 pub struct NodalEquations<'m> {
     pub(super) model: &'m FeModel,
     pub(super) frame: Frame,
-    /// Nodes about the origin of the frame, model axes.
+    /// Positions of the nodes about the origin of the frame, model axes.
     pub(super) positions: Vec<Vector3<f64>>,
     pub(super) length: f64,
-    /// Components of motion that there are, of (V, omega).
+    /// Indices of the existing components of (V, omega).
     pub(super) moving: &'static [usize],
     /// R: rigid motions about the origin of the frame, model axes.
     pub(super) rigid: Motions,
     pub(super) mass_rigid: Motions,
-    /// R'M R, of motions that a plane body does not have the identity.
+    /// R'M R; motions that a plane body does not have get the identity.
     pub(super) rigid_mass: Matrix6<f64>,
-    /// C'.
+    /// C', the conditions as columns.
     pub(super) conditions: Motions,
-    /// Whether the conditions are those of places that rest, not mean axes.
+    /// True if the conditions hold points at rest; false for mean axes.
     pub(super) is_held: bool,
-    /// R'C', completed in the same way.
+    /// R'C', completed by the identity for motions that do not exist.
     pub(super) conditions_rigid: Matrix6<f64>,
     /// (C R)^-1.
     pub(super) rigid_part: Matrix6<f64>,
     pub(super) factor: SparseLdl,
     pub(super) massless: Massless,
-    /// M^-1 C', and E = C M^-1 C', completed in the same way.
+    /// M^-1 C', and E = C M^-1 C', completed by the identity for motions that do not exist.
     pub(super) answered: Motions,
     pub(super) answer: Matrix6<f64>,
-    /// Damping of the model; ratios of modes are in `modal_damping`.
+    /// Damping of the model; damping by modal ratios is in `modal_damping`.
     pub(super) damping: Option<&'m Damping<SymmetricMatrix>>,
     pub(super) modal_damping: Option<ModalDamping>,
-    /// Nodes with rotational mass, where there are any.
+    /// Nodes with rotational mass, if there are any.
     pub(super) directors: Option<Directors<'m>>,
 }
 
-/// R and M R: rigid motions of the frame at the rows of the model, zero for those that a plane body does not
-/// have.
+/// Returns R and M R: rigid motions of the frame at the rows of the model, zero for motions that a plane
+/// body does not have.
 fn rigid_motions(model: &FeModel, frame: &Frame, moving: &[usize]) -> (Motions, Motions) {
     let (pencil, n) = (model.pencil(), model.rows().len());
     let fields = model.rigid_fields(frame.origin.into(), 1.0);
@@ -111,14 +114,15 @@ fn rigid_motions(model: &FeModel, frame: &Frame, moving: &[usize]) -> (Motions, 
 }
 
 impl<'m> NodalEquations<'m> {
-    /// The equations of `model` in a frame that coincides with `frame` before deformation.
+    /// Creates the equations of `model` in a frame that coincides with `frame` before deformation.
     ///
-    /// Factors M. Rows and null vectors without mass are condensed: u of the empty rows of M, and along any
-    /// null vector z, follows from z'(K u - f) = 0.
+    /// Factors M and condenses massless rows and null vectors: u of the empty rows of M, and along any null
+    /// vector z, follows from z'(K u - f) = 0.
     ///
     /// # Errors
-    /// [`NodalError`]: conditions that do not fix the frame; K that does not hold what carries no mass; M
-    /// that is indefinite or has more null vectors than dense storage is worth; damping by ratios of modes.
+    /// [`NodalError`] for conditions that do not fix the frame, for K that does not resist a massless
+    /// motion, for M that is indefinite or has more null vectors than dense storage allows, and for damping
+    /// by modal ratios.
     pub fn new(
         model: &'m FeModel,
         frame: &Frame,
@@ -130,13 +134,13 @@ impl<'m> NodalEquations<'m> {
         Self::undamped_modes(model, frame, conditions)
     }
 
-    /// The equations of `model` in the frame of `body`, a body of it, with the damping of its modes where the
-    /// model has no damping matrix of its own: D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M, with which Psi'D Psi is
-    /// the D_ff of the body.
+    /// Creates the equations of `model` in the frame of `body`, a body of this model. If the model has no
+    /// damping matrix of its own, the damping of the modes is used: D = M Psi m_ff^-1 D_ff m_ff^-1 Psi'M,
+    /// which gives Psi'D Psi = D_ff of the body.
     ///
     /// # Errors
-    /// As [`NodalEquations::new`]; [`NodalError::OtherBody`] when the body has other rows, or modes that
-    /// depend on each other.
+    /// The errors of [`NodalEquations::new`]; [`NodalError::OtherBody`] if the body has other rows, or
+    /// modes that depend on each other.
     pub fn of_body(
         model: &'m FeModel,
         body: &FlexBody,
@@ -148,11 +152,11 @@ impl<'m> NodalEquations<'m> {
         Self::of_damped_body(model, body, conditions)
     }
 
-    /// The equations of `model` in the frame of `body` with the damping of the modes of the body in place of that of
-    /// the model.
+    /// Creates the equations of `model` in the frame of `body` with the damping of the modes of the body in
+    /// place of that of the model.
     ///
     /// # Errors
-    /// As [`NodalEquations::of_body`].
+    /// The errors of [`NodalEquations::of_body`].
     pub fn of_damped_body(
         model: &'m FeModel,
         body: &FlexBody,
@@ -179,6 +183,7 @@ impl<'m> NodalEquations<'m> {
         }
 
         let (_, length) = centre_and_length(&model.nodes().positions);
+        // The conditions fix the frame if C R is regular.
         let conditions_rigid = products(&rigid, &columns, moving);
         let independent = match conditions {
             ReferenceConditions::MeanAxes => true,
@@ -189,6 +194,7 @@ impl<'m> NodalEquations<'m> {
         };
         let rigid_part = conditions_rigid.transpose().try_inverse().filter(|_| independent);
         let rigid_part = rigid_part.ok_or(NodalError::ConditionsDependent)?;
+        // For mean axes C' = M R, so that M^-1 C' = R.
         let answered = match conditions {
             ReferenceConditions::MeanAxes => rigid.clone(),
             _ => answers(model, &factor, &columns, moving),
@@ -218,22 +224,22 @@ impl<'m> NodalEquations<'m> {
         })
     }
 
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &'m FeModel {
         self.model
     }
 
-    /// The frame, where it is before deformation.
+    /// Returns the frame in its position before deformation.
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    /// Number of entries of the factor of M below the diagonal.
+    /// Returns the number of entries of the factor of M below the diagonal.
     pub fn factor_entries(&self) -> usize {
         self.factor.entries()
     }
 
-    /// Number of rows N of the model.
+    /// Returns the number of rows N of the model.
     pub fn n_rows(&self) -> usize {
         self.rigid.len()
     }
@@ -242,23 +248,23 @@ impl<'m> NodalEquations<'m> {
         self.model.stiffness()
     }
 
-    /// y = M x.
+    /// Computes y = M x.
     pub(super) fn weigh(&self, x: &[f64], y: &mut [f64]) {
         let pencil = self.model.pencil();
         multiply_vector(pencil.mass(), pencil.block(), x, y);
     }
 
-    /// x <- M^-1 x, for x in the range of M; up to null vectors.
+    /// Computes x <- M^-1 x for x in the range of M, up to null vectors.
     pub(super) fn solve(&self, x: &mut [f64], scratch: &mut [f64]) {
         self.factor.solve_in_place(self.model.pencil().block(), x, scratch);
     }
 
-    /// y += factor omega x x, at displacements.
+    /// Computes y += factor omega x x at displacements.
     pub(super) fn add_turned(&self, factor: f64, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
         add_turned(self.model, factor, omega, x, y);
     }
 
-    /// sum_i x_i x y_i over displacements: B(x)'y.
+    /// Returns sum_i x_i x y_i over displacements, which is B(x)'y.
     pub(super) fn moment(&self, x: &[f64], y: &[f64]) -> Vector3<f64> {
         let end = self.model.rows().displacements();
         if self.model.dimension() == 2 {
@@ -274,7 +280,7 @@ impl<'m> NodalEquations<'m> {
         sum.into()
     }
 
-    /// B'C' at the displacements u, completed to an invertible matrix.
+    /// Returns B'C' at the displacements u, completed to an invertible matrix.
     pub(super) fn conditions_at(&self, u: &[f64]) -> Matrix6<f64> {
         let d = self.model.dimension();
         let mut sum = [[0.0; 6]; 3];
@@ -295,13 +301,13 @@ impl<'m> NodalEquations<'m> {
         matrix
     }
 
-    /// x += factor B_r nu at the displacements u.
+    /// Computes x += factor B_r nu at the displacements u.
     pub(super) fn add_frame(&self, factor: f64, nu: &Vector6<f64>, u: &[f64], x: &mut [f64]) {
         add_motion(&self.rigid, factor, nu, x);
         self.add_turned(factor, &nu.fixed_rows::<3>(3).into_owned(), u, x);
     }
 
-    /// B_r'x at the displacements u.
+    /// Returns B_r'x at the displacements u.
     pub(super) fn onto_frame(&self, u: &[f64], x: &[f64]) -> Vector6<f64> {
         let mut both = sums(&self.rigid, x);
         let mut angular = both.fixed_rows_mut::<3>(3);
@@ -309,19 +315,19 @@ impl<'m> NodalEquations<'m> {
         both
     }
 
-    /// (C R)^-1 C u: the rigid motion in displacements.
+    /// Returns (C R)^-1 C u, the rigid motion contained in displacements.
     pub(super) fn rigid_motion(&self, u: &[f64]) -> Vector6<f64> {
         self.rigid_part * sums(&self.conditions, u)
     }
 
-    /// Takes it out, u - R (C R)^-1 C u, and returns it.
+    /// Removes the rigid motion, u - R (C R)^-1 C u, and returns it.
     pub(super) fn take_rigid(&self, u: &mut [f64]) -> Vector6<f64> {
         let part = self.rigid_motion(u);
         add_motion(&self.rigid, -1.0, &part, u);
         part
     }
 
-    /// (V, omega) in model axes, without what a plane body does not have.
+    /// Returns (V, omega) in model axes, without components that a plane body does not have.
     pub(super) fn in_model(&self, linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
         let (linear, angular) = (self.frame.axes * linear, self.frame.axes * angular);
         let both = Vector6::from_iterator(linear.iter().chain(&angular).copied());
@@ -329,7 +335,7 @@ impl<'m> NodalEquations<'m> {
     }
 }
 
-/// M^-1 C'.
+/// Returns M^-1 C'.
 fn answers(model: &FeModel, factor: &SparseLdl, columns: &Motions, moving: &[usize]) -> Motions {
     let n = columns.len();
     let (mut answered, mut scratch) = (vec![[0.0; 6]; n], vec![0.0; n]);
@@ -341,7 +347,7 @@ fn answers(model: &FeModel, factor: &SparseLdl, columns: &Motions, moving: &[usi
     answered
 }
 
-/// y += factor omega x x, at the displacements of the rows of `model`.
+/// Computes y += factor omega x x at the displacements of the rows of `model`.
 fn add_turned(model: &FeModel, factor: f64, omega: &Vector3<f64>, x: &[f64], y: &mut [f64]) {
     let end = model.rows().displacements();
     let w = omega * factor;
@@ -359,7 +365,7 @@ fn add_turned(model: &FeModel, factor: f64, omega: &Vector3<f64>, x: &[f64], y: 
     }
 }
 
-/// A'B of two sets of motions, with ones on the diagonal of those that do not exist.
+/// Returns A'B of two sets of motions, with ones on the diagonal for motions that do not exist.
 pub(super) fn products(a: &Motions, b: &Motions, moving: &[usize]) -> Matrix6<f64> {
     let mut sum = Matrix6::zeros();
     for (a, b) in a.iter().zip(b) {
@@ -369,7 +375,7 @@ pub(super) fn products(a: &Motions, b: &Motions, moving: &[usize]) -> Matrix6<f6
     sum
 }
 
-/// R'C' with rotations by one over the `length` of the body and columns of one size.
+/// Returns R'C' with rotations divided by the `length` of the body and columns scaled to unit size.
 fn equilibrated(matrix: &Matrix6<f64>, length: f64) -> Matrix6<f64> {
     let mut scaled = *matrix;
     scaled.fixed_rows_mut::<3>(3).unscale_mut(length);

@@ -1,33 +1,33 @@
-//! Why a model or a state has no nodal equations.
+//! Reasons why a model or a state has no nodal equations.
 
 use flexbody_model::DofLabel;
 
-/// What keeps a model, or a state of it, from the nodal equations.
+/// Reason why a model, or a state of it, has no nodal equations.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum NodalError {
     /// A condition names a degree of freedom that the model does not have.
     DofUnknown(DofLabel),
-    /// Not six held degrees of freedom, in the plane three.
+    /// The number of held degrees of freedom is not six, in the plane three.
     ConditionCount {
-        /// As many as rigid motions.
+        /// Number of rigid motions.
         expected: usize,
-        /// As many as were given.
+        /// Number of held degrees of freedom.
         found: usize,
     },
     /// The conditions leave a rigid motion free.
     ConditionsDependent,
     /// A held degree of freedom without mass.
     HeldWithoutMass(DofLabel),
-    /// Degrees of freedom are held, and M has null vectors that no single row shows.
+    /// Degrees of freedom are held, and M has null vectors besides its empty rows.
     HeldMassSingular {
-        /// Number of null vectors that no single row shows.
+        /// Number of null vectors besides the empty rows.
         null_vectors: usize,
     },
-    /// M is not positive semidefinite, or so nearly singular that its null vectors cannot be told.
+    /// M is not positive semidefinite, or so nearly singular that its null vectors cannot be identified.
     MassIndefinite,
-    /// K does not hold what carries no mass.
+    /// K does not resist a massless motion.
     MasslessUnheld,
-    /// More null vectors of M than are worth their dense storage.
+    /// M has more null vectors than dense storage allows.
     NullSpaceTooLarge {
         /// Number of null vectors.
         null_vectors: usize,
@@ -36,13 +36,13 @@ pub enum NodalError {
     },
     /// Damping is given by ratios of modes.
     DampingOfModes,
-    /// The body is none of the model.
+    /// The body does not belong to the model.
     OtherBody,
-    /// A frame that nodal rotations or rows without a place tie to the body.
+    /// Nodal rotations or rows without a position tie the frame to the body.
     FrameTied,
     /// The displacements do not fulfil the reference conditions.
     ConditionsViolated {
-        /// Size of the rigid motion in them, relative to the largest displacement.
+        /// Size of the rigid motion in the displacements, relative to the largest displacement.
         part: f64,
     },
 }

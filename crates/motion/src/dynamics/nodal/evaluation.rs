@@ -1,4 +1,4 @@
-//! The nodal equations at one state.
+//! Evaluation of the nodal equations at one state.
 
 use super::damping::{Amplitudes, ModalDamping};
 use super::drive::{Drive, LOST};
@@ -15,21 +15,21 @@ use flexbody_linalg::multiply_vector;
 use flexbody_model::Damping;
 use nalgebra::{Matrix3, Vector3, Vector6};
 
-/// The nodal equations at one state, and the memory to evaluate them: nothing is allocated after
+/// Nodal equations at one state, with all memory for their evaluation: nothing is allocated after
 /// [`NodalEvaluation::new`].
 ///
-/// [`NodalEvaluation::set`] takes the state and removes all loads; loads are added then; rates and
-/// accelerations are those under them.
+/// [`NodalEvaluation::set`] sets the state and removes all loads. Loads are added afterwards; rates and
+/// accelerations are computed under these loads.
 #[derive(Debug, Clone)]
 pub struct NodalEvaluation<'e> {
     pub(super) equations: &'e NodalEquations<'e>,
     pub(super) origin: Vector3<f64>,
-    /// As in the state, of unit length but for the error of the integration.
+    /// Attitude as in the state, of unit length except for the integration error.
     pub(super) attitude: EulerParameters,
     /// D, and P / m.
     offset: Vector3<f64>,
     flight: Vector3<f64>,
-    /// Model axes to world axes.
+    /// Rotation from model axes to world axes.
     pub(super) axes: Matrix3<f64>,
     /// V, omega, p, h in model axes.
     pub(super) velocity: Vector3<f64>,
@@ -41,15 +41,15 @@ pub struct NodalEvaluation<'e> {
     pub(super) vbar: Vec<f64>,
     pub(super) w: Vec<f64>,
     pub(super) conditions: Conditions,
-    /// The mass of turned nodes, where rotations carry mass.
+    /// Mass of turned nodes, if rotations carry mass.
     pub(super) turned: Option<TurnedMass<'e>>,
-    /// Loads: force, torque about the origin, forces of rows; model axes.
+    /// Loads: force, torque about the origin, and forces on rows; model axes.
     pub(super) force: Vector3<f64>,
     pub(super) torque: Vector3<f64>,
     pub(super) row_forces: Vec<f64>,
     pub(super) w_rate: Vec<f64>,
     pub(super) multipliers: Vector6<f64>,
-    /// Where motion of the frame is given.
+    /// Prescribed motion of the frame, if any.
     pub(super) drive: Option<Drive>,
     pub(super) first: Vec<f64>,
     pub(super) second: Vec<f64>,
@@ -58,7 +58,7 @@ pub struct NodalEvaluation<'e> {
 }
 
 impl<'e> NodalEvaluation<'e> {
-    /// Memory for evaluations of `equations`, set to rest without deformation.
+    /// Creates an evaluation of `equations` at rest without deformation.
     pub fn new(equations: &'e NodalEquations<'e>) -> Self {
         let zeros = || vec![0.0; equations.n_rows()];
         let zero = Vector3::zeros();
@@ -92,23 +92,23 @@ impl<'e> NodalEvaluation<'e> {
         }
     }
 
-    /// The equations.
+    /// Returns the equations.
     pub fn equations(&self) -> &'e NodalEquations<'e> {
         self.equations
     }
 
-    /// Goes to a state, without loads.
+    /// Sets a state without loads.
     ///
-    /// w of the state counts up to C'mu, with mu from B'w = (p, h): P and L say how the body moves as a
-    /// whole. Then M(u) vbar = w, C B (V, omega) = C vbar and u' = vbar - B (V, omega), where M(u) = M unless
-    /// rotations carry mass.
+    /// w of the state is defined up to C'mu, with mu from B'w = (p, h): P and L determine the motion of the
+    /// body as a whole. Then M(u) vbar = w, C B (V, omega) = C vbar and u' = vbar - B (V, omega), where
+    /// M(u) = M unless rotations carry mass.
     ///
     /// # Errors
-    /// [`Failure::Rates`] when the body is deformed so far that C B is singular, or nodes are turned so far that
-    /// their mass is not positive definite.
+    /// [`Failure::Rates`] if the body is deformed so far that C B is singular, or nodes are turned so far
+    /// that their mass is not positive definite.
     ///
     /// # Panics
-    /// When `state` has not [`NodalEquations::dimension`] entries.
+    /// When the length of `state` is not [`NodalEquations::dimension`].
     pub fn set(&mut self, state: &[f64]) -> Result<(), Failure> {
         let body = self.equations;
         let momenta = self.go_to(state);
@@ -134,7 +134,7 @@ impl<'e> NodalEvaluation<'e> {
         Ok(())
     }
 
-    /// Takes what the state says, without loads; (p, h) as its momenta say.
+    /// Copies the state without loads and returns (p, h) from its momenta.
     pub(super) fn go_to(&mut self, state: &[f64]) -> Vector6<f64> {
         let body = self.equations;
         let (frame, u, w) = body.parts(state);
@@ -143,7 +143,7 @@ impl<'e> NodalEvaluation<'e> {
         self.origin = vector(0) + self.offset;
         self.flight = vector(LINEAR) / body.rigid_mass[(0, 0)];
         self.attitude = attitude(frame);
-        // As the reduced equations have it between the ends of steps, where e is not of unit length.
+        // The axes follow the reduced equations between the ends of steps, where e is not of unit length.
         self.axes = self.attitude.axes() * body.frame.axes.transpose();
         self.u.copy_from_slice(u);
         self.w.copy_from_slice(w);
@@ -155,7 +155,7 @@ impl<'e> NodalEvaluation<'e> {
         joined(&self.p, &self.h)
     }
 
-    /// The frame moves with nu = (V, omega); u' is what that leaves of vbar.
+    /// Sets the frame motion nu = (V, omega); u' is the remainder of vbar.
     pub(super) fn move_frame(&mut self, nu: &Vector6<f64>) {
         let body = self.equations;
         (self.velocity, self.omega) = halves(nu);
@@ -168,13 +168,13 @@ impl<'e> NodalEvaluation<'e> {
         }
     }
 
-    /// y' (see [`NodalEquations::dimension`]) under the loads.
+    /// Computes y' (see [`NodalEquations::dimension`]) under the loads.
     ///
     /// # Errors
-    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    /// The error [`Failure::Rates`] of [`NodalEvaluation::set`].
     ///
     /// # Panics
-    /// When `rates` has not the length of a state.
+    /// When `rates` does not have the length of a state.
     pub fn rates(&mut self, rates: &mut [f64]) -> Result<(), Failure> {
         assert_eq!(rates.len(), self.equations.dimension(), "rates of these equations");
         self.find_rates()?;
@@ -183,7 +183,7 @@ impl<'e> NodalEvaluation<'e> {
                 let relative = self.velocity - self.p / self.equations.rigid_mass[(0, 0)];
                 (self.flight, self.axes * relative)
             }
-            // Where the frame is driven it is not told from the momentum: G goes with it.
+            // The momentum does not determine the motion of a driven frame: G moves with the frame.
             Some(_) => (self.axes * self.velocity, Vector3::zeros()),
         };
         let linear = self.axes * self.force;
@@ -195,12 +195,12 @@ impl<'e> NodalEvaluation<'e> {
         Ok(())
     }
 
-    /// w' and lambda.
+    /// Computes w' and lambda.
     ///
-    /// With g = f - omega x w - K u - D u' and T of what carries no mass, w' = T'g + C'lambda, where B'w' is
-    /// known from the momenta.
+    /// With g = f - omega x w - K u - D u' and the projection T of massless motions, w' = T'g + C'lambda,
+    /// where B'w' is known from the momenta.
     ///
-    /// Where motion of the frame is given, w counts up to C'mu: lambda then leaves R'w' = 0.
+    /// If motion of the frame is prescribed, w is defined up to C'mu: lambda then makes R'w' = 0.
     fn find_rates(&mut self) -> Result<(), Failure> {
         let body = self.equations;
         let wanted = self.find_forces();
@@ -214,7 +214,7 @@ impl<'e> NodalEvaluation<'e> {
         Ok(())
     }
 
-    /// w' without C'lambda; what B'w' is of a body that nothing drives.
+    /// Computes w' without C'lambda; returns B'w' of a body without prescribed motion.
     pub(super) fn find_forces(&mut self) -> Vector6<f64> {
         self.first.copy_from_slice(&self.row_forces);
         match &self.turned {
@@ -225,7 +225,7 @@ impl<'e> NodalEvaluation<'e> {
         self.wanted()
     }
 
-    /// `w_rate` = T'(f - D u') - K u for the forces f in `first`.
+    /// Computes `w_rate` = T'(f - D u') - K u for the forces f in `first`.
     fn take_internal_forces(&mut self) {
         let body = self.equations;
         self.second.copy_from_slice(&self.u);
@@ -240,27 +240,27 @@ impl<'e> NodalEvaluation<'e> {
                 multiply_vector(damping, 1, &self.ud, &mut self.w_rate);
                 add_scaled(-1.0, &self.w_rate, &mut self.first);
             }
-            // That of the modes is below.
+            // Damping by modal ratios follows below.
             Some(Damping::Ratio(_) | Damping::Bands(_)) => {}
         }
         if let Some(damping) = &body.modal_damping {
             damping.add(-1.0, &self.ud, &mut self.first, &mut self.amplitudes);
         }
-        // K T = T'K: with what the forces do to rows without mass, one product with K takes them to the
-        // others.
+        // K T = T'K: adding the static response of the massless rows to u transfers their forces to the
+        // other rows with one product with K.
         body.massless.add_static(&self.first, &mut self.second, &mut self.room);
         multiply_vector(body.stiffness(), 1, &self.second, &mut self.w_rate);
         self.w_rate.iter_mut().zip(&self.first).for_each(|(rate, force)| *rate = force - *rate);
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the components
-    /// in these axes.
+    /// Computes V' and omega' in the axes of the frame, and u'' (N), under the loads. V' is the rate of the
+    /// components in these axes.
     ///
     /// # Errors
-    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    /// The error [`Failure::Rates`] of [`NodalEvaluation::set`].
     ///
     /// # Panics
-    /// When `udd` has not N entries.
+    /// When the length of `udd` is not N.
     pub fn accelerations(&mut self, udd: &mut [f64]) -> Result<(Vector3<f64>, Vector3<f64>), Failure> {
         assert_eq!(udd.len(), self.u.len(), "one entry per row");
         if self.turned.is_some() {
@@ -280,18 +280,20 @@ impl<'e> NodalEvaluation<'e> {
         Ok((to_frame * linear, to_frame * angular))
     }
 
-    /// Force and torque about the origin of C'lambda in the last rates or accelerations, axes of the frame:
-    /// what it takes to hold C u = 0. Where rotations carry mass, lambda is that of the last accelerations: in
-    /// rates it counts up to what leaves (p, h) = B'w. Of a solid the force is zero, and the torque sum_i u_i x (K u)_i, the
-    /// moment that linear elastic forces have about the deformed body.
+    /// Returns force and torque about the origin of the constraint forces C'lambda, which hold C u = 0,
+    /// from the last rates or accelerations, axes of the frame. If rotations carry mass, lambda is that of
+    /// the last accelerations, since in rates it is only defined up to the part that leaves (p, h) = B'w.
+    /// For a solid the force is zero and the torque is sum_i u_i x (K u)_i, the moment of linear elastic
+    /// forces about the deformed body.
     pub fn reaction(&self) -> (Vector3<f64>, Vector3<f64>) {
         let (force, torque) = halves(&(self.equations.conditions_at(&self.u) * self.multipliers));
         let to_frame = self.equations.frame.axes.transpose();
         (to_frame * force, to_frame * torque)
     }
 
-    /// The forces that have to be applied for the accelerations V', omega' (axes of the frame) and u'' (N): F
-    /// and tau in the axes of the frame, and f (N) in model axes, with lambda = 0; none on what has no mass.
+    /// Computes the forces that cause the accelerations V', omega' (axes of the frame) and u'' (N): returns
+    /// F and tau in the axes of the frame, and writes f (N) in model axes, with lambda = 0 and no forces on
+    /// massless motions.
     ///
     /// # Panics
     /// When a length is not N.
@@ -325,7 +327,7 @@ impl<'e> NodalEvaluation<'e> {
         (to_frame * force, to_frame * torque)
     }
 
-    /// Adds what K and damping take to the `forces` that inertia takes.
+    /// Adds the elastic and damping forces to the inertia `forces`.
     pub(super) fn take_inertia_forces(&mut self, forces: &mut [f64]) {
         self.first.copy_from_slice(forces);
         self.first.iter_mut().for_each(|force| *force = -*force);

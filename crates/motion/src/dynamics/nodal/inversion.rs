@@ -10,15 +10,14 @@ use crate::integration::Failure;
 use flexbody_linalg::multiply_vector;
 use nalgebra::{LU, Matrix6, U6, Vector6};
 
-/// Iterations end when the energy of the residual is the square of this part of the energy of the solution, which
-/// is rounding.
+/// Relative size of the residual, in the energy norm, at which iterations end: rounding.
 const SOLVED: f64 = 1e-15;
 
-/// Iterations at the most: their number grows with the turns of the nodes, to 30 at turns of 0.3. Beyond it the
-/// evaluation fails.
+/// Limit of the iterations. Their number grows with the rotations of the nodes, to 30 at rotations of 0.3.
+/// Beyond the limit the evaluation fails.
 const MOST_ITERATIONS: usize = 200;
 
-/// Nodes that are turned beyond what their mass is positive for.
+/// Failure for nodes turned so far that their mass is not positive definite.
 const TURNED: Failure =
     Failure::Rates { reason: "the nodes are turned so far that their mass is not positive definite" };
 
@@ -35,18 +34,18 @@ impl Conditions {
     }
 }
 
-/// The mass of turned nodes as a symmetric operator on N rows.
+/// Mass of turned nodes as a symmetric operator on N rows.
 ///
-/// A vector v of all rows is a motion nu = (C B)^-1 C v of the frame and rates u' = T (v - B nu) with C u' = 0. Of
-/// the momenta w and (p, h) of these,
+/// A vector v of all rows is a motion nu = (C B)^-1 C v of the frame and rates u' = T (v - B nu) with C u'
+/// = 0. With its momenta w and (p, h),
 ///
 /// ```text
 /// M(u) v = T'w + C'(B'C')^-1 ((p, h) - B'T'w)
 /// ```
 ///
-/// is the gradient of T(v). w of a state counts up to C'mu: w + C'(B'C')^-1 ((p, h) - B'w) = M(u) v is what v
-/// follows from, by conjugate gradients with the factor of M = M(0) as preconditioner. T takes what carries no
-/// mass where K takes it; it is the identity where that turns no node with directors.
+/// is the gradient of T(v). w of a state is defined up to C'mu: v follows from M(u) v = w + C'(B'C')^-1
+/// ((p, h) - B'w) by conjugate gradients with the factor of M = M(0) as preconditioner. T moves massless
+/// motions to static equilibrium; it is the identity if these turn no node with directors.
 #[derive(Debug, Clone)]
 pub(super) struct TurnedMass<'e> {
     pub kinetics: Kinetics<'e>,
@@ -64,26 +63,27 @@ pub(super) struct TurnedMass<'e> {
     room: Room,
 }
 
-/// Components of (V, omega), or of their rates, that are given.
+/// Prescribed components of (V, omega), or of their rates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Given {
     pub components: [bool; 6],
-    /// Model axes; zero in the components that are free.
+    /// Values of the prescribed components in model axes; zero in the free components.
     pub motion: Vector6<f64>,
 }
 
 impl Given {
-    /// No component.
+    /// Prescribes no component.
     pub(super) fn nothing() -> Self {
         Self { components: [false; 6], motion: Vector6::zeros() }
     }
 
-    /// `free` in the components that are free, `own` in the given ones.
+    /// Returns `free` in the free components and `own` in the prescribed ones.
     pub(super) fn or_own(&self, free: &Vector6<f64>, own: &Vector6<f64>) -> Vector6<f64> {
         Vector6::from_fn(|k, _| if self.components[k] { own[k] } else { free[k] })
     }
 
-    /// x <- v with the given motion, and M(u) v = x + C'(B'C')^-1 (rest of the momenta) in what is free.
+    /// Computes x <- v with the prescribed motion, and M(u) v = x + C'(B'C')^-1 (rest of the momenta) in
+    /// the free components.
     pub(super) fn solve(
         &self,
         turned: &mut TurnedMass<'_>,
@@ -100,17 +100,18 @@ impl Given {
     }
 }
 
-/// Components of the motion of the frame that are given, and the rest of what constrains it.
+/// Prescribed components of the frame motion, and the matrices that constrain it.
 #[derive(Debug, Clone)]
 struct Constraint {
     components: [bool; 6],
-    /// (B'C')^-1 and the inverse of N'M^-1 N for the columns N of C'(B'C')^-1 that belong to given components.
+    /// (B'C')^-1, and the inverse of N'M^-1 N for the columns N of C'(B'C')^-1 of prescribed components.
     multipliers: Matrix6<f64>,
     answer: Matrix6<f64>,
 }
 
 impl<'e> TurnedMass<'e> {
-    /// Memory for the equations of `body`, at rest without deformation; `None` where no rotation carries mass.
+    /// Creates the operator for the equations of `body`, at rest without deformation; `None` if no rotation
+    /// carries mass.
     pub(super) fn new(body: &'e NodalEquations<'e>) -> Option<Self> {
         let directors = body.directors.as_ref()?;
         let zeros = || vec![0.0; body.n_rows()];
@@ -130,14 +131,14 @@ impl<'e> TurnedMass<'e> {
         })
     }
 
-    /// Goes to the displacements `u` with their `conditions`.
+    /// Sets the displacements `u` and their `conditions`.
     pub(super) fn turn(&mut self, u: &[f64], conditions: &Conditions) {
         self.u.copy_from_slice(u);
         self.conditions.clone_from(conditions);
         self.kinetics.turn(u);
     }
 
-    /// w <- w + C'(B'C')^-1 (momenta - B'w).
+    /// Computes w <- w + C'(B'C')^-1 (momenta - B'w).
     pub(super) fn complete(&self, momenta: &Vector6<f64>, w: &mut [f64]) -> Result<(), Failure> {
         let missing = momenta - self.body.onto_frame(&self.u, w);
         let mu = self.conditions.plain.solve(&missing).ok_or(LOST)?;
@@ -145,13 +146,13 @@ impl<'e> TurnedMass<'e> {
         Ok(())
     }
 
-    /// nu = (C B)^-1 C v.
+    /// Returns nu = (C B)^-1 C v.
     pub(super) fn frame_of(&self, v: &[f64]) -> Result<Vector6<f64>, Failure> {
         let nu = sums(&self.body.conditions, v);
         self.conditions.transposed.solve(&nu).ok_or(LOST)
     }
 
-    /// x <- T'x.
+    /// Computes x <- T'x.
     pub(super) fn restrict(&mut self, x: &mut [f64]) {
         if !self.restricts {
             return;
@@ -162,7 +163,7 @@ impl<'e> TurnedMass<'e> {
         x.iter_mut().zip(&self.rates).for_each(|(x, taken)| *x -= taken);
     }
 
-    /// w = T'dT/du' and (p, h) of v.
+    /// Computes w = T'dT/du' of v and returns (p, h).
     pub(super) fn momenta(&mut self, v: &[f64], w: &mut [f64]) -> Result<Vector6<f64>, Failure> {
         let nu = self.frame_of(v)?;
         self.rates.copy_from_slice(v);
@@ -175,23 +176,23 @@ impl<'e> TurnedMass<'e> {
         Ok(momenta)
     }
 
-    /// product = M(u) v.
+    /// Computes product = M(u) v.
     fn multiply(&mut self, v: &[f64], product: &mut [f64]) -> Result<(), Failure> {
         let momenta = self.momenta(v, product)?;
         self.complete(&momenta, product)
     }
 
-    /// x <- M(u)^-1 x for a body that nothing drives.
+    /// Computes x <- M(u)^-1 x for a body without prescribed motion.
     pub(super) fn solve(&mut self, x: &mut [f64]) -> Result<(), Failure> {
         self.residual.copy_from_slice(x);
         x.fill(0.0);
         self.iterate(x, 0.0, None)
     }
 
-    /// x <- v with the `components` of its motion of the frame as in `motion`, and M(u) v = x up to forces that
-    /// act on these.
+    /// Computes x <- v with the prescribed `components` of the frame motion equal to `motion`, and M(u) v =
+    /// x up to forces on these components.
     ///
-    /// * `motion`: zero in the other components.
+    /// * `motion`: zero in the free components.
     pub(super) fn solve_given(
         &mut self,
         x: &mut [f64],
@@ -222,8 +223,8 @@ impl<'e> TurnedMass<'e> {
         Ok(Constraint { components, multipliers, answer: answer.try_inverse().ok_or(LOST)? })
     }
 
-    /// Conjugate gradients from x, whose residual is set, to rounding of the larger of `energy` and that of the
-    /// correction.
+    /// Runs conjugate gradients from x, whose residual is set, to rounding of the larger of `energy` and
+    /// the energy of the correction.
     fn iterate(&mut self, x: &mut [f64], energy: f64, given: Option<&Constraint>) -> Result<(), Failure> {
         self.precondition(given)?;
         let mut square = dot(&self.residual, &self.preconditioned);
@@ -249,7 +250,7 @@ impl<'e> TurnedMass<'e> {
         Err(TURNED)
     }
 
-    /// The product of the mass with the direction, and the square of the direction in it.
+    /// Computes the product of the mass with the direction; returns its inner product with the direction.
     fn curvature(&mut self) -> Result<f64, Failure> {
         let (direction, mut product) =
             (std::mem::take(&mut self.direction), std::mem::take(&mut self.product));
@@ -259,8 +260,8 @@ impl<'e> TurnedMass<'e> {
         Ok(dot(&self.direction, &self.product))
     }
 
-    /// The residual times M^-1, without motion in the given components: forces on these are taken from both, and
-    /// rounding on what carries no mass from the residual.
+    /// Computes the residual times M^-1 without motion in the prescribed components. Forces on these
+    /// components are removed from both, and rounding on massless motions from the residual.
     fn precondition(&mut self, given: Option<&Constraint>) -> Result<(), Failure> {
         let mut residual = std::mem::take(&mut self.residual);
         self.restrict(&mut residual);

@@ -1,4 +1,4 @@
-//! The kinetic energy of turned nodes at one state: momenta, their rates and what it does to the displacements.
+//! Kinetic energy of turned nodes at one state: momenta, their rates, and the forces on displacements.
 
 use super::directors::{Directors, Rest};
 use super::equations::NodalEquations;
@@ -34,7 +34,7 @@ impl Flow {
     }
 }
 
-/// The nodes at the displacements u.
+/// Nodes turned by the displacements u.
 #[derive(Debug, Clone)]
 struct TurnedNodes<'e> {
     body: &'e NodalEquations<'e>,
@@ -56,7 +56,7 @@ impl TurnedNodes<'_> {
         }
     }
 
-    /// C1_R u.
+    /// Returns C1_R u.
     fn rest_shift(&self, rest: &Rest, u: &[f64]) -> Vector3<f64> {
         let of_points = u.iter().zip(&rest.translated[..self.directors.points]);
         let mut sum: Vector3<f64> = of_points.map(|(u, row)| row * *u).sum();
@@ -69,13 +69,13 @@ impl TurnedNodes<'_> {
         sum
     }
 
-    /// First row, number and vector of every director of the node at `place`.
+    /// Returns first row and vector of every director of the node at `place`.
     fn directors_of(&self, place: usize) -> impl Iterator<Item = (usize, Vector3<f64>)> + '_ {
         let node = &self.nodes[place];
         (0..self.directors.dimension).map(move |a| (self.directors.director(place, a), node.director(a)))
     }
 
-    /// The vector of a point or director that begins at a row.
+    /// Returns the vector of the point or director that begins at `row`.
     fn vector(&self, x: &[f64], row: usize) -> Vector3<f64> {
         let d = self.directors.dimension;
         Vector3::from_fn(|k, _| if k < d { x[row + k] } else { 0.0 })
@@ -85,7 +85,7 @@ impl TurnedNodes<'_> {
         x[row..row + self.directors.dimension].iter_mut().zip(vector).for_each(|(x, value)| *x = *value);
     }
 
-    /// Yd and y of the motion nu = (V, omega) and u'.
+    /// Computes Yd and y of the motion nu = (V, omega) and u'.
     fn velocities(&self, nu: &Vector6<f64>, ud: &[f64], flow: &mut Flow) {
         let points = self.directors.points;
         let (linear, omega) = halves(nu);
@@ -111,7 +111,7 @@ impl TurnedNodes<'_> {
         }
     }
 
-    /// The rates of Yd and y at constant (V, omega) and u', while u changes with u'.
+    /// Computes the rates of Yd and y at constant (V, omega) and u', while u changes with u'.
     fn velocity_drifts(&self, omega: &Vector3<f64>, ud: &[f64], flow: &mut Flow) {
         let points = self.directors.points;
         let of_points = &mut flow.velocities[..points];
@@ -132,7 +132,7 @@ impl TurnedNodes<'_> {
         }
     }
 
-    /// E Yd, M_R y and the moments of the directors.
+    /// Computes E Yd, M_R y and the moments of the directors.
     fn multiply(&self, flow: &mut Flow) {
         self.directors.weigh(&flow.velocities, &mut flow.momenta);
         if let Some(rest) = self.directors.mass.rest() {
@@ -144,7 +144,7 @@ impl TurnedNodes<'_> {
         }
     }
 
-    /// w and (p, h) that the products in `flow` are, without the momentum that M_R has of V.
+    /// Computes w and returns (p, h) from the products in `flow`, without the momentum of M_R due to V.
     fn gather(&self, flow: &Flow, w: &mut [f64]) -> Vector6<f64> {
         let points = self.directors.points;
         w.fill(0.0);
@@ -173,7 +173,7 @@ impl TurnedNodes<'_> {
         joined(&linear, &angular)
     }
 
-    /// x += M_R Phi_t v on the rows of the model.
+    /// Computes x += M_R Phi_t v on the rows of the model.
     fn add_rest_translation(&self, rest: &Rest, v: &Vector3<f64>, x: &mut [f64]) {
         let of_points = x.iter_mut().zip(&rest.translated[..self.directors.points]);
         of_points.for_each(|(x, row)| *x += row.dot(v));
@@ -186,7 +186,7 @@ impl TurnedNodes<'_> {
         }
     }
 
-    /// w = dT/du' and (p, h) = dT/d(V, omega).
+    /// Computes w = dT/du' and returns (p, h) = dT/d(V, omega).
     fn momenta(&self, nu: &Vector6<f64>, ud: &[f64], flow: &mut Flow, w: &mut [f64]) -> Vector6<f64> {
         self.velocities(nu, ud, flow);
         self.multiply(flow);
@@ -199,8 +199,8 @@ impl TurnedNodes<'_> {
         both + joined(&relative, &(self.rest_first_moment.cross(&flight) + rest.centre.cross(&relative)))
     }
 
-    /// The rates of w and (p, h) at constant (V, omega) and u', while u changes with u'; `state` are the products
-    /// of the present velocities.
+    /// Computes the rates of w and (p, h) at constant (V, omega) and u', while u changes with u'; `state`
+    /// holds the products of the present velocities.
     fn drifts(
         &self,
         nu: &Vector6<f64>,
@@ -212,7 +212,7 @@ impl TurnedNodes<'_> {
         let (linear, omega) = halves(nu);
         self.velocity_drifts(&omega, ud, flow);
         self.multiply(flow);
-        // The directors turn too.
+        // Add the rotation of the directors themselves.
         for (place, node) in self.nodes.iter().enumerate() {
             let own = node.spin(&self.directors.turn_of(place, ud));
             let turned = self
@@ -240,7 +240,8 @@ impl TurnedNodes<'_> {
         both + joined(&Vector3::zeros(), &moment)
     }
 
-    /// forces += dT/du at constant (V, omega) and u'; `state` are the products of the present velocities.
+    /// Computes forces += dT/du at constant (V, omega) and u'; `state` holds the products of the present
+    /// velocities.
     fn add_slope(&self, nu: &Vector6<f64>, ud: &[f64], state: &Flow, forces: &mut [f64]) {
         let (linear, omega) = halves(nu);
         self.body.add_turned(-1.0, &omega, &state.momenta, forces);
@@ -262,8 +263,8 @@ impl TurnedNodes<'_> {
     }
 }
 
-/// The kinetic energy T(V, omega, u, u') of [`Directors`] at a state: the momenta w = dT/du' and (p, h) = dT/d(V,
-/// omega), which are linear in the velocities, their rates while u changes, and dT/du.
+/// Kinetic energy T(V, omega, u, u') of [`Directors`] at a state: the momenta w = dT/du' and (p, h) =
+/// dT/d(V, omega), which are linear in the velocities, their rates while u changes, and dT/du.
 #[derive(Debug, Clone)]
 pub(super) struct Kinetics<'e> {
     at: TurnedNodes<'e>,
@@ -274,7 +275,7 @@ pub(super) struct Kinetics<'e> {
 }
 
 impl<'e> Kinetics<'e> {
-    /// Memory for `directors` of `body`, at rest without deformation.
+    /// Creates the kinetics for `directors` of `body`, at rest without deformation.
     pub(super) fn new(body: &'e NodalEquations<'e>, directors: &'e Directors<'e>) -> Self {
         let at = TurnedNodes {
             body,
@@ -287,12 +288,12 @@ impl<'e> Kinetics<'e> {
         Self { at, nu: Vector6::zeros(), state, trial, energy: 0.0 }
     }
 
-    /// Goes to the displacements `u` (N).
+    /// Sets the displacements `u` (N).
     pub(super) fn turn(&mut self, u: &[f64]) {
         self.at.turn(u);
     }
 
-    /// Goes to the velocities nu = (V, omega) and u'. Returns (p, h) and sets w = dT/du'.
+    /// Sets the velocities nu = (V, omega) and u'. Returns (p, h) and computes w = dT/du'.
     pub(super) fn go(&mut self, nu: &Vector6<f64>, ud: &[f64], w: &mut [f64]) -> Vector6<f64> {
         let both = self.at.momenta(nu, ud, &mut self.state, w);
         self.nu = *nu;
@@ -300,27 +301,29 @@ impl<'e> Kinetics<'e> {
         both
     }
 
-    /// T.
+    /// Returns T.
     pub(super) fn energy(&self) -> f64 {
         self.energy
     }
 
-    /// (p, h) and w that other velocities have at the same displacements.
+    /// Computes w and returns (p, h) of other velocities at the present displacements.
     pub(super) fn momenta(&mut self, nu: &Vector6<f64>, ud: &[f64], w: &mut [f64]) -> Vector6<f64> {
         self.at.momenta(nu, ud, &mut self.trial, w)
     }
 
-    /// The rates of (p, h) and w at constant velocities, those of the state, of which `ud` are u'.
+    /// Computes the rates of w and returns those of (p, h) at constant velocities of the state, whose u' is
+    /// `ud`.
     pub(super) fn drifts(&mut self, ud: &[f64], w: &mut [f64]) -> Vector6<f64> {
         self.at.drifts(&self.nu, ud, &self.state, &mut self.trial, w)
     }
 
-    /// forces += dT/du at constant velocities, those of the state, of which `ud` are u'.
+    /// Computes forces += dT/du at constant velocities of the state, whose u' is `ud`.
     pub(super) fn add_slope(&self, ud: &[f64], forces: &mut [f64]) {
         self.at.add_slope(&self.nu, ud, &self.state, forces);
     }
 
-    /// The part of the first moment s(u) that turns of the nodes add to that of displaced points.
+    /// Returns the contribution of nodal rotations to the first moment s(u), in addition to that of
+    /// displaced points.
     pub(super) fn first_moment_of_turns(&self) -> Vector3<f64> {
         let (at, directors) = (&self.at, self.at.directors);
         let mut sum = Vector3::zeros();

@@ -7,17 +7,17 @@ use crate::dynamics::{LoadAxes, Orientation, RotationVector};
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEvaluation<'_> {
-    /// Adds uniform gravity: the gradient of -g'(m R + A s) with the first moment s(u), c + Phi_t'M u where no
-    /// rotation carries mass.
+    /// Adds uniform gravity: the gradient of -g'(m R + A s) with the first moment s(u), which is c +
+    /// Phi_t'M u if no rotation carries mass.
     ///
-    /// * `gravity`: g, world axes; of a plane body what it has along z is left out. Unit: length/time^2.
+    /// * `gravity`: g, world axes; for a plane body the component along z is ignored. Unit: length/time^2.
     pub fn add_gravity(&mut self, gravity: &Vector3<f64>) {
         let body = self.equations;
         let own = self.in_body(gravity);
         let mass = &body.rigid_mass;
-        // R'M R = [m I, -c~; c~, I0]: of a plane body it has only the last column of c~.
+        // R'M R = [m I, -c~; c~, I0]; for a plane body only the last column of c~ exists.
         let mut moment = Vector3::new(mass[(1, 5)], -mass[(0, 5)], mass[(0, 4)]);
-        // Rows whose part in s is linear in u.
+        // Rows whose contribution to s is linear in u.
         let linear = body.directors.as_ref().map_or(body.n_rows(), |directors| directors.points);
         let displaced = sums(&body.mass_rigid, &self.u[..linear]);
         moment += displaced.fixed_rows::<3>(0);
@@ -36,7 +36,7 @@ impl NodalEvaluation<'_> {
 
     /// Adds a force at node `i`.
     ///
-    /// * `force`: world axes; of a plane body what it has along z is left out.
+    /// * `force`: world axes; for a plane body the component along z is ignored.
     ///
     /// # Panics
     /// When `i` is not below the number of nodes.
@@ -49,10 +49,10 @@ impl NodalEvaluation<'_> {
         self.row_forces[d * i..d * (i + 1)].iter_mut().zip(&own).for_each(|(sum, value)| *sum += value);
     }
 
-    /// Adds a torque at node `i`, on the axes that its rotation vector theta turns: G(theta) t on its
-    /// rotations (theory 6.8).
+    /// Adds a torque at node `i`, along the axes turned by the rotation vector theta of the node: G(theta)
+    /// t on its rotations (theory 6.8).
     ///
-    /// * `torque`: world axes; of a plane body what it has along z.
+    /// * `torque`: world axes; for a plane body only the component along z is used.
     ///
     /// # Panics
     /// When `i` is not below the number of nodes, or the node has no rotations.
@@ -77,11 +77,11 @@ impl NodalEvaluation<'_> {
         }
     }
 
-    /// Adds forces of all rows (N) that turn with the frame, model axes: forces of displacements, moments of
-    /// rotations.
+    /// Adds forces on all rows (N) that turn with the frame, model axes: forces on displacements, moments
+    /// on rotations.
     ///
     /// # Panics
-    /// When there are not N.
+    /// When the number of forces is not N.
     pub fn add_row_forces(&mut self, forces: &[f64]) {
         assert_eq!(forces.len(), self.row_forces.len(), "one force per row");
         let both = self.equations.onto_frame(&self.u, forces);
@@ -90,10 +90,10 @@ impl NodalEvaluation<'_> {
         self.row_forces.iter_mut().zip(forces).for_each(|(sum, value)| *sum += value);
     }
 
-    /// Adds a force at a point, whose moment is about where the point is displaced to.
+    /// Adds a force at a point; its moment refers to the displaced position of the point.
     ///
-    /// * `force`: along `axes`, those of the world or of the frame; of a plane body what it has along z is
-    ///   left out.
+    /// * `force`: along `axes` of the world or of the frame; for a plane body the component along z is
+    ///   ignored.
     pub fn add_force_at(&mut self, point: &NodalPoint, force: &Vector3<f64>, axes: LoadAxes) {
         let mut own = self.along_model(force, axes);
         if self.equations.model.dimension() == 2 {
@@ -105,10 +105,11 @@ impl NodalEvaluation<'_> {
         self.add_weighted(&point.translation, &own);
     }
 
-    /// Adds a torque at a point, on the axes that its rotation vector theta turns: C_r'G(theta) t (theory
-    /// 6.8).
+    /// Adds a torque at a point, along the axes turned by the rotation vector theta of the point:
+    /// C_r'G(theta) t (theory 6.8).
     ///
-    /// * `torque`: along `axes`, those of the world or of the frame; of a plane body what it has along z.
+    /// * `torque`: along `axes` of the world or of the frame; for a plane body only the component along z
+    ///   is used.
     pub fn add_torque_at(&mut self, point: &NodalPoint, torque: &Vector3<f64>, axes: LoadAxes) {
         let mut own = self.along_model(torque, axes);
         if self.equations.model.dimension() == 2 {
@@ -132,7 +133,7 @@ impl NodalEvaluation<'_> {
         }
     }
 
-    /// A world vector in model axes, for a plane body in its plane.
+    /// Returns a world vector in model axes, for a plane body in its plane.
     fn in_body(&self, world: &Vector3<f64>) -> Vector3<f64> {
         let own = self.axes.tr_mul(world);
         let d = self.equations.model.dimension();

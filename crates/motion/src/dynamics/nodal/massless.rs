@@ -1,4 +1,4 @@
-//! What carries no mass follows from the rest: exact condensation (theory 6.13).
+//! Exact condensation of massless motions (theory 6.13).
 
 use super::NodalError;
 use super::directors::Directors;
@@ -6,32 +6,32 @@ use flexbody_linalg::{SparseLdl, SymmetricMatrix, multiply_vector};
 use flexbody_model::FeModel;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Part of its diagonal entry up to which a pivot of M is zero. Consistent masses stay above 1e-4, null
+/// Pivot of M, relative to its diagonal entry, that counts as zero. Consistent masses stay above 1e-4, null
 /// vectors leave 1e-15.
 pub(super) const NULL_PIVOT: f64 = 1e-9;
 
 /// Largest z'Mz of a null vector relative to that of the diagonal of M.
 const NULL_MASS: f64 = 1e-10;
 
-/// Most numbers that null vectors may take (16 MB).
+/// Limit of the numbers stored for null vectors (16 MB).
 const DENSE: usize = 2_000_000;
 
-/// The null space of M: Z = \[unit vectors of empty rows, others\], the others with K z = 0 in the empty
+/// Null space of M: Z = \[unit vectors of empty rows, others\], where the others have K z = 0 in the empty
 /// rows.
 #[derive(Debug, Clone)]
 pub(super) struct Massless {
     /// Empty rows of M.
     rows: Vec<usize>,
-    /// K of these rows.
+    /// Factor of K on these rows.
     own: Option<SparseLdl>,
-    /// The other null vectors, one after the other, and K times them.
+    /// The other null vectors, one after the other, and their products with K.
     vectors: Vec<f64>,
     weighted: Vec<f64>,
-    /// Z'K Z of the others.
+    /// Factor of Z'K Z of the other null vectors.
     factor: Option<Cholesky<f64, Dyn>>,
 }
 
-/// Memory for the products of [`Massless`].
+/// Work arrays for the products of [`Massless`].
 #[derive(Debug, Clone)]
 pub(super) struct Room {
     own: Vec<f64>,
@@ -39,13 +39,13 @@ pub(super) struct Room {
     coefficients: DVector<f64>,
 }
 
-/// Whether M has nothing in a row.
+/// Returns true if a row of M is empty.
 fn is_empty(model: &FeModel, row: usize) -> bool {
     let pencil = model.pencil();
     pencil.mass().row(row / pencil.block()).0.is_empty()
 }
 
-/// Refuses a null vector z that has a mass: `product` is M z, `diagonal` that of M.
+/// Returns an error if a null vector z has mass: `product` is M z, `diagonal` that of M.
 fn refuse_mass(product: &[f64], z: &[f64], diagonal: &[f64]) -> Result<(), NodalError> {
     let mass: f64 = product.iter().zip(z).map(|(m, z)| m * z).sum();
     let scale: f64 = diagonal.iter().zip(z).map(|(d, z)| d * z * z).sum();
@@ -55,7 +55,7 @@ fn refuse_mass(product: &[f64], z: &[f64], diagonal: &[f64]) -> Result<(), Nodal
     Ok(())
 }
 
-/// The factor of Z'K Z for null vectors Z and their products K Z, of `n` rows each.
+/// Returns the factor of Z'K Z for null vectors Z and their products K Z, with `n` rows each.
 fn null_stiffness(vectors: &[f64], weighted: &[f64], n: usize) -> Result<Cholesky<f64, Dyn>, NodalError> {
     let k = vectors.len() / n;
     let product = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
@@ -65,7 +65,7 @@ fn null_stiffness(vectors: &[f64], weighted: &[f64], n: usize) -> Result<Cholesk
 }
 
 impl Massless {
-    /// Finds the null space of the mass that `factor` is of.
+    /// Finds the null space of the mass matrix that `factor` belongs to.
     pub(super) fn new(model: &FeModel, factor: &SparseLdl) -> Result<Self, NodalError> {
         let (pencil, stiffness) = (model.pencil(), model.stiffness());
         let (n, block) = (pencil.n(), pencil.block());
@@ -86,7 +86,7 @@ impl Massless {
         for ((&start, z), kz) in starts.iter().zip(vectors.chunks_mut(n)).zip(weighted.chunks_mut(n)) {
             z[start] = 1.0;
             factor.solve_in_place(block, z, &mut scratch);
-            // Of a size that suits the products below, in any units.
+            // Scale to unit size, so that the products below work in any units.
             let size = z.iter().fold(0.0f64, |m, z| m.max(z.abs()));
             z.iter_mut().for_each(|z| *z /= size);
             multiply_vector(pencil.mass(), block, z, &mut scratch);
@@ -101,7 +101,7 @@ impl Massless {
         Ok(massless)
     }
 
-    /// The rows that M leaves empty, which K must hold, without null vectors yet.
+    /// Finds the empty rows of M, on which K must be regular; null vectors are not yet included.
     fn of_empty_rows(model: &FeModel) -> Result<Self, NodalError> {
         let rows: Vec<usize> = (0..model.pencil().n()).filter(|&row| is_empty(model, row)).collect();
         let own = (!rows.is_empty()).then(|| SparseLdl::new(&model.stiffness().principal(&rows), 0.0));
@@ -113,18 +113,18 @@ impl Massless {
         Ok(Self { rows, own, vectors: Vec::new(), weighted: Vec::new(), factor: None })
     }
 
-    /// Whether M has an inverse.
+    /// Returns true if M has an inverse.
     pub(super) fn is_empty(&self) -> bool {
         self.rows.is_empty() && self.vectors.is_empty()
     }
 
-    /// True if there are null vectors beside the empty rows, or an empty row turns a node with directors: their
-    /// motion may have mass where nodes are turned.
+    /// Returns true if there are null vectors besides the empty rows, or an empty row turns a node with
+    /// directors. Such motions may have mass when nodes are turned.
     pub(super) fn turns(&self, directors: &Directors<'_>) -> bool {
         self.n_vectors() > 0 || self.rows.iter().any(|&row| directors.has_rotation(row))
     }
 
-    /// Number of null vectors beside the empty rows.
+    /// Returns the number of null vectors besides the empty rows.
     pub(super) fn n_vectors(&self) -> usize {
         self.factor.as_ref().map_or(0, |factor| factor.l_dirty().nrows())
     }
@@ -134,7 +134,7 @@ impl Massless {
         Room { own: zeros(), scratch: zeros(), coefficients: DVector::zeros(self.n_vectors()) }
     }
 
-    /// x <- T x, T = I - Z (Z'K Z)^-1 Z'K: what has no mass goes where K takes it.
+    /// Computes x <- T x, T = I - Z (Z'K Z)^-1 Z'K, which moves massless motions to static equilibrium.
     pub(super) fn project(&self, stiffness: &SymmetricMatrix, x: &mut [f64], room: &mut Room) {
         if let Some(own) = &self.own {
             self.rows.iter().for_each(|&row| x[row] = 0.0);
@@ -153,7 +153,8 @@ impl Massless {
         self.add_vectors(x, room);
     }
 
-    /// x <- x + Z (Z'K Z)^-1 Z'b: adds the displacements that the forces b give to what has no mass.
+    /// Computes x <- x + Z (Z'K Z)^-1 Z'b, which adds the static response of massless motions to the forces
+    /// b.
     pub(super) fn add_static(&self, b: &[f64], x: &mut [f64], room: &mut Room) {
         if let Some(own) = &self.own {
             room.own.iter_mut().zip(&self.rows).for_each(|(force, &row)| *force = b[row]);

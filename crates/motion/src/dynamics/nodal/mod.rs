@@ -1,5 +1,5 @@
-//! The unreduced equations of motion of a body in its floating frame, all nodes kept (theory 6.9 to 6.13):
-//! what every reduced equation is measured against.
+//! Unreduced equations of motion of a body in its floating frame with all nodes (theory 6.9 to 6.13): the
+//! reference for every reduced equation.
 
 mod conditions;
 mod damping;

@@ -1,4 +1,4 @@
-//! From modal coordinates to nodal displacements and back.
+//! Conversion between modal coordinates and nodal displacements.
 
 use super::NodalConfiguration;
 use super::equations::NodalEquations;
@@ -8,8 +8,7 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_linalg::{combine, gram};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// The modes of a body in the rows of its model: trajectories of the reduced and of the nodal equations
-/// compare.
+/// Modes of a body in the rows of its model, to compare motions of the reduced and of the nodal equations.
 #[derive(Debug, Clone)]
 pub struct NodalModes {
     vectors: Mat<f64>,
@@ -19,8 +18,8 @@ pub struct NodalModes {
 }
 
 impl NodalModes {
-    /// The modes of `body`, which was made of the model of `equations`; `None` when it has other rows,
-    /// another frame, or modes that depend on each other.
+    /// Returns the modes of `body`, which was made of the model of `equations`. Returns `None` if the body
+    /// has other rows, another frame, or modes that depend on each other.
     pub fn new(equations: &NodalEquations<'_>, body: &FlexBody) -> Option<Self> {
         let vectors = body.vectors_of(equations.model).filter(|_| *body.frame() == equations.frame)?;
         let weighted = equations.model.pencil().apply_mass(vectors.as_ref());
@@ -29,15 +28,15 @@ impl NodalModes {
         Some(Self { vectors, weighted, modal_mass })
     }
 
-    /// Psi (N x nf), model axes.
+    /// Returns Psi (N x nf), model axes.
     pub fn vectors(&self) -> MatRef<'_, f64> {
         self.vectors.as_ref()
     }
 
-    /// The same state of all nodes: u = Psi q.
+    /// Returns the state of all nodes, u = Psi q.
     ///
     /// # Panics
-    /// When q or its rates have not nf entries.
+    /// When the length of q or its rates is not nf.
     pub fn lift(&self, modal: &Configuration) -> NodalConfiguration {
         let Configuration { origin, attitude, velocity, omega, q, qd } = modal;
         let lifted = |q: &[f64]| {
@@ -49,10 +48,10 @@ impl NodalModes {
         NodalConfiguration { origin: *origin, attitude: *attitude, velocity: *velocity, omega: *omega, u, ud }
     }
 
-    /// The modal state that is nearest: q = (Psi'M Psi)^-1 Psi'M u.
+    /// Returns the nearest modal state, q = (Psi'M Psi)^-1 Psi'M u.
     ///
     /// # Panics
-    /// When u or its rates have not N entries.
+    /// When the length of u or its rates is not N.
     pub fn project(&self, nodal: &NodalConfiguration) -> Configuration {
         let NodalConfiguration { origin, attitude, velocity, omega, u, ud } = nodal;
         let projected = |u: &[f64]| {

@@ -1,4 +1,4 @@
-//! The nodal equations under loads as a system that is integrated.
+//! Nodal equations under loads as a system for integration.
 
 use super::NodalEvaluation;
 use super::equations::NodalEquations;
@@ -8,25 +8,26 @@ use crate::dynamics::{Orientation, Prescribed};
 use crate::integration::{Failure, StageMode, System};
 use nalgebra::{Matrix3, Vector3, Vector6};
 
-/// Deformation that is nothing, relative to the size of the body: the scale of a body at rest.
+/// Deformation, relative to the size of the body, that sets the scale of a body at rest.
 const NOTHING: f64 = 1e-9;
 
-/// y' = f(t, y) of all nodes, with y as [`NodalEquations::dimension`] says.
+/// System y' = f(t, y) of all nodes, with y as defined by [`NodalEquations::dimension`].
 ///
-/// The error of a step is measured in energy: with E the kinetic energy about the centre of mass (estimated
-/// with the diagonal of M) and the elastic energy, and n entries of y,
+/// The error of a step is measured in energy. With E the kinetic energy about the centre of mass (estimated
+/// with the diagonal of M) plus the elastic energy, and n entries of y, the scales are
 ///
 /// ```text
-/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)    G, D: length / sqrt(n)    e: 1 / sqrt(n)
+/// u: sqrt(2 E / (n K_ii))    w: sqrt(2 E M_ii / n)    P, L: sqrt(2 E m / n), sqrt(2 E I / n)
+/// G, D: length / sqrt(n)    e: 1 / sqrt(n)
 /// ```
 ///
 /// so that the mean square of error over scale is the energy of the error relative to E, with the diagonals
-/// of K and M in place of the matrices: strict for soft modes, whose u has less energy than that. A body at
-/// rest has in place of E what deforms it by 1e-9 of its size; one that is driven the energy of its spin
-/// besides.
+/// of K and M in place of the matrices. This is strict for soft modes, whose u has less energy. For a body
+/// at rest E is the energy of a deformation by 1e-9 of its size; for a driven body the energy of its spin
+/// is added.
 ///
-/// Implicit steps solve what is stiff, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of M + z D +
-/// z^2 K.
+/// Implicit steps solve the stiff part, u' = P M^-1 w and w' = -K u - D u', with a sparse factor of
+/// M + z D + z^2 K.
 pub struct NodalMotion<'e, L> {
     pub(super) evaluation: NodalEvaluation<'e>,
     loads: L,
@@ -36,19 +37,19 @@ pub struct NodalMotion<'e, L> {
     mass: Vec<f64>,
 }
 
-/// Velocities of the frame that are given at a time, and their rates, where the frame has these axes in the
-/// world.
+/// Prescribed velocities of the frame at a time, and their rates, for the axes of the frame in the world.
 type Drive<'e> = dyn Fn(f64, &Matrix3<f64>) -> (Prescribed, Prescribed) + 'e;
 
 impl<'e> NodalMotion<'e, fn(f64, &mut NodalEvaluation<'e>)> {
-    /// A body without loads.
+    /// Creates the motion of a body without loads.
     pub fn free(equations: &'e NodalEquations<'e>) -> Self {
         Self::new(equations, |_, _| {})
     }
 }
 
 impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
-    /// A body under `loads`, which are added at a time and to an evaluation that is set to the state.
+    /// Creates the motion of a body under `loads`. The closure gets the time and an evaluation set to the
+    /// state, and adds the loads to it.
     pub fn new(equations: &'e NodalEquations<'e>, loads: L) -> Self {
         let positive = |diagonal: Vec<f64>| {
             let mean = diagonal.iter().sum::<f64>() / diagonal.len() as f64;
@@ -64,24 +65,24 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         }
     }
 
-    /// The same where motion of the frame is given: `drive` tells its velocities at a time, V and omega in
-    /// the axes of the frame, and their rates, from these axes in the world. What is given at one time is
-    /// given at all.
+    /// Adds prescribed motion of the frame. `drive` gets the time and the axes of the frame in the world,
+    /// and returns velocities V and omega in the axes of the frame, and their rates. The prescribed
+    /// components must be the same at all times.
     pub fn driven(self, drive: impl Fn(f64, &Matrix3<f64>) -> (Prescribed, Prescribed) + 'e) -> Self {
         Self { drive: Some(Box::new(drive)), ..self }
     }
 
-    /// What is given of the motion of the frame at a state, and of its rates.
+    /// Returns the prescribed velocities of the frame at a state, and their rates.
     fn given(&self, time: f64, state: &[f64]) -> (Prescribed, Prescribed) {
         let Some(drive) = &self.drive else { return (Prescribed::NOTHING, Prescribed::NOTHING) };
         let axes = attitude(state).normalised().axes() * self.evaluation.equations.frame.axes;
         drive(time, &axes)
     }
 
-    /// The body at a state, under its loads.
+    /// Returns the body at a state, under its loads.
     ///
     /// # Errors
-    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    /// The error [`Failure::Rates`] of [`NodalEvaluation::set`].
     pub fn evaluate(&mut self, time: f64, state: &[f64]) -> Result<&mut NodalEvaluation<'e>, Failure> {
         let (velocities, _) = self.given(time, state);
         self.evaluation.set_driven(state, &velocities)?;
@@ -89,14 +90,14 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         Ok(&mut self.evaluation)
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), at a state; the evaluation then has what drives
-    /// the frame ([`NodalEvaluation::driving_force`]).
+    /// Computes V' and omega' in the axes of the frame, and u'' (N), at a state. Afterwards the evaluation
+    /// holds the driving force of the frame ([`NodalEvaluation::driving_force`]).
     ///
     /// # Errors
-    /// [`Failure::Rates`] as [`NodalEvaluation::set`].
+    /// The error [`Failure::Rates`] of [`NodalEvaluation::set`].
     ///
     /// # Panics
-    /// When `udd` has not N entries.
+    /// When the length of `udd` is not N.
     pub fn accelerations(
         &mut self,
         time: f64,
@@ -111,17 +112,17 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         }
     }
 
-    /// [`NodalEvaluation::loaded_displacements`] at the state that was seen last.
+    /// Returns [`NodalEvaluation::loaded_displacements`] at the last evaluated state.
     pub fn loaded_displacements(&mut self) -> &[f64] {
         self.evaluation.loaded_displacements()
     }
 
-    /// The evaluation at the state that was seen last.
+    /// Returns the evaluation at the last evaluated state.
     pub fn evaluation(&self) -> &NodalEvaluation<'e> {
         &self.evaluation
     }
 
-    /// E.
+    /// Returns the energy E of the scales.
     fn energy(&self, state: &[f64]) -> f64 {
         let body = self.evaluation.equations;
         let (frame, u, w) = body.parts(state);
@@ -129,7 +130,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
         let mut linear = Vector3::from_column_slice(&frame[LINEAR..LINEAR + 3]) / body.rigid_mass[(0, 0)];
         let mut spin = 0.0;
         if self.drive.is_some() {
-            // w has nothing of the frame then.
+            // For a driven body w contains no motion of the frame.
             linear.fill(0.0);
             let omega = self.evaluation.omega;
             spin = omega.dot(&(body.rigid_mass.fixed_view::<3, 3>(3, 3) * omega));
@@ -168,8 +169,8 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
         w.iter_mut().zip(&self.mass).for_each(|(scale, m)| *scale = (share * m).sqrt());
     }
 
-    /// The energy of the corrections of u and w, relative to E of the step; those of the frame in their
-    /// scales.
+    /// Corrects the stages. Returns the energy of the corrections of u and w relative to E of the step, and
+    /// of the frame in its scales.
     fn correct_stages(
         &mut self,
         h: f64,
@@ -184,7 +185,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> System for NodalMotion<'e, L> 
         Ok(Some((energy / of_step + frame / (lacks.len() * scales.len()) as f64).sqrt()))
     }
 
-    /// Euler parameters of unit length; C u = 0; of a body that is driven R'w = 0.
+    /// Scales the Euler parameters to unit length and enforces C u = 0 and, for a driven body, R'w = 0.
     fn settle(&self, state: &mut [f64]) {
         let unit = attitude(state).normalised();
         state[ATTITUDE..LINEAR].copy_from_slice(&unit.0);

@@ -2,10 +2,10 @@
 
 use nalgebra::{Vector3, Vector6};
 
-/// Numbers of each row for the six rigid motions; zero for those that a plane body does not have.
+/// Six numbers per row, one for each rigid motion; zero for motions that a plane body does not have.
 pub(super) type Motions = Vec<[f64; 6]>;
 
-/// The sums over all rows of `motions` times x.
+/// Returns the sums over all rows of `motions` times x.
 pub(super) fn sums(motions: &Motions, x: &[f64]) -> Vector6<f64> {
     let mut sum = [0.0; 6];
     for (motion, x) in motions.iter().zip(x) {
@@ -14,7 +14,7 @@ pub(super) fn sums(motions: &Motions, x: &[f64]) -> Vector6<f64> {
     sum.into()
 }
 
-/// x += factor (motions) nu.
+/// Computes x += factor (motions) nu.
 pub(super) fn add_motion(motions: &[[f64; 6]], factor: f64, nu: &Vector6<f64>, x: &mut [f64]) {
     let nu: [f64; 6] = (nu * factor).into();
     for (x, motion) in x.iter_mut().zip(motions) {
@@ -22,12 +22,12 @@ pub(super) fn add_motion(motions: &[[f64; 6]], factor: f64, nu: &Vector6<f64>, x
     }
 }
 
-/// A linear and an angular part as one vector.
+/// Returns a linear and an angular part as one vector.
 pub(super) fn joined(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector6<f64> {
     Vector6::from_iterator(linear.iter().chain(angular).copied())
 }
 
-/// The linear and the angular part.
+/// Returns the linear and the angular part.
 pub(super) fn halves(both: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (both.fixed_rows::<3>(0).into_owned(), both.fixed_rows::<3>(3).into_owned())
 }

@@ -4,7 +4,7 @@ use super::{NodalConfiguration, NodalEvaluation};
 use nalgebra::{Matrix3, Vector3};
 
 impl NodalEvaluation<'_> {
-    /// The state as positions and velocities.
+    /// Returns the state in positions and velocities.
     pub fn configuration(&self) -> NodalConfiguration {
         NodalConfiguration {
             origin: self.origin,
@@ -16,18 +16,18 @@ impl NodalEvaluation<'_> {
         }
     }
 
-    /// Axes of the frame in the world, in columns.
+    /// Returns the axes of the frame in the world, in columns.
     pub fn axes(&self) -> Matrix3<f64> {
         self.axes * self.equations.frame.axes
     }
 
-    /// u (N), model axes.
+    /// Returns u (N), model axes.
     pub fn displacements(&self) -> &[f64] {
         &self.u
     }
 
-    /// u (N), model axes, with what the forces of the loads and of inertia do to motions without mass, which
-    /// u of the state leaves out (theory 6.13). The rates and accelerations of before are lost.
+    /// Returns u (N), model axes, with the response of massless motions to the loads and inertia forces,
+    /// which u of the state excludes (theory 6.13). Earlier rates and accelerations are overwritten.
     pub fn loaded_displacements(&mut self) -> &[f64] {
         let body = self.equations;
         if body.massless.is_empty() {
@@ -39,12 +39,12 @@ impl NodalEvaluation<'_> {
         &self.second
     }
 
-    /// u' (N), model axes, C u' = 0.
+    /// Returns u' (N), model axes, with C u' = 0.
     pub fn displacement_rates(&self) -> &[f64] {
         &self.ud
     }
 
-    /// Place of node `i`, world axes.
+    /// Returns the position of node `i`, world axes.
     ///
     /// # Panics
     /// When `i` is not below the number of nodes.
@@ -52,26 +52,26 @@ impl NodalEvaluation<'_> {
         self.origin + self.axes * (self.equations.positions[i] + self.node_vector(&self.u, i))
     }
 
-    /// Velocity of node `i`, world axes.
+    /// Returns the velocity of node `i`, world axes.
     ///
     /// # Panics
-    /// As [`NodalEvaluation::place`].
+    /// The panics of [`NodalEvaluation::place`].
     pub fn node_velocity(&self, i: usize) -> Vector3<f64> {
         self.axes * self.node_vector(&self.vbar, i)
     }
 
-    /// The entries of node `i`, zero along an axis that a plane model does not have.
+    /// Returns the entries of node `i`, zero along an axis that a plane model does not have.
     pub(super) fn node_vector(&self, x: &[f64], i: usize) -> Vector3<f64> {
         let d = self.equations.model.dimension();
         Vector3::from_fn(|k, _| if k < d { x[d * i + k] } else { 0.0 })
     }
 
-    /// The linear momentum P and the angular momentum L about the origin of the frame, world axes.
+    /// Returns the linear momentum P and the angular momentum L about the origin of the frame, world axes.
     pub fn momenta(&self) -> (Vector3<f64>, Vector3<f64>) {
         (self.axes * self.p, self.axes * self.h)
     }
 
-    /// T, which is vbar'M vbar / 2 where no rotation carries mass.
+    /// Returns T, which is vbar'M vbar / 2 if no rotation carries mass.
     pub fn kinetic_energy(&self) -> f64 {
         if let Some(turned) = &self.turned {
             return turned.kinetics.energy();
@@ -79,7 +79,7 @@ impl NodalEvaluation<'_> {
         0.5 * self.vbar.iter().zip(&self.w).map(|(v, w)| v * w).sum::<f64>()
     }
 
-    /// U = u'K u / 2.
+    /// Returns U = u'K u / 2.
     pub fn elastic_energy(&self) -> f64 {
         self.equations.elastic_energy(&self.u)
     }

@@ -1,4 +1,4 @@
-//! Points of a body among its nodes: where loads act and motion is read.
+//! Points of a body among its nodes, where loads act and motion is measured.
 
 use faer::{Mat, MatRef};
 use flexbody_base::error::Result;
@@ -9,21 +9,22 @@ use nalgebra::Vector3;
 /// Rows of the model with their weights in the three components of a vector.
 pub(super) type Weights = Vec<(usize, [f64; 3])>;
 
-/// A node, or the reference point of an interface: C_t and C_r, which take the displacement and the rotation
-/// vector of the point from the displacements u of all rows, in model axes. The forces b and torques t that
-/// do work on these are the nodal forces C_t'b + C_r't: [`BodyPoint`](crate::dynamics::BodyPoint)
-/// without modes, for Psi_t = C_t Psi and Psi_r = C_r Psi.
+/// Node, or reference point of an interface: the matrices C_t and C_r give its displacement and rotation
+/// vector from the displacements u of all rows, in model axes. Forces b and torques t at the point are the
+/// nodal forces C_t'b + C_r't. With Psi_t = C_t Psi and Psi_r = C_r Psi it corresponds to
+/// [`BodyPoint`](crate::dynamics::BodyPoint) without modes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalPoint {
-    /// Place in the undeformed model.
+    /// Position in the undeformed model.
     place: Vector3<f64>,
     pub(super) translation: Weights,
-    /// Empty where the point has no orientation.
+    /// Empty if the point has no orientation.
     pub(super) rotation: Weights,
 }
 
 impl NodalPoint {
-    /// Node `node` of `model`, by its index. It has an orientation where the node has rotations.
+    /// Creates a point at node `node` of `model`, given by its index. The point has an orientation if the
+    /// node has rotations.
     ///
     /// # Panics
     /// When the index is not below the number of nodes.
@@ -39,11 +40,12 @@ impl NodalPoint {
         }
     }
 
-    /// The reference point of the interface `name`: the rigid motion that fits that of its nodes best, as of
-    /// every coupling (theory (5.3)). `None` for an interface that does not exist or has no reference point.
+    /// Creates a point at the reference point of the interface `name`: the rigid motion that best fits the
+    /// motion of its nodes, for every coupling (theory (5.3)). Returns `None` if the interface does not
+    /// exist or has no reference point.
     ///
     /// # Errors
-    /// FB150 when the model has no interfaces at all.
+    /// FB150 if the model has no interfaces.
     pub fn interface(model: &FeModel, name: &str) -> Result<Option<Self>> {
         let set = model.interfaces().iter().find(|set| set.name == name);
         let Some(place) = set.and_then(|set| set.reference.point()) else { return Ok(None) };
@@ -58,27 +60,28 @@ impl NodalPoint {
         }))
     }
 
-    /// Place in the undeformed model, model axes.
+    /// Returns the position in the undeformed model, model axes.
     pub fn place(&self) -> Vector3<f64> {
         self.place
     }
 
-    /// Whether the point has an orientation.
+    /// Returns true if the point has an orientation.
     pub fn turns(&self) -> bool {
         !self.rotation.is_empty()
     }
 
-    /// C_t u, model axes.
+    /// Returns C_t u, model axes.
     pub fn displacement(&self, u: &[f64]) -> Vector3<f64> {
         sum(&self.translation, u)
     }
 
-    /// theta = C_r u, model axes; zero where the point has no orientation.
+    /// Returns theta = C_r u, model axes; zero if the point has no orientation.
     pub fn rotation(&self, u: &[f64]) -> Vector3<f64> {
         sum(&self.rotation, u)
     }
 
-    /// \[C_t', C_r'\] (N x 6, in the plane N x 3): nodal forces of unit forces and torques, model axes.
+    /// Returns \[C_t', C_r'\] (N x 6, in the plane N x 3): nodal forces of unit forces and torques, model
+    /// axes.
     pub fn unit_loads(&self, model: &FeModel) -> Mat<f64> {
         let d = model.dimension();
         let axes: &[usize] = if d == 2 { &[0, 1, 5] } else { &[0, 1, 2, 3, 4, 5] };
@@ -91,7 +94,7 @@ impl NodalPoint {
     }
 }
 
-/// The rows of `loads` that are not zero, its columns being components from `first` on.
+/// Returns the nonzero rows of `loads`, whose columns are the components from `first` on.
 fn weights(loads: MatRef<'_, f64>, first: usize) -> Weights {
     let row = |i: usize| {
         let mut own = [0.0; 3];

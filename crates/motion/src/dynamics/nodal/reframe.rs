@@ -1,26 +1,28 @@
-//! The same motion of the nodes, seen from the frame that the conditions ask for.
+//! Change of the frame of a nodal motion to the frame defined by the conditions.
 
 use super::equations::NodalEquations;
 use super::{NodalConfiguration, NodalError};
 use crate::dynamics::{EulerParameters, Orientation};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-/// Corrections of the frame: each takes a part of the size of the deformation of what the last has left.
+/// Limit of the corrections of the frame. Each correction reduces the remaining rigid motion by a factor of
+/// the size of the deformation.
 const MOST_CORRECTIONS: usize = 100;
 
-/// Rigid motion that is left, relative to the size of the body: rounding.
+/// Remaining rigid motion, relative to the size of the body, that counts as rounding.
 const CLOSE: f64 = 1e-14;
 
 impl NodalEquations<'_> {
-    /// The configuration with the same places and velocities of all nodes, whose displacements fulfil C u =
-    /// 0: how a state with mean axes, as modes have it, becomes one with held degrees of freedom.
+    /// Returns the configuration with equal positions and velocities of all nodes whose displacements
+    /// fulfil C u = 0. Use it to convert a state with mean axes, as given by modes, to a state with held
+    /// degrees of freedom.
     ///
-    /// The frame moves by d and turns by S, u becomes S'(x + u - d) - x. Models of displacements only: what K
-    /// and M say of nodal rotations and of rows without a place holds for small ones.
+    /// The frame moves by d and turns by S; u becomes S'(x + u - d) - x. For models of displacements only:
+    /// K and M treat nodal rotations and rows without a position as small.
     ///
     /// # Errors
-    /// [`NodalError::FrameTied`] when the model has other rows, [`NodalError::ConditionsViolated`] when no
-    /// frame was found: the deformation is too large.
+    /// [`NodalError::FrameTied`] if the model has other rows, [`NodalError::ConditionsViolated`] if no
+    /// frame was found because the deformation is too large.
     ///
     /// # Panics
     /// When a length is not N.
@@ -51,7 +53,7 @@ impl NodalEquations<'_> {
         let mut rates = vec![0.0; ud.len()];
         self.seen(ud, |_, ud| turn.inverse() * ud, &mut rates);
 
-        // In the axes of the frame.
+        // Convert to the axes of the frame.
         let to_frame = |v: Vector3<f64>| self.frame.axes.tr_mul(&v);
         let (shift, turn): (_, Matrix3<f64>) =
             (to_frame(shift), self.frame.axes.transpose() * turn.matrix() * self.frame.axes);
@@ -70,7 +72,7 @@ impl NodalEquations<'_> {
         })
     }
 
-    /// Displacements of all nodes by another rule.
+    /// Applies `rule` to the displacement of each node.
     fn seen(&self, from: &[f64], rule: impl Fn(usize, Vector3<f64>) -> Vector3<f64>, to: &mut [f64]) {
         let d = self.model.dimension();
         for (i, (from, to)) in from.chunks_exact(d).zip(to.chunks_exact_mut(d)).enumerate() {

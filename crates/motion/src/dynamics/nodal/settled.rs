@@ -1,4 +1,4 @@
-//! The deformation that stays as it is under what acts at time zero.
+//! Static equilibrium of the nodal deformation with the loads and the motion at a given time.
 
 use super::equations::products;
 use super::motions::{Motions, add_motion, sums};
@@ -7,26 +7,27 @@ use crate::integration::Failure;
 use flexbody_linalg::{MatrixSum, SparseLdl, larger};
 use nalgebra::Matrix6;
 
-/// Steps at the most, and what is near enough.
+/// Limit of the number of steps.
 const MOST_STEPS: usize = 300;
+/// Size of a step, relative to the largest displacement, at which the iteration ends.
 const SETTLED: f64 = 1e-12;
 
-/// Steps below this part that no longer shrink are rounding of K u.
+/// Relative size below which steps that no longer shrink are rounding of K u.
 const NEAR_ROUNDING: f64 = 1e-6;
 
-/// Steps that are rounding where nothing acts, relative to the extent of the body and the way that it flies while it
-/// swings by a radian.
+/// Step size that counts as rounding without loads, relative to the extent of the body plus the distance
+/// that it travels while it oscillates by one radian.
 const NOTHING: f64 = 1e-14;
 
-/// The shift of K, relative to the square of the first circular frequency: steps of a free body leave a tenth
-/// of the way to go, or less.
+/// Shift of K relative to the square of the first circular frequency. A step of a free body leaves one
+/// tenth of the remaining distance or less.
 const SHIFT: f64 = 0.1;
 
-/// That of a body that something holds, whose first frequency may be far below that of the free one: K with
-/// the conditions is definite by itself.
+/// Shift for a held body, whose first frequency may be far below that of the free body: K with the
+/// conditions is definite by itself.
 const SHIFT_HELD: f64 = 1e-3;
 
-/// Steps x with (K + sigma M) x = M u'' + C'mu, C x = 0.
+/// Solver of steps x with (K + sigma M) x = M u'' + C'mu, C x = 0.
 struct Steps {
     factor: SparseLdl,
     /// A = (K + sigma M)^-1 C', and (C A)^-1.
@@ -35,7 +36,8 @@ struct Steps {
 }
 
 impl Steps {
-    /// With sigma = `shift`. `None` where there is no factor, or the conditions depend on each other.
+    /// Creates the solver with sigma = `shift`. Returns `None` if the factorisation fails, or if the
+    /// conditions depend on each other.
     fn new(body: &NodalEquations<'_>, shift: f64) -> Option<Self> {
         let pencil = body.model.pencil();
         let terms = vec![(1.0, pencil.stiffness(), 1), (shift, pencil.mass(), pencil.block())];
@@ -51,7 +53,7 @@ impl Steps {
         Some(Self { factor, answered, inverse })
     }
 
-    /// Takes the forces to the step.
+    /// Replaces the forces by the step.
     fn solve(&self, body: &NodalEquations<'_>, forces: &mut [f64], scratch: &mut [f64]) {
         self.factor.solve_in_place(1, forces, scratch);
         let mu = self.inverse * sums(&body.conditions, forces);
@@ -60,14 +62,14 @@ impl Steps {
 }
 
 impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
-    /// `start` with the deformation that stays as it is under what acts at `time`: u'' = 0 with u' = 0, by
-    /// u += x with (K + sigma M) x = M u'' + C'mu and C x = 0.
+    /// Returns `start` with the deformation in equilibrium at `time`: u'' = 0 with u' = 0, by steps u += x
+    /// with (K + sigma M) x = M u'' + C'mu and C x = 0.
     ///
     /// * `softest`: square of the first circular frequency.
     ///
     /// # Errors
-    /// [`Failure::Rates`] where there is none: the spin takes the stiffness of some motion, or K is not
-    /// positive semidefinite.
+    /// [`Failure::Rates`] if there is no equilibrium: the spin removes the stiffness of some motion, or K
+    /// is not positive semidefinite.
     pub fn settled(
         &mut self,
         time: f64,
@@ -89,6 +91,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
             let state = body
                 .state(&settled)
                 .map_err(|_| lost("the deformation does not fulfil the reference conditions"))?;
+            // Residual M u'' with u' = 0, and the step (K + sigma M) x = M u'' + C'mu.
             self.accelerations(time, &state, &mut acceleration)?;
             body.weigh(&acceleration, &mut step);
             steps.solve(body, &mut step, &mut scratch);
@@ -97,6 +100,7 @@ impl<'e, L: FnMut(f64, &mut NodalEvaluation<'e>)> NodalMotion<'e, L> {
                 return Ok(settled);
             }
             settled.u.iter_mut().zip(&step).for_each(|(u, step)| *u += step);
+            // Accept a small step, or one at rounding level that no longer shrinks.
             let (size, largest) = (size(&step), size(&settled.u));
             if size <= SETTLED * largest || (size <= NEAR_ROUNDING * largest && size > 0.5 * before) {
                 return Ok(settled);

@@ -7,21 +7,20 @@ use crate::dynamics::{EulerParameters, Orientation};
 use flexbody_linalg::quadratic_form;
 use nalgebra::Vector3;
 
-/// Largest rigid motion in displacements that is rounding, relative to the largest of them.
+/// Rigid motion in displacements, relative to the largest displacement, that counts as rounding.
 const ROUNDING: f64 = 1e-8;
 
-/// Rigid motion in displacements, relative to the extent of the body, that is the rounding of positions.
+/// Rigid motion in displacements, relative to the extent of the body, that counts as rounding of positions.
 const ROUNDING_OF_POSITIONS: f64 = 1e-12;
 
-/// Where in a state y = (G, D, e, P, L, u, w) each part but the first begins.
+/// First index of each part but the first in a state y = (G, D, e, P, L, u, w).
 pub(super) const OFFSET: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
 pub(super) const LINEAR: usize = 10;
 pub(super) const ANGULAR: usize = 13;
 pub(super) const DISPLACEMENTS: usize = 16;
 
-/// A state in the velocities that a reader thinks in:
-/// [`Configuration`](crate::dynamics::Configuration) with nodal displacements.
+/// State in velocities: a [`Configuration`](crate::dynamics::Configuration) with nodal displacements.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NodalConfiguration {
     /// Origin of the body frame, world axes.
@@ -34,26 +33,26 @@ pub struct NodalConfiguration {
     pub omega: Vector3<f64>,
     /// Displacements relative to the frame (N), in the rows and axes of the model.
     pub u: Vec<f64>,
-    /// Their rates (N).
+    /// Rates of the displacements (N).
     pub ud: Vec<f64>,
 }
 
 impl NodalEquations<'_> {
-    /// Number of entries of a state y = (G, D, e, P, L, u, w): 16 + 2 N. The frame has its origin at R = G +
-    /// D and the Euler parameters e; P is the linear momentum, L the angular momentum about G, which starts
-    /// at R and flies with P / m; all in world axes. P and L of a free body are constant entries, which every
-    /// method keeps to rounding.
+    /// Returns the number of entries of a state y = (G, D, e, P, L, u, w): 16 + 2 N. The frame has its
+    /// origin at R = G + D and the Euler parameters e. P is the linear momentum, L the angular momentum
+    /// about G, which starts at R and moves with P / m; all in world axes. P and L of a free body are
+    /// constant entries, which every method conserves to rounding.
     pub fn dimension(&self) -> usize {
         DISPLACEMENTS + 2 * self.n_rows()
     }
 
-    /// The state y of a configuration.
+    /// Returns the state y of a configuration.
     ///
-    /// What carries no mass is set to where the rest takes it. Rigid motion in u' is taken as that of the
-    /// body: the velocities that a state has leave C u' = 0.
+    /// Massless motions are set to static equilibrium. Rigid motion in u' is attributed to the frame: the
+    /// velocities in a state fulfil C u' = 0.
     ///
     /// # Errors
-    /// [`NodalError::ConditionsViolated`] when C u is not zero to rounding.
+    /// [`NodalError::ConditionsViolated`] if C u is not zero to rounding.
     ///
     /// # Panics
     /// When a length is not N.
@@ -69,7 +68,7 @@ impl NodalEquations<'_> {
         let largest = u.iter().fold(0.0f64, |m, u| m.max(u.abs()));
         let moved = taken.fixed_rows::<3>(0).amax().max(taken.fixed_rows::<3>(3).amax() * self.length);
         let allowed = (ROUNDING * largest).max(ROUNDING_OF_POSITIONS * self.length);
-        // The sizes ignore what is no number, which is no displacement.
+        // The maxima ignore NaN, so that it must be checked separately.
         if taken.iter().any(|part| part.is_nan()) || moved > allowed {
             return Err(NodalError::ConditionsViolated { part: moved / largest });
         }
@@ -98,7 +97,7 @@ impl NodalEquations<'_> {
         Ok(state)
     }
 
-    /// Parts of a state: that of the frame, u and w.
+    /// Returns the parts of a state: frame, u and w.
     pub(super) fn parts<'s>(&self, state: &'s [f64]) -> (&'s [f64], &'s [f64], &'s [f64]) {
         assert_eq!(state.len(), self.dimension(), "a state of these equations");
         let (frame, nodes) = state.split_at(DISPLACEMENTS);
@@ -106,16 +105,16 @@ impl NodalEquations<'_> {
         (frame, u, w)
     }
 
-    /// u'K u / 2 of displacements u (N), model axes.
+    /// Returns u'K u / 2 for displacements u (N), model axes.
     ///
     /// # Panics
-    /// When `u` does not have N entries.
+    /// When the length of `u` is not N.
     pub fn elastic_energy(&self, u: &[f64]) -> f64 {
         0.5 * quadratic_form(self.stiffness(), u)
     }
 }
 
-/// The Euler parameters of a state.
+/// Returns the Euler parameters of a state.
 pub(super) fn attitude(frame: &[f64]) -> EulerParameters {
     EulerParameters([frame[ATTITUDE], frame[ATTITUDE + 1], frame[ATTITUDE + 2], frame[ATTITUDE + 3]])
 }

@@ -1,4 +1,4 @@
-//! The stiff part of the nodal equations, as implicit steps solve it.
+//! Stiff part of the nodal equations, for implicit steps.
 
 use super::equations::NodalEquations;
 use super::state::DISPLACEMENTS;
@@ -7,38 +7,38 @@ use flexbody_linalg::{MatrixSum, Scalar, SparseLdl, multiply_vector};
 use flexbody_model::Damping;
 use nalgebra::Complex;
 
-/// M + z D + z^2 K is singular to rounding, or too large for its ordering.
+/// Failure for M + z D + z^2 K that is singular to rounding, or too large for its ordering.
 const SINGULAR: Failure = Failure::Rates {
     reason: "mass, damping and stiffness of the nodes cannot be factored for implicit steps",
 };
 
-/// u' = P M^-1 w, w' = -K u - D u' with P = I - R (C R)^-1 C: what is linear and fast in the nodal equations,
-/// solved in the eigenvalues mu of an implicit method with the step h. What the stages lack, (a, b) in (u,
-/// w), is corrected by
+/// Linear and fast part of the nodal equations, u' = P M^-1 w, w' = -K u - D u' with P = I - R (C R)^-1 C,
+/// solved for the eigenvalues mu of an implicit method with the step h. The residuals (a, b) of the stages
+/// in (u, w) are corrected by
 ///
 /// ```text
 /// (M + z D + z^2 K) x = z b + M a + z D a,    z = h mu,    u: P x,    w: M (x - a) / z
 /// ```
 ///
-/// where K R = 0 and D R = 0, D being the damping of the model; that of modes is left to the iteration. This
-/// is what is linear with mean axes; other conditions leave a constraint in M^-1 w that is left to the
-/// iteration too, which then asks for steps below the shortest period.
+/// where K R = 0 and D R = 0. D is the damping of the model; modal damping is left to the iteration. This
+/// is the linear part for mean axes. Other conditions leave a constraint in M^-1 w to the iteration too,
+/// which then needs steps below the shortest period.
 #[derive(Debug)]
 pub(super) struct Stiff<'m> {
     equations: &'m NodalEquations<'m>,
-    /// Step that the factors are for.
+    /// Step length of the factors.
     step: f64,
     factors: Vec<StepFactor>,
-    /// Corrections of u and w of every stage.
+    /// Corrections of u and w for every stage.
     corrected: Vec<Vec<f64>>,
-    /// Lacks and products in an eigenvalue: real and imaginary parts.
+    /// Residuals and products for an eigenvalue: real and imaginary parts.
     parts: [Vec<f64>; 4],
     product: Vec<f64>,
     real: [Vec<f64>; 2],
     complex: [Vec<Complex<f64>>; 2],
 }
 
-/// M + z D + z^2 K.
+/// Factor of M + z D + z^2 K.
 #[derive(Debug)]
 enum StepFactor {
     Real(SparseLdl),
@@ -59,8 +59,8 @@ impl<'m> Stiff<'m> {
         }
     }
 
-    /// Corrections in place of what the stages lack; their energy, u'K u / 2 + w'M^-1 w / 2, on an average
-    /// over the stages, at the most.
+    /// Replaces the residuals of the stages by corrections. Returns an upper bound of the mean energy of
+    /// the corrections over the stages, u'K u / 2 + w'M^-1 w / 2.
     pub(super) fn correct(
         &mut self,
         h: f64,
@@ -72,8 +72,8 @@ impl<'m> Stiff<'m> {
             self.prepare(h, modes, lacks.len())?;
         }
         self.corrected.iter_mut().for_each(|stage| stage.fill(0.0));
-        // Square roots of the energies of the stages: those of the parts, of which a pair counts twice, add
-        // up at the most.
+        // Bound the square roots of the energies of the stages by the sum of those of the parts; a
+        // conjugate pair counts twice.
         let mut roots = [0.0; STAGES];
         for (at, mode) in modes.iter().enumerate() {
             self.gather(mode, lacks);
@@ -108,7 +108,7 @@ impl<'m> Stiff<'m> {
         Ok(())
     }
 
-    /// M + z D + z^2 K.
+    /// Returns the sum M + z D + z^2 K.
     fn sum<T: Scalar>(&self, z: T) -> MatrixSum<'m, T> {
         let model = self.equations.model;
         let pencil = model.pencil();
@@ -126,7 +126,7 @@ impl<'m> Stiff<'m> {
         MatrixSum::new(terms)
     }
 
-    /// What the stages lack in an eigenvalue: real and imaginary part of a, then of b.
+    /// Computes the residual for an eigenvalue: real and imaginary part of a, then of b.
     fn gather(&mut self, mode: &StageMode, lacks: &[Vec<f64>]) {
         let n = self.equations.n_rows();
         self.parts.iter_mut().for_each(|part| part.fill(0.0));
@@ -142,7 +142,8 @@ impl<'m> Stiff<'m> {
         }
     }
 
-    /// (a, b) <- (P x, M (x - a) / z), x from the factor; x*K x / 2 + (x - a)*M (x - a) / (2 |z|^2).
+    /// Computes (a, b) <- (P x, M (x - a) / z) with x from the factor; returns x*K x / 2 + (x - a)*M (x -
+    /// a) / (2 |z|^2).
     fn solve(&mut self, at: usize, z: Complex<f64>) -> f64 {
         let Self { equations, factors, parts: [a_re, a_im, b_re, b_im], product, real, complex, .. } = self;
         match &factors[at] {
@@ -164,7 +165,7 @@ impl<'m> Stiff<'m> {
                 for ((x, re), im) in x.iter_mut().zip(&*b_re).zip(&*b_im) {
                     *x = z * Complex::new(*re, *im);
                 }
-                // M a, then D a.
+                // Add M a, then z D a.
                 equations.weigh(a_re, product);
                 equations.weigh(a_im, more);
                 add_complex(Complex::new(1.0, 0.0), product, more, x);
@@ -190,7 +191,7 @@ impl<'m> Stiff<'m> {
         }
     }
 
-    /// Gives the parts back to the stages.
+    /// Distributes the parts to the stages.
     fn spread(&mut self, mode: &StageMode) {
         let n = self.equations.n_rows();
         let twice = if mode.paired { 2.0 } else { 1.0 };
@@ -211,7 +212,7 @@ fn factored<T: Scalar>(sum: &MatrixSum<'_, T>, equations: &NodalEquations<'_>) -
     SparseLdl::of_sum(sum, &equations.model.pencil())
 }
 
-/// y = D x with the damping of the model; whether there is any.
+/// Computes y = D x with the damping of the model; returns true if the model has damping.
 fn damp(equations: &NodalEquations<'_>, x: &[f64], y: &mut [f64], room: &mut [f64]) -> bool {
     match equations.damping {
         Some(Damping::Rayleigh { alpha, beta }) => {
@@ -228,7 +229,7 @@ fn damp(equations: &NodalEquations<'_>, x: &[f64], y: &mut [f64], room: &mut [f6
     }
 }
 
-/// y = (M + z D) x for a real z.
+/// Computes y = (M + z D) x for a real z.
 fn weigh_damped(equations: &NodalEquations<'_>, z: f64, x: &[f64], y: &mut [f64], room: [&mut Vec<f64>; 2]) {
     let [damped, room] = room;
     equations.weigh(x, y);
@@ -237,17 +238,17 @@ fn weigh_damped(equations: &NodalEquations<'_>, z: f64, x: &[f64], y: &mut [f64]
     }
 }
 
-/// x'y / 2.
+/// Returns x'y / 2.
 fn half_product(x: &[f64], y: &[f64]) -> f64 {
     0.5 * x.iter().zip(y).map(|(x, y)| x * y).sum::<f64>()
 }
 
-/// y += factor x.
+/// Computes y += factor x.
 fn add(factor: f64, x: &[f64], y: &mut [f64]) {
     y.iter_mut().zip(x).for_each(|(y, x)| *y += factor * x);
 }
 
-/// y += factor (re + i im).
+/// Computes y += factor (re + i im).
 fn add_complex(factor: Complex<f64>, re: &[f64], im: &[f64], y: &mut [Complex<f64>]) {
     for ((y, re), im) in y.iter_mut().zip(re).zip(im) {
         *y += factor * Complex::new(*re, *im);

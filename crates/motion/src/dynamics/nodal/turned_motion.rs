@@ -8,8 +8,8 @@ use crate::integration::Failure;
 use nalgebra::{Vector3, Vector6};
 
 impl NodalEvaluation<'_> {
-    /// Goes on from the displacements and w of a state with the momenta (p, h) along what is free; p, h and w are
-    /// then those of the motion that follows.
+    /// Sets the velocities from the displacements and w of a state and the momenta (p, h) along free
+    /// components; afterwards p, h and w are those of the resulting motion.
     pub(super) fn set_turned(&mut self, given: &Given, momenta: &Vector6<f64>) -> Result<(), Failure> {
         let body = self.equations;
         let Some(turned) = &mut self.turned else { return Ok(()) };
@@ -25,11 +25,11 @@ impl NodalEvaluation<'_> {
         Ok(())
     }
 
-    /// V' and omega' in the axes of the frame, and u'' (N), with the `given` rates. Sets lambda, and the reaction
-    /// of what drives the frame.
+    /// Computes V' and omega' in the axes of the frame, and u'' (N), with the `given` rates. Sets lambda,
+    /// and the reaction of driving forces on the frame.
     ///
-    /// With the forces g on the rows and the drifts d and e of w and (p, h) at constant velocities, M(u) v = g - d
-    /// + C'(B'C')^-1 ((p', h') - e - B'(g - d)) for v = B (V', omega') + u''.
+    /// With the forces g on the rows and the drifts d and e of w and (p, h) at constant velocities, M(u) v =
+    /// g - d + C'(B'C')^-1 ((p', h') - e - B'(g - d)) for v = B (V', omega') + u''.
     pub(super) fn turned_accelerations(
         &mut self,
         given: &Given,
@@ -54,7 +54,7 @@ impl NodalEvaluation<'_> {
         for ((rest, drift), force) in self.second.iter_mut().zip(&self.first).zip(&self.w_rate) {
             *rest += drift - force;
         }
-        // What is left is C'lambda.
+        // The remainder is C'lambda.
         self.multipliers = body.rigid_part.tr_mul(&sums(&body.rigid, &self.second));
         if let Some(drive) = &mut self.drive {
             let taken = rates + drift - wanted;
@@ -65,7 +65,7 @@ impl NodalEvaluation<'_> {
         Ok((to_frame * linear, to_frame * angular))
     }
 
-    /// The forces for the accelerations nu = (V', omega') in model axes and u'', as
+    /// Computes the forces for the accelerations nu = (V', omega') in model axes and u'', as
     /// [`NodalEvaluation::balance`] returns them.
     pub(super) fn turned_balance(
         &mut self,
