@@ -40,7 +40,7 @@ impl<'a> InterfaceMatrices<'a> {
                 return refuse(body.conditions().to_string(), help);
             }
             let what = "the body has free modes only".to_owned();
-            return refuse(what, "make it anew: flexbody convert --basis craig-bampton");
+            return refuse(what, "convert it again: flexbody convert --basis craig-bampton");
         };
         if body.dimension() != 3 {
             return refuse(
@@ -49,7 +49,7 @@ impl<'a> InterfaceMatrices<'a> {
             );
         }
         if let Some(free) = body.interfaces().iter().find(|interface| interface.reference.is_none()) {
-            let help = "couple the interface rigidly or by averaging, and make the body anew";
+            let help = "couple the interface rigidly or by averaging, and convert the body again";
             return refuse(format!("the interface `{}` is free and has none", free.name), help);
         }
         let frames: Vec<(&str, [f64; 3])> = body
@@ -66,7 +66,7 @@ impl<'a> InterfaceMatrices<'a> {
             && names.iter().skip(6 * frames.len()).all(modal);
         if !fits {
             let what = "the coordinates of the body are not those of its interfaces".to_owned();
-            return refuse(what, "make it anew: flexbody convert --basis craig-bampton");
+            return refuse(what, "convert it again: flexbody convert --basis craig-bampton");
         }
         let damping = losses::is_damped(body).then(|| {
             let weighted = combine(coordinates.mass.as_ref(), coordinates.of_modes.as_ref());

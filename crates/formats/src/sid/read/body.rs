@@ -76,7 +76,7 @@ pub(crate) fn body(
     terms.accelerated();
     if frames.iter().any(has_own_axes) {
         terms.notes.push(
-            "frames have axes other than those of the body (AP), which a body of ours does not hold"
+            "frames have axes other than those of the body (AP), which a flex-body file does not hold"
                 .to_owned(),
         );
     }
