@@ -1,20 +1,20 @@
-//! The answer of the eigen-solver where there are no modes to be trusted.
+//! The failures of the eigen-solver: reasons why there are no trustworthy modes.
 
 use faer::Mat;
 use std::fmt;
 
-/// Why there is no trustworthy result.
+/// Reason why there is no trustworthy result.
 #[derive(Debug, Clone)]
 pub enum EigenFailure {
-    /// `converged` of `wanted` modes converged within the allowed restarts.
+    /// Only `converged` of `wanted` modes converged within the allowed restarts or rounds.
     NotConverged {
-        /// Modes that did converge.
+        /// Number of converged modes.
         converged: usize,
-        /// Modes asked for.
+        /// Number of requested modes.
         wanted: usize,
     },
-    /// Failure of a search with a single-precision factor, where double precision was not allowed or does
-    /// not fit: often it says nothing about the model.
+    /// Failure of a search with a single-precision factor, where double precision was not allowed or does not fit the
+    /// memory or time. The cause is often the precision and not the model.
     SinglePrecision(Box<EigenFailure>),
     /// K + tau M is not positive definite: K or M is indefinite.
     NotPositiveDefinite {
@@ -25,7 +25,7 @@ pub enum EigenFailure {
     NegativeEigenvalue {
         /// The eigenvalue.
         eigenvalue: f64,
-        /// Its vector (N).
+        /// Eigenvector (N x 1).
         vector: Mat<f64>,
     },
     /// M has a negative direction beyond rounding.
@@ -39,18 +39,18 @@ pub enum EigenFailure {
         /// Their shapes (N x as many as were resolved).
         vectors: Mat<f64>,
     },
-    /// The inertia count contradicts the modes found, also after another search.
+    /// The inertia count contradicts the number of modes found, also after a repeated search.
     CountDiffers {
-        /// Modes found below the shift.
+        /// Number of modes found below the shift.
         found: usize,
-        /// Modes that the count says there are.
+        /// Number of modes below the shift by the count.
         counted: usize,
         /// The shift.
         shift: f64,
     },
     /// A factorisation is useless (element growth, overflow).
     Inaccurate {
-        /// Probe residual.
+        /// Relative residual of a test solve, or of a response.
         residual: f64,
     },
     /// The modes are sound, but no bounds of the eigenvalues can be guaranteed.
@@ -58,23 +58,23 @@ pub enum EigenFailure {
         /// The reason.
         why: &'static str,
     },
-    /// The search needs more memory than there is.
+    /// The search needs more memory than is available.
     Memory {
         /// Bytes needed.
         bytes: u64,
-        /// Bytes there are.
+        /// Bytes available.
         available: u64,
     },
-    /// The search takes longer than it may.
+    /// The search takes longer than the limit of the context.
     TooLong {
-        /// Modes that are wanted, of those that there are.
+        /// Number of wanted modes, at most the number of flexible modes.
         wanted: usize,
         /// Seconds that the search takes, estimated for one processor.
         seconds: f64,
         /// Bytes needed.
         bytes: u64,
     },
-    /// The pencil is too large for the ordering's 32-bit numbers.
+    /// The pencil is too large for the 32-bit indices of the ordering.
     TooLarge,
 }
 
