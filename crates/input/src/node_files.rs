@@ -1,5 +1,4 @@
-//! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its
-//! content.
+//! Files with node positions: tables, and files of FE programs and meshers. Each format is recognised by its content.
 
 mod ansys_axes;
 mod ansys_list;
@@ -24,13 +23,13 @@ use std::collections::HashSet;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// A format of node files besides our table.
+/// Format of node files besides the table of this program.
 struct Format {
     recognises: fn(&str) -> bool,
     read: fn(&InputFile) -> Found<NodeFile>,
 }
 
-/// The first that recognises the begin of a file reads it.
+/// Formats of node files. The first that recognises the beginning of a file reads it.
 const FORMATS: &[Format] = &[
     Format { recognises: gmsh::recognises, read: gmsh::read },
     Format { recognises: vtk_xml::recognises, read: vtk_xml::read },
@@ -42,10 +41,10 @@ const FORMATS: &[Format] = &[
     Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
 ];
 
-/// Number of bytes that formats are told by.
+/// Number of bytes by which formats are recognised.
 const HEAD: usize = 4096;
 
-/// Reads the nodes of a file; in the plane z is zero.
+/// Reads the nodes of a file; z is zero in the plane.
 ///
 /// # Errors
 /// FB102 for compressed files; FB106, FB203 to FB206 for tables; FB110, FB111, FB115, FB205 for other files.

@@ -1,5 +1,5 @@
-//! What the rows of matrices stand for that do not name them: those of OUTPUT4 follow the points in ascending
-//! order, six to a grid and one to a scalar point, less what the set of the matrix does not have.
+//! The labels of matrix rows without names: rows of OUTPUT4 follow the points in ascending order, six per grid and one
+//! per scalar point, without the points outside the set of the matrix.
 
 use super::bulk::Bulk;
 use crate::dmig::Point;
@@ -7,17 +7,17 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// True if matrices of `n` rows may be those of a set of the deck.
+/// Returns true when matrices of `n` rows may be those of a set of the deck.
 pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
     bulk.resequenced || points(bulk, n, "", Path::new("")).is_ok()
 }
 
-/// Points of the rows of matrices with `n` rows: the g-set, the a-set of the deck, the g-set without what follows
-/// others by constraints, without what supports hold as well, or the displacements where all elements are solids;
-/// the first that has as many.
+/// Returns the points of the rows of matrices with `n` rows. The first set with this number of rows is chosen among:
+/// the g-set, the a-set of the deck, the g-set without dependent points, this one without supported points, and the
+/// displacements if all elements are solids.
 ///
 /// # Errors
-/// FB112 when none has.
+/// FB112 if no set has this number.
 pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<Vec<Point>, Diagnostic> {
     if bulk.resequenced {
         let message = "SEQGP changes the order of the rows, which OUTPUT4 does not name";
