@@ -83,7 +83,7 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile>
     Ok(read)
 }
 
-/// Whether a file is a keyword deck: its first line that is no comment is a keyword.
+/// Returns true when a file is a keyword deck: its first line that is no comment is a keyword.
 fn is_deck(head: &str) -> bool {
     let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
     first
@@ -94,17 +94,17 @@ fn bulk(file: &InputFile) -> Found<NodeFile> {
     nodes_of_bulk(file.path())
 }
 
-/// FB115 at a line.
+/// Returns FB115 at a line.
 fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
 }
 
-/// FB115 for a line that is not what was expected.
+/// Returns FB115 for a line of an unexpected form.
 fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
     vec![expected(Code::NodeFileSyntax, what, found).in_file(file.path()).at_line(line)]
 }
 
-/// FB115 of a file without lines.
+/// Returns FB115 about a file without lines.
 fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
 }

@@ -30,7 +30,7 @@ pub(super) struct Grid {
     pub system: Option<i64>,
     pub x: [f64; 3],
     pub axes: Option<i64>,
-    /// True if the card has its permanent constraints (field PS).
+    /// True if the field PS (permanent constraints) of the card is not empty.
     pub has_support_field: bool,
     /// Components held by the card.
     pub held: Vec<u8>,
