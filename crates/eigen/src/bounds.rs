@@ -37,11 +37,11 @@ const SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 ///
 /// * `vectors` (N x m, m > 0): nearly M-orthonormal approximate modes, one for every flexible eigenvalue
 ///   below `high`.
-/// * `eigenvalues`: their approximate eigenvalues, ascending.
 /// * `eigenvalues`: approximate eigenvalues of `vectors`, ascending.
 /// * `high`: shift above all of `eigenvalues`; an inertia count found m flexible eigenvalues and the rigid ones below
 ///   it.
 /// * `gap`: relative gap between clusters, see [`clusters`].
+///
 /// # Errors
 /// [`EigenFailure::CountDiffers`] if the number of eigenvalues below half the first flexible one is not the number of
 /// rigid modes; [`EigenFailure::NotCertified`] if K + tau M cannot be proved positive definite in f64, or if bounds

@@ -11,10 +11,10 @@ use flexbody_linalg::{Analysis, Indefinite, Inertia};
 /// Backward error above which element growth may have spoilt a count in double precision.
 const GROWTH_LIMIT: f64 = 1e-4;
 
-/// Distance of a shift from an eigenvalue, relative to [`size_along`] its mode, below which no count in single
-/// precision is made. A smaller value makes single-precision counts that rounding may spoil. Measured on cubes and
-/// blocks: the norm of G of [`Indefinite::perturbation`](flexbody_linalg::Indefinite::perturbation) is 4.5e-7 over this
-/// distance.
+/// Distance of a shift from an eigenvalue, relative to [`size_along`] its mode, below which the count is made in double
+/// precision, if that fits the memory. With a smaller value rounding may spoil counts in single precision. Measured on
+/// cubes and blocks: the norm of G of [`Indefinite::perturbation`](flexbody_linalg::Indefinite::perturbation) is 4.5e-7
+/// over this distance.
 pub(super) const NEAR: f64 = 2e-6;
 
 /// Returns the size of K - sigma M along a mode psi: psi' diag(K + sigma M) psi. Rounding moves the eigenvalue of the
@@ -34,7 +34,7 @@ pub enum Proof {
     NotProved,
 }
 
-/// Knowledge about missed modes.
+/// Proof that no mode is missing, or the reason why there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Completeness {
     /// State of the proof.

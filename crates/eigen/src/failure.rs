@@ -21,7 +21,7 @@ pub enum EigenFailure {
         /// The shift tau.
         shift: f64,
     },
-    /// A negative eigenvalue beyond noise.
+    /// An eigenvalue is negative beyond noise.
     NegativeEigenvalue {
         /// The eigenvalue.
         eigenvalue: f64,
@@ -32,11 +32,11 @@ pub enum EigenFailure {
     MassIndefinite,
     /// Flexible modes without strain energy: a mechanism or several bodies.
     ZeroEnergy {
-        /// Number of such modes beside the rigid ones.
+        /// Number of zero-energy modes beside the rigid ones.
         count: usize,
-        /// Their eigenvalues as computed.
+        /// Computed eigenvalues of the zero-energy modes.
         eigenvalues: Vec<f64>,
-        /// Their shapes (N x as many as were resolved).
+        /// Shapes of the resolved zero-energy modes (N x number of them).
         vectors: Mat<f64>,
     },
     /// The inertia count contradicts the number of modes found, also after a repeated search.
@@ -50,10 +50,10 @@ pub enum EigenFailure {
     },
     /// A factorisation is useless (element growth, overflow).
     Inaccurate {
-        /// Relative residual of a test solve, or of a response.
+        /// Relative residual or backward error that was found; NaN if there is none.
         residual: f64,
     },
-    /// The modes are sound, but no bounds of the eigenvalues can be guaranteed.
+    /// The modes are accurate, but no bounds of the eigenvalues can be guaranteed.
     NotCertified {
         /// The reason.
         why: &'static str,

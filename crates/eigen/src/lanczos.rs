@@ -217,7 +217,7 @@ impl Ritz {
     }
 
     /// Returns an estimate of the K-residual of pair i. With x = OP V s / theta and r = V_fresh B s, K x - lambda M x =
-    /// -M r / theta^2; M-norms stand for the Euclidean norms.
+    /// -M r / theta^2; M-norms replace the Euclidean norms.
     fn estimate(&self, i: usize) -> f64 {
         let theta = self.theta[i];
         0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta)).abs().max(SMALLEST_PART * theta.abs())

@@ -39,12 +39,12 @@ impl<'a> EigenProblem<'a> {
     /// multiplied twice by (K + tau M)^-1 M and freed of `rigid`; their Rayleigh quotient is an upper bound of it. K
     /// and M count as exact. This factor also fills `order`, where the search finds its elimination order.
     ///
+    /// # Errors
     /// [`TooLarge`](EigenFailure::TooLarge) if the pencil has no ordering;
     /// [`NotPositiveDefinite`](EigenFailure::NotPositiveDefinite) if K + tau M has no Cholesky factor.
-    /// Cholesky factor.
     ///
+    /// # Panics
     /// If the number of rows of `rigid` differs from that of the pencil.
-    /// When `rigid` has another number of rows than the pencil.
     pub fn new(
         pencil: Pencil<'a>,
         rigid: MatRef<'a, f64>,

@@ -314,6 +314,7 @@ pub(super) fn refine(
         if least.is_nan() || least <= 1.0 {
             break;
         }
+        // Only the modes above the tolerance are iterated; Rayleigh-Ritz then acts on all modes.
         let poor: Vec<usize> =
             (0..best.residuals.len()).filter(|&i| best.excess_of(i, tolerance) > 1.0).collect();
         let mut x = best.vectors.clone();
@@ -327,6 +328,7 @@ pub(super) fn refine(
         if excess < least {
             best = refined;
         }
+        // A round that does not halve the excess is the last one.
         if excess.is_nan() || excess > 0.5 * least {
             break;
         }

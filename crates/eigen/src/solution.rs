@@ -41,7 +41,7 @@ pub struct EigenSolution {
     pub residuals: Vec<f64>,
     /// K-residual of each mode that rounding alone explains.
     pub rounding_floors: Vec<f64>,
-    /// Knowledge about missed modes.
+    /// Proof that no mode is missing, or the reason why there is none.
     pub completeness: Completeness,
     /// Attempts with memory and precision, as planned and as they ended; `None` for the dense path.
     pub plan: Option<Plan>,

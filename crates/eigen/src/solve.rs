@@ -114,6 +114,7 @@ fn find_all(
         if there > counted || round == ROUNDS {
             return Err(EigenFailure::CountDiffers { found: there, counted, shift: completeness.shift });
         }
+        // The next search asks for the missing modes as well.
         asked = wanted + counted - there;
     }
 }
@@ -236,6 +237,7 @@ fn finish(
     (wanted, plan): (usize, Plan),
 ) -> Result<EigenSolution, EigenFailure> {
     let mut modes = search.refined;
+    // Rotated or moved modes get new residuals.
     let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
     canonical_basis(modes.vectors.as_mut(), &groups);
     if let Some(bounds) = &bounds {

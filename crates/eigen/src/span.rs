@@ -167,6 +167,7 @@ fn count(
     if !is_positive_semidefinite(&problem.pencil, analysis) {
         return Err(EigenFailure::MassIndefinite);
     }
+    // The smaller distance is used if the larger one counts too many.
     let mut counted = (last, 0);
     for above in ABOVE {
         let shift = (1.0 + above) * last;

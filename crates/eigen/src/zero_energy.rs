@@ -95,11 +95,13 @@ pub fn unresisted_motions(pencil: &Pencil<'_>, tau: f64, input_error: f64) -> Op
     let with = |stiffness: &SymmetricMatrix| {
         Inertia::new(&analysis, &Pencil::new(stiffness, pencil.mass(), pencil.block()), -tau)
     };
+    // Eigenvalues mu between -delta and delta become negative in one pencil and positive in the other.
     let (lowered, raised) = (moved(-delta)?, moved(delta)?);
     let count = with(&lowered).negative;
     if count == 0 || with(&raised).negative > 0 {
         return None;
     }
+    // Inverse iteration on the positive definite pencil resolves some of the motions.
     let raised = Pencil::new(&raised, pencil.mass(), pencil.block());
     let factor = Cholesky::<f64>::new(&analysis, &raised, tau)?;
     let start = |i: usize, j: usize| ((i + 1) as f64 * (j as f64 + 1.37) * 0.754_877_666).fract() - 0.5;

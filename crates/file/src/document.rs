@@ -239,7 +239,7 @@ fn of_group(held: TermGroup) -> Value {
 }
 
 /// Returns the schema of the member group `key`, creating it if necessary. `required` is false for groups that files of
-/// older minor versions lack.
+/// older minor versions do not have.
 fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));

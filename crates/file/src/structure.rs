@@ -10,7 +10,7 @@ use hdf5_metno as hdf5;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Depth of groups above which a file is refused: no format version has deeper ones.
+/// Depth of groups above which members are left out: no format version has deeper groups.
 const DEEPEST: usize = 8;
 
 /// Number of members above which a file is refused. Groups may contain themselves, so that even a small file can have

@@ -210,12 +210,14 @@ impl Counted {
         let list = List::new(pieces, stored);
         let mut col_ptr = vec![0usize; n + 1];
         let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
+        // Each task counts the entries of its columns.
         col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
             let first = task * width;
             list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
         });
         add_up(&mut col_ptr);
         let entries = col_ptr[n];
+        // Each task then puts the entries of its columns in file order, and sorts the columns.
         let (mut row_idx, mut values) = (vec![0u32; entries], vec![0.0f64; entries]);
         let fill = |block: ColumnBlock<'_>| {
             let (first, end) = (block.columns.start, block.columns.end);
@@ -424,6 +426,7 @@ fn merge_duplicates(
     row_idx: &mut Vec<u32>,
     values: &mut Vec<f64>,
 ) -> Result<(), (u32, u32)> {
+    // Entries are read at `from` and written at `to`, which never passes it.
     let (mut from, mut to) = (0, 0);
     for j in 0..col_ptr.len() - 1 {
         let end = col_ptr[j + 1];

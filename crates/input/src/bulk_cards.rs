@@ -332,6 +332,7 @@ impl<'t> BulkReader<'t> {
         let line = Line::of(line);
         let head = line.head();
         let here = |diagnostic: Diagnostic| diagnostic.in_file(at.path).at_line(at.line);
+        // A line of replication makes cards from the last one.
         match Replication::asked(&line).map_err(here)? {
             None => {}
             Some(Asked::One(replication)) => {
@@ -346,6 +347,7 @@ impl<'t> BulkReader<'t> {
                 Diagnostic::new(Code::DeckSyntax, message).in_file(at.path).at_line(at.line)
             };
             let (name, card) = (bare(head).to_ascii_uppercase(), &self.card);
+            // A continuation elsewhere is stored until the end of the file; others must follow their card.
             let is_below = self.is_open && !name.is_empty() && name == card.continuation;
             if !is_below && self.apart.keep(&name, &line.text, at.line) {
                 return Ok(());

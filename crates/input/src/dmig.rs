@@ -208,8 +208,8 @@ impl Dmigs {
     /// name. Its entries are moved out: the matrix can be taken once.
     ///
     /// # Errors
-    /// FB302 for matrices that are not square, FB307 for an undeclared triangle, FB309 for duplicate entries, FB301,
-    /// FB306, FB312.
+    /// FB302 for complex matrices and other forms, FB307 for an undeclared triangle, FB309 for duplicate entries, FB301
+    /// for more rows than the entries can fill, FB312 if there is no nonzero entry.
     pub(super) fn take_matrix(&mut self, k: usize, points: &[Point]) -> Result<RawMatrix, Diagnostic> {
         let own = &mut self.matrices[k];
         let (count, pieces) = (own.count(), std::mem::take(&mut own.pieces));

@@ -207,9 +207,12 @@ fn beginning_alike(main: &Path) -> Vec<Beside> {
     };
     let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
     let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
+    // A file belongs to another deck if its name continues the stem of that deck.
     let goes_on = |rest: &str, deck: &String| {
         rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
     };
+    // A name that continues the stem by a letter or a version number belongs to another job, except for the matrices of
+    // Abaqus.
     let is_own = |rest: &str| {
         let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
         let version = name.strip_prefix('v').unwrap_or(name);

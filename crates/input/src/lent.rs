@@ -119,7 +119,7 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> Diagnostic {
     Diagnostic::new(Code::OutputUnwritable, message)
 }
 
-// The one exception to `unsafe_code = "deny"` in this crate: a memory map is sound only while nobody truncates its
+// The one exception to `unsafe_code = "deny"` in this crate: a memory map is safe only while no program truncates its
 // file. The files of this module have no name: no other program can open them, and this module does not write to them
 // after mapping.
 #[allow(unsafe_code)]

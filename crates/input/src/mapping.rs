@@ -25,7 +25,7 @@ impl Mapping {
     /// directions such as `UX` (the mapping of `HBMAT`).
     ///
     /// # Errors
-    /// FB203 to FB208, FB301, FB302.
+    /// FB203 to FB208 for a table that is not valid, FB301, FB302 for an array that is not valid.
     pub(super) fn read(file: &InputFile) -> Found<Self> {
         let bytes = file.bytes();
         if bytes.get(..14).is_some_and(|start| start.eq_ignore_ascii_case(b"%%MatrixMarket")) {

@@ -92,6 +92,7 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
         let message = "file does not begin with the number of a matrix of PETSc, 1211216";
         return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
     };
+    // A matrix has a head of four numbers, the lengths of its rows, the column indices and the values.
     let (head, rest) = whole.list(bytes, 4).ok_or_else(cut_off)?;
     let [kind, rows, columns, entries] = std::array::from_fn(|k| whole.get(head, k).unwrap_or(-1));
     let entries = entry_count(kind, entries)?;

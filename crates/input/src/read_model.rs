@@ -76,6 +76,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
         Matrices::Job(job) => take(&mut diagnostics, *job),
     };
+    // Damping and geometric stiffness follow K and M to the rows of the model.
     let no_rows = GivenRows::default();
     let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);
     let damping = parsed.damping.and_then(|damping| {
@@ -88,6 +89,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Some(GeometricStiffness { load, matrix })
     });
     let geometric_stiffness = geometric.collect();
+    // Interfaces and surface refer to the nodes.
     let places = NodeLookup::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
         .interfaces
@@ -102,6 +104,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     });
     let mesh = mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
+    // Errors end here, with all diagnostics that were found.
     let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
         return Err(Error::new(diagnostics));
@@ -134,7 +137,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
 /// Reads nodal masses `node,mass`, as a multibody program would have imported them.
 ///
 /// # Errors
-/// FB101 to FB106, FB203 to FB205 and FB803.
+/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table, FB803 for invalid masses.
 pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
     read_masses(&InputFile::open(path)?).map_err(Error::new)
 }

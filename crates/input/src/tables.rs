@@ -76,6 +76,7 @@ fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLab
     let n = rows.len();
     let mut at: Vec<Option<usize>> = vec![None; n];
     let mut bad = BadRows::new(file.path());
+    // Rows that are numbered from 1 get a specific help.
     let from_one = rows.iter().all(|r| r.0 >= 1) && rows.iter().any(|r| r.0 == n as i64);
     for (k, &(row, line, _)) in rows.iter().enumerate() {
         let slot = usize::try_from(row).ok().and_then(|row| at.get_mut(row));

@@ -130,6 +130,7 @@ impl Carriers {
     ) -> (Vector3<f64>, Vector3<f64>, DVector<f64>) {
         let (places, yd) = (self.places(origin, path.u), self.derivative(path.u, path.ud, step));
         let (w, ydd) = (path.omega, self.second_derivative(path, step));
+        // Acceleration in a moving frame: of the origin, Euler, centripetal, Coriolis and relative.
         let accelerations: Vec<Vector3<f64>> = (0..places.len())
             .map(|i| {
                 path.linear

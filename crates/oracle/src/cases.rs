@@ -65,6 +65,7 @@ impl Case {
 
     /// Writes `report` as the expected one into the file of the case.
     ///
+    /// # Panics
     /// If the report contains three apostrophes, which would end the text.
     pub fn bless(&self, report: &str) {
         const BEGIN: &str = "expected = '''\n";

@@ -129,6 +129,7 @@ impl ElementKind {
     pub fn matrices(self, nodes: &[[f64; 3]], material: &Material, rule: MassRule) -> (Vec<f64>, Vec<f64>) {
         let m = nodes.len();
         let (lambda, mu) = material.lame();
+        // Upper triangle of the integral of lambda div u div v + 2 mu eps(u):eps(v).
         let mut stiffness = vec![0.0; 9 * m * m];
         for (xi, weight) in self.stiffness_rule() {
             let (_, reference) = self.shape(xi);
@@ -148,6 +149,7 @@ impl ElementKind {
                 }
             }
         }
+        // Upper triangle of the integral of rho N_a N_b.
         let mut mass = vec![0.0; m * m];
         for (xi, weight) in self.mass_rule(rule) {
             let (shape, reference) = self.shape(xi);

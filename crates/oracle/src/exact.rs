@@ -35,6 +35,7 @@ pub fn count_below(k: &[Vec<f64>], m: &[Vec<f64>], sigma: f64) -> usize {
             }
             continue;
         }
+        // Elimination by a pivot of one row, whose sign counts.
         let p = left.swap_remove(one.expect("just tested"));
         let pivot = a[p][p].clone();
         negative += usize::from(pivot < zero);

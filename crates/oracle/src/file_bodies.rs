@@ -129,7 +129,7 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
     }
 }
 
-/// Returns one load of every kind; forces and moments occur as often as there are interfaces.
+/// Returns up to `count` loads, each of a different kind.
 fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
     let kinds = [
         LoadKind::Force(r.name()),

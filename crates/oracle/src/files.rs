@@ -38,6 +38,7 @@ pub enum Triangle {
 pub fn reordered(raw: &RawModel, order: DofOrder, numbering: Numbering) -> RawModel {
     assert!(raw.dofs.is_none(), "already labelled");
     let n = raw.nodes.len();
+    // Old row of every new row; numbers of the nodes, and old node of every row of the table.
     let rows: Vec<usize> = match order {
         DofOrder::NodeMajor => (0..3 * n).collect(),
         DofOrder::ComponentMajor => (0..3 * n).map(|r| 3 * (r % n) + r / n).collect(),

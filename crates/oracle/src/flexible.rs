@@ -57,6 +57,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
     let ReducedBody { c1, c2, w1, w2, w3, .. } = reduced;
     let nf = c1.ncols();
     let faer = |a: &DMatrix<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)]);
+    // Diagonal entries follow from the trace of W1, off-diagonal ones from W1 and the skew part C2.
     let ibar = |k: usize, l: usize, j: usize| {
         if k == l {
             let trace: f64 = (0..3).map(|b| w1[(b, b * nf + j)]).sum();
@@ -65,6 +66,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
         let skew = if (k + 1) % 3 == l { c2[(3 - k - l, j)] } else { -c2[(3 - k - l, j)] };
         0.5 * (skew - w1[(k, l * nf + j)])
     };
+    // S follows from W2 alike.
     let s = |k: usize, l: usize, i: usize, j: usize| {
         if k == l {
             let trace: f64 = (0..3).map(|b| w2[(b * nf + i, b * nf + j)]).sum();

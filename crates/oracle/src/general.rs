@@ -344,6 +344,7 @@ fn on_directors(
     let place: HashMap<Row, usize> = rows.iter().enumerate().map(|(i, &row)| (row, i)).collect();
     let plane = rows.iter().all(|row| (row.kind == RowKind::Rotation) == (row.axis == 2));
     let axes = if plane { 2 } else { 3 };
+    // Nodes with rotations, and the vectors of the other rows.
     let mut nodes: Vec<usize> =
         rows.iter().filter(|row| row.kind == RowKind::Rotation).map(|row| row.node).collect();
     nodes.sort_unstable();
@@ -353,6 +354,7 @@ fn on_directors(
     vectors.sort_unstable_by_key(|(kind, node)| (*kind == RowKind::Internal, *node));
     vectors.dedup();
 
+    // Extended rows: points and internal vectors, directors, rotations.
     let mut all: Vec<Row> = vectors
         .iter()
         .flat_map(|&(kind, node)| (0..axes).map(move |axis| Row { kind, node, axis }))
@@ -368,6 +370,7 @@ fn on_directors(
     let director =
         |node: usize, a: usize, axis: usize| at[&Row { kind: RowKind::Director, node: 3 * node + a, axis }];
 
+    // Blocks M of the given mass between two vectors; missing rows count as zero.
     let entry = |a: Row, b: Row| match (place.get(&a), place.get(&b)) {
         (Some(&i), Some(&j)) => mass[(i, j)],
         _ => 0.0,
@@ -380,6 +383,7 @@ fn on_directors(
     let mut e = DMatrix::zeros(all.len(), all.len());
     for &(kind, node) in &vectors {
         for &(other, second) in &vectors {
+            // M_tt between points is kept.
             let own = block((kind, node), (other, second));
             for (k, l) in (0..axes).flat_map(|k| (0..axes).map(move |l| (k, l))) {
                 e[(at[&Row { kind, node, axis: k }], at[&Row { kind: other, node: second, axis: l }])] =
@@ -387,6 +391,7 @@ fn on_directors(
             }
         }
         for &second in &nodes {
+            // M_tr = -h~ + N: h couples the point to the directors, N to the rotations.
             let own = block((kind, node), (RowKind::Rotation, second));
             let (moment, symmetric) = match plane {
                 true => (Vector3::new(own[(1, 2)], -own[(0, 2)], 0.0), Matrix3::zeros()),
@@ -413,6 +418,7 @@ fn on_directors(
         }
     }
     for (&node, &second) in nodes.iter().flat_map(|node| nodes.iter().map(move |second| (node, second))) {
+        // P = tr(M_rr) / 2 I - M_rr' couples the directors.
         let own = block((RowKind::Rotation, node), (RowKind::Rotation, second));
         let p = match plane {
             true => Matrix3::identity() * (0.5 * own[(2, 2)]),
@@ -425,6 +431,7 @@ fn on_directors(
         }
     }
 
+    // Shapes in the extended rows: a director moves by theta x e_a.
     let mut extended = DMatrix::zeros(all.len(), shapes.ncols());
     for (i, row) in all.iter().enumerate() {
         for j in 0..shapes.ncols() {

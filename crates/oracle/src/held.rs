@@ -29,6 +29,7 @@ impl HeldModel {
                 (0..3).for_each(|c| rigid[(3 * i + c, 3 + axis)] = turn[c]);
             }
         }
+        // The null space of R R' is the space of motions that are left.
         let eigen = (&rigid * rigid.transpose()).symmetric_eigen();
         let free: Vec<usize> = (0..k.nrows()).filter(|&j| eigen.eigenvalues[j].abs() < 1e-9).collect();
         assert_eq!(free.len(), k.nrows() - 6);

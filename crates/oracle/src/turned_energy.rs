@@ -131,6 +131,7 @@ impl TurnedEnergy {
     pub fn kinetic(&self, u: &DVector<f64>, v: &Velocities) -> f64 {
         let n = self.positions.len();
         let (w, skew) = (v.omega, v.omega.cross_matrix());
+        // Rates of the directors: omega x e_a and their rate relative to the frame.
         let directors: Vec<Matrix3<f64>> = (0..n)
             .map(|i| {
                 let (theta, rate) =
@@ -141,12 +142,14 @@ impl TurnedEnergy {
                 skew * turn(0.0) + own
             })
             .collect();
+        // Velocities of the nodes relative to the centre of mass.
         let relative: Vec<Vector3<f64>> = (0..n)
             .map(|i| {
                 let place = self.positions[i] - self.centre + self.vector(u, RowKind::Displacement, i);
                 w.cross(&place) + self.vector(&v.ud, RowKind::Displacement, i)
             })
             .collect();
+        // Velocity of the centre of mass of the undeformed body.
         let flight = v.linear + w.cross(&self.centre);
         let of_block = |block: &Block| {
             let [p, q] = block.nodes;

@@ -63,6 +63,7 @@ impl Unreduced {
         let rigid = model.rigid_fields([0.0; 3], 1.0);
         let block = rigid.transpose() * &mass * &rigid;
         let (total_mass, z) = (block[(0, 0)], rigid.ncols() - 1);
+        // The first moment is in the coupling of translation and rotation of R' M R.
         let com = match rigid.ncols() {
             3 => Vector3::new(block[(1, z)], -block[(0, z)], 0.0) / total_mass,
             _ => Vector3::new(block[(1, 5)], -block[(0, 5)], block[(0, 4)]) / total_mass,

@@ -31,6 +31,7 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
             None => return Err(vec![reader.layout("holds no sparse matrix")]),
         },
     };
+    // Declaration and entries must agree about the stored triangles.
     let sides = parsed.sides;
     let stored = match declared {
         Declared::Triangle if sides == (Sides { lower: true, upper: true }) => {

@@ -47,6 +47,7 @@ pub(super) fn file_of(deck: &Deck, path: &Path) -> Option<(PathBuf, Option<Diagn
 impl Substructure {
     /// Reads the file of a substructure.
     ///
+    /// # Errors
     /// FB101, FB106; FB109 if a matrix is missing; FB110 for lines that cannot be read; FB111 for degrees of freedom
     /// other than displacements and rotations; FB301, FB303, FB312.
     pub(super) fn read(path: &Path) -> Found<Self> {
@@ -170,6 +171,7 @@ impl SubstructureFile<'_> {
         }
         check_size(n as u64, n as u64, count as u64).map_err(in_file)?;
         let written = pieces.iter().map(|piece| piece.written).max().unwrap_or(0);
+        // Number of values before each piece, from which its positions follow.
         let mut end = 0;
         let starts: Vec<usize> = pieces
             .iter()

@@ -202,6 +202,7 @@ impl Deck {
                 }
             }
         }
+        // Data extend to the next keyword line.
         let (data, first) = (end, number);
         while end < bytes.len() && !is_keyword(&bytes[end..]) {
             end = line_end(bytes, end);

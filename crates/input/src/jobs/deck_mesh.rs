@@ -144,6 +144,7 @@ impl Scopes {
                 format!("instances share node numbers, which are too large ({highest}) to be changed");
             return Err(vec![Diagnostic::new(Code::DeckUnsupported, message)]);
         }
+        // Each instance gets a range of numbers above the highest one, a power of ten apart.
         let stride = if unique { 0 } else { power_of_ten_above(highest) };
         // Nodes of the assembly keep their numbers.
         let first = i64::from(!self.top.nodes.is_empty());

@@ -51,6 +51,7 @@ pub(super) fn label_once(
 ) -> Found<Once> {
     let mut rows: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
     labels.iter().enumerate().for_each(|(row, label)| rows.entry(label.node).or_default().push(row));
+    // Nodes with more than one row in a direction were expanded.
     let is_repeated = |rows: &Vec<usize>| {
         let mut directions: Vec<u8> = rows.iter().map(|row| labels[*row].direction).collect();
         directions.sort_unstable();
@@ -65,6 +66,7 @@ pub(super) fn label_once(
     if kinds.is_empty() || !kinds.iter().all(|kind| SHELLS.contains(kind)) {
         return Err(refuse("the deck does not say where their nodes lie"));
     }
+    // Copies of each node from one face to the other, and the vector through the thickness from K.
     let offsets = offsets(deck, mesh, &rows).map_err(refuse)?;
     let mut all = Vec::new();
     for (&node, own) in &rows {
@@ -115,6 +117,7 @@ fn offsets(
         };
         of_elements.extend(members.iter().map(|element| (*element, offset)));
     }
+    // Nodes take the OFFSET of their elements, which must agree.
     let mut of_nodes: BTreeMap<i64, f64> = BTreeMap::new();
     for (element, own) in mesh.elements.iter().flat_map(|own| &own.members) {
         let offset = of_elements.get(element).copied().unwrap_or(0.0);
@@ -189,6 +192,7 @@ fn thickness(
             _ => 0.0,
         }
     };
+    // Matrix C'KC and load -C'K R_b.
     let mut load = Mat::zeros(3 * all.len(), 3);
     let mut entries = Vec::new();
     for column in 0..n {

@@ -47,6 +47,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut table = ModeTable::new(DIGITS.0, DIGITS.1);
     let (mut head, mut pending, mut block): (Head, Option<Block>, Option<Block>) = Default::default();
     for Line { number: at, text: line } in Lines::of(file.bytes()) {
+        // Within a block: lines of nodes, lines of component names, and the end with the announced number of nodes.
         if let Some(open) = &mut block {
             if line.starts_with(b" -1") {
                 open.node(&mut table, file, at, line)?;
@@ -63,6 +64,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                 ));
             }
         }
+        // Outside: parameters, the heading of a block (100C), and the name of its quantity (-4).
         if line.starts_with(b"    1P") {
             head.parameter(file, at, line)?;
         } else if line.starts_with(b"  100C") {

@@ -88,6 +88,8 @@ impl Packing {
             let length = self.header(&mut stream)?;
             return exactly(&mut stream, length);
         }
+        // The header holds the number of blocks, their size, and the size of an incomplete last block (0 if there is
+        // none).
         let [blocks, size, last] =
             [self.header(&mut stream)?, self.header(&mut stream)?, self.header(&mut stream)?];
         let whole = if last == 0 { blocks } else { blocks.saturating_sub(1) };
@@ -98,6 +100,7 @@ impl Packing {
         if left().is_some_and(|left| total > left) {
             return Err(format!("unpacks to {total} bytes, more than fit the memory"));
         }
+        // The packed length of every block precedes the blocks.
         let lengths = blocks.checked_mul(self.header_bytes as u64).ok_or(ENDS)?;
         let lengths = exactly(&mut stream, lengths)?;
         let mut unpacked = Vec::new();

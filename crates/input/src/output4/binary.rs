@@ -65,7 +65,8 @@ impl Binary {
     /// Returns the entries of some columns.
     ///
     /// # Errors
-    /// FB301, FB303, FB306.
+    /// FB301 for records that cannot be parsed, FB303 for indices outside the matrix, FB306 for values that are not
+    /// finite.
     pub(super) fn columns(self, bytes: &[u8], header: &Header) -> Result<Columns, Diagnostic> {
         let mut columns = Columns::with_room(bytes.len() / self.size(header));
         columns.written = if self.size(header) == 4 { SINGLE_DIGITS } else { 17 };
@@ -98,9 +99,11 @@ impl Binary {
             self.integer(record, 2).and_then(|words| usize::try_from(words).ok()).ok_or_else(misread)?;
         let data = record.get(3 * self.word..).ok_or_else(misread)?;
         let data = words.checked_mul(self.word).and_then(|bytes| data.get(..bytes)).ok_or_else(misread)?;
+        // A start other than zero marks a dense column.
         if start != 0 {
             return self.values(data, header, start, column, columns);
         }
+        // A sparse column consists of strings, each with one or two words of start and length.
         let mut rest = data;
         while !rest.is_empty() {
             let first = self.integer(rest, 0).ok_or_else(misread)?;

@@ -246,7 +246,7 @@ impl Columns {
     /// Returns the matrix of `n` rows and columns.
     ///
     /// # Errors
-    /// FB306, FB312.
+    /// FB306 if a sum of duplicates is not finite, FB312 if there is no nonzero entry.
     pub(super) fn into_matrix(self, n: usize, ascending: bool, path: &Path) -> Result<RawMatrix, Diagnostic> {
         if ascending {
             let columns = ColumnEntries::new(n, &self.lengths, self.rows, self.values);

@@ -100,7 +100,7 @@ pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagno
 /// Returns the entries of some columns of a matrix, below `line` lines.
 ///
 /// # Errors
-/// FB301, FB303, FB306.
+/// FB301 for lines that cannot be parsed, FB303 for indices outside the matrix, FB306 for values that are not finite.
 pub(super) fn columns(
     bytes: &[u8],
     line: usize,
@@ -158,6 +158,7 @@ impl<'a> Text<'a> {
         mut place: Option<&mut Columns>,
     ) -> Result<usize, Diagnostic> {
         let per_value = if header.is_single() { 1 } else { 2 };
+        // Each string has a line with its start and length, which count as words of the column.
         let (mut left, mut values) = (words, 0);
         while left > 0 {
             let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;

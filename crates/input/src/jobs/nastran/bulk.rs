@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 
 /// Number of bad cards that are reported one by one.
 const SHOWN: usize = 5;
-/// Largest number of scalar points in a range.
+/// Largest number of scalar points in a range; `MOST_SCALARS` is the largest number in a deck.
 const MOST_IN_RANGE: i64 = 1_000_000;
 const MOST_SCALARS: usize = 10_000_000;
 /// Elements with displacements only.

@@ -159,6 +159,7 @@ impl Constraints {
         let mut open = Vec::new();
         for own in &self.all {
             match &own.relation {
+                // An unsupported card matters only if it connects grids with rows.
                 Relation::NotRead { numbers } => {
                     let moves = |grid: i64| (0..=6).any(|component| has(&(grid, component)));
                     if numbers.iter().filter(|number| moves(**number)).count() > 1 {

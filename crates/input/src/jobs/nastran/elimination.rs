@@ -247,6 +247,7 @@ fn rod(
     dependent: Point,
     places: &GridPlaces<'_>,
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
+    // Coefficients of the constraint in all displacements of both grids, solved for the dependent one.
     let line = places.position(b, of)? - places.position(a, of)?;
     let along = |grid: i64, sign: f64| {
         (1..=3).map(move |component| ((grid, component), sign * line.dot(&places.axis((grid, component)))))
@@ -271,11 +272,13 @@ fn average(
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     let origin = places.position(reference, of)?;
     let grids: std::collections::BTreeSet<i64> = weighted.iter().map(|((grid, _), _)| *grid).collect();
+    // Mean distance of the grids, by which rotations become lengths.
     let mut distance = 0.0;
     for grid in &grids {
         distance += (places.position(*grid, of)? - origin).norm() / grids.len() as f64;
     }
     let length = if distance > 0.0 { distance } else { 1.0 };
+    // Normal matrix B' W B of the weighted fit.
     let mut normal = Matrix6::zeros();
     let mut rows = Vec::new();
     for &(point, weight) in weighted {
@@ -286,6 +289,7 @@ fn average(
     }
     let inverse =
         inverted(normal).ok_or_else(|| of.refused("the components that it averages leave it a motion"))?;
+    // Each component of the reference grid follows the fitted motion b (B' W B)^-1 B' W u.
     let follow = |component: &u8| {
         let point = (reference, *component);
         let own = places.rigid(point, origin, length, of)?.transpose() * inverse;

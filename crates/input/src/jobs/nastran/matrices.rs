@@ -46,6 +46,7 @@ impl Matrices {
         let (punches, outputs) = files_beside(bulk, job)?;
         let punched = Dmigs::of(&punches)?;
         let outputs = Outputs::of(outputs)?;
+        // Exactly one kind of file must have a pair; else all pairs are reported.
         let punch_pair = choose_pair(&punched.names(), &punched.candidates(), stated);
         match (punch_pair, choose_pair(&outputs.names, &outputs.fitting(bulk), stated)) {
             (Ok(pair), Err(_)) => Self::of_dmigs(bulk, punched, pair, places),
