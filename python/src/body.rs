@@ -395,7 +395,7 @@ pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Body> {
     Ok(Body::new(alone(py, || FlexBody::read(&path))?, Vec::new()))
 }
 
-/// Formats that `Body.export` writes: dict of name to the programs that read it.
+/// Returns the formats that `Body.export` writes: dict of name to the programs that read it.
 #[pyfunction]
 pub fn export_formats(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let all = PyDict::new(py);

@@ -306,7 +306,7 @@ impl Trial {
             }
         }
         let (p_slack, q_slack) = (Slack::of(&p, &p_error)?, Slack::of(&q, &q_error)?);
-        // Both matrices are scaled to a diagonal of ones in Q, which the bounds of `Slack` assume.
+        // Both matrices are scaled so that Q has a diagonal of ones.
         for matrix in [&mut p, &mut q] {
             for (row, si) in matrix.iter_mut().zip(&q_slack.scale) {
                 for (value, sj) in row.iter_mut().zip(&q_slack.scale) {
@@ -333,7 +333,7 @@ impl Trial {
     }
 
     /// Returns for each mode a bound of its distance from the exact eigenspace of its cluster, in the norm of M:
-    /// r| sqrt(omega') / |omega - omega'| with the nearest eigenvalue omega' outside the cluster, on either side.
+    /// |r| sqrt(omega') / |omega - omega'| with the nearest eigenvalue omega' outside the cluster, on either side.
     fn shape_errors(
         &self,
         lower: &[f64],

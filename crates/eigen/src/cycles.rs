@@ -64,7 +64,7 @@ impl Attempt for Cycles {
         Correction::begin(task, Corrector::Levels(&*levels), goal, (rough, goal.wanted))?.modes()
     }
 
-    /// A failure of cycles does not depend on the model alone: another attempt may succeed.
+    /// Returns false: a failure of cycles does not concern the model, and another attempt may succeed.
     fn is_conclusive(&self, _: &EigenFailure) -> bool {
         false
     }

@@ -90,7 +90,7 @@ impl Attempt for SecondShift {
         })
     }
 
-    /// A failure after the change of the shift may come from the second shift, and does not concern the model.
+    /// Returns false for modes that did not converge: the reason may be the second shift instead of the model.
     fn is_conclusive(&self, failure: &EigenFailure) -> bool {
         !matches!(failure, EigenFailure::NotConverged { .. })
     }

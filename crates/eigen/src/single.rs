@@ -61,7 +61,7 @@ impl Attempt for SinglePrecision {
         })
     }
 
-    /// A failure with this factor often comes from its precision, and does not concern the model.
+    /// Returns false: a failure with this factor often comes from its precision, and does not concern the model.
     fn is_conclusive(&self, _: &EigenFailure) -> bool {
         false
     }

@@ -30,8 +30,8 @@ impl Compressed<'_> {
     /// Builds the matrix. Both triangles must be stored; symmetry is not checked.
     ///
     /// # Errors
-    /// FB301, FB304 for pointers that do not fit the entries, FB303 for indices outside the matrix, FB306 for values that
-    /// are not finite, FB307 for a single triangle, FB312 if there is no nonzero entry.
+    /// FB301, FB304 for pointers that do not fit the entries, FB303 for indices outside the matrix, FB306 for values
+    /// that are not finite, FB307 for a single triangle, FB312 if there is no nonzero entry.
     pub(super) fn assemble(self, path: &Path) -> Result<RawMatrix, Diagnostic> {
         self.check_pointers()?;
         let mut columns = ColumnEntries::with_room(self.n, self.entries);

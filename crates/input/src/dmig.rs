@@ -63,7 +63,8 @@ impl Dmigs {
     /// Reads the DMIG matrices of files.
     ///
     /// # Errors
-    /// FB101, FB106, FB110, FB301, FB302, all that are found.
+    /// FB101, FB106 for files that cannot be read, FB110 for a deck that cannot be read, FB301 for bad cards, FB302 for
+    /// unsupported matrices, all that are found.
     pub(super) fn of(paths: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let mut all = Self::default();
         for path in paths {
@@ -326,8 +327,8 @@ impl Reader for DmigPunch {
         true
     }
 
-    /// Rows are the points, ascending, of all matrices of the file that may be K or M. Points of loads and other
-    /// rectangular matrices are left out.
+    /// Reads a matrix. Its rows are the points, ascending, of all matrices of the file that may be K or M. Points of
+    /// loads and other rectangular matrices are left out.
     fn read(&self, source: &MatrixSource<'_>) -> Outcome<RawMatrix> {
         let path = source.file.path();
         if source.compression != Compression::None {

@@ -99,7 +99,7 @@ pub(super) trait JobReader: Sync {
     /// Reads matrices, nodes, labels and sets.
     ///
     /// # Errors
-    /// FB101 to FB112, FB2xx and FB3xx, all that are found.
+    /// FB101 to FB112 for files and decks, FB2xx for tables and nodes, FB3xx for matrices, all that are found.
     fn read(&self, job: &JobFile) -> Found<JobModel>;
 
     /// Returns true when the matrices of a job have names by which a user may choose.

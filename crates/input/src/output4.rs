@@ -100,7 +100,9 @@ impl Contents {
     /// Returns the matrix with this index; `file` must be the file that was scanned.
     ///
     /// # Errors
-    /// FB301, FB302 for complex and other matrices, FB303, FB305, FB306, FB307, FB312.
+    /// FB301 for text that cannot be parsed, FB302 for complex and other matrices, FB303 for rows outside the matrix,
+    /// FB305 for a matrix that is not square, FB306 for values that are not finite, FB307 for a single triangle, FB312
+    /// if there is no nonzero entry.
     pub(super) fn matrix(&self, file: &InputFile, wanted: usize) -> Found<RawMatrix> {
         let Some((stored, encoding)) = self.matrices.get(wanted) else {
             return Err(Diagnostic::new(Code::MatrixSyntax, "the matrix is not in the file"));

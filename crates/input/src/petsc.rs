@@ -1,7 +1,7 @@
 //! Matrices of PETSc in its binary form, as `MatView` writes them into a binary viewer:
 //! <https://petsc.org/release/manualpages/Mat/MatLoad/>. All numbers are big-endian. Integers have 32 or 64 bits and
 //! values 4, 8 or 16 bytes, by the configuration of PETSc. The file does not state these sizes, but they follow from
-//! its length.
+//! its first number and its length.
 
 use super::assemble::check_size;
 use super::compressed::Compressed;

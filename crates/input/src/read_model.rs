@@ -29,7 +29,7 @@ const FEW_DIGITS: u8 = 10;
 /// Reads one matrix with both triangles, whichever of them are stored.
 ///
 /// # Errors
-/// FB101 to FB106 and FB301 to FB313, all that are found in the file.
+/// FB101 to FB106 for a file that cannot be read, FB301 to FB313 for an invalid matrix, all that are found in the file.
 pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMatrix> {
     read_opened(&InputFile::open_unread(&location.path)?, location.group.as_deref(), role, None)
 }

@@ -106,7 +106,7 @@ pub trait Reader: Sync {
     /// stored in full is not checked.
     ///
     /// # Errors
-    /// FB101, FB103 and FB301 to FB313, all that are found.
+    /// FB101, FB103 for a file that cannot be read, FB301 to FB313 for an invalid matrix, all that are found.
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix>;
 }
 

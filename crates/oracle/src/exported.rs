@@ -116,7 +116,7 @@ pub fn on_interfaces() -> Vec<(String, FlexBody)> {
     ["bracket_hex20", "robot_link", "satellite", "car_frame"].map(made).to_vec()
 }
 
-/// Returns the output of an export, with or without losses.
+/// Returns the output of an export, which may have losses.
 pub fn exported(
     body: &FlexBody,
     format: &str,

@@ -98,6 +98,9 @@ impl Rows {
         Ok(Self { labels, stiffness, mass, files, condensed: None })
     }
 
+    /// Reads the matrices of a substructure.
+    ///
+    /// # Errors
     /// FB111 for rows whose nodes are not in the deck, or along the axes of a `*TRANSFORM`.
     fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Found<Self> {
         let Substructure { labels, stiffness, mass, seen } = Substructure::read(file)?;

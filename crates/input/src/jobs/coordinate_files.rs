@@ -23,7 +23,8 @@ impl CoordinateFile {
     /// Reads a file whose indices are at most `n`.
     ///
     /// # Errors
-    /// FB101, FB103, FB106, FB132, and FB301, FB303, FB306 for its lines.
+    /// FB101, FB103, FB106 for a file that cannot be read, FB132 for one that changed; FB301 for bad lines, FB303 for
+    /// indices out of range, FB306 for values that are not finite.
     pub(super) fn read(path: &Path, n: u32) -> Found<Self> {
         let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
         let read = Self::read_opened(&file, n);

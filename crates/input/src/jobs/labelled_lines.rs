@@ -22,7 +22,8 @@ const SHOWN: usize = 5;
 /// Reads two matrices and the labels of their rows.
 ///
 /// # Errors
-/// FB101, FB132, FB301 for their lines, and the errors of [`assemble`].
+/// FB101 for files that cannot be read, FB132 for files that changed, FB301 for bad lines, and the errors of
+/// [`assemble`].
 pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
     let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);

@@ -72,7 +72,8 @@ impl Bulk {
     /// Reads a deck with the files that it includes.
     ///
     /// # Errors
-    /// FB101, FB106, FB110, FB111, FB205, and the errors of [`Dmigs`], all that are found.
+    /// FB101, FB106 for files that cannot be read, FB110 for bad lines, FB111 for unsupported cards, FB205 for a node
+    /// that is given twice, and the errors of [`Dmigs`], all that are found.
     pub(super) fn read(path: &Path) -> Found<Self> {
         let mut bulk = Self::default();
         let files = read_deck(path, &mut |item| match item {

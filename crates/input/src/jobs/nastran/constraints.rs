@@ -232,7 +232,7 @@ fn not_read(card: &Card) -> Relation {
     Relation::NotRead { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
 }
 
-/// Fields: EID, GN, CM, GM1, GM2, ..., ALPHA.
+/// Reads RBE2 with the fields EID, GN, CM, GM1, GM2, ..., ALPHA.
 fn rbe2(card: &Card) -> Option<Relation> {
     let own = components(card.field(2)).filter(|own| !own.is_empty() && !own.contains(&0))?;
     let (followers, end) = grids(card, 3)?;
@@ -241,7 +241,7 @@ fn rbe2(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
 }
 
-/// Fields: EID, GA, GB, CNA, CNB, CMA, CMB, ALPHA.
+/// Reads RBAR with the fields EID, GA, GB, CNA, CNB, CMA, CMB, ALPHA.
 fn rbar(card: &Card) -> Option<Relation> {
     let own = |k: usize| -> Option<Vec<Point>> {
         let id = grid(card, 1 + k % 2)?;
@@ -257,7 +257,7 @@ fn rbar(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent, dependent })
 }
 
-/// Fields: EID, GA, GB, CB, ALPHA.
+/// Reads RBAR1 with the fields EID, GA, GB, CB, ALPHA.
 fn rbar1(card: &Card) -> Option<Relation> {
     let own = components(card.field(3))?;
     let own = if own.is_empty() { vec![1, 2, 3, 4, 5, 6] } else { own };
@@ -266,7 +266,7 @@ fn rbar1(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
 }
 
-/// Fields: EID, pairs of independent grids and components, UM, dependent pairs, ALPHA.
+/// Reads RBE1 with the fields EID, pairs of independent grids and components, UM, dependent pairs, ALPHA.
 fn rbe1(card: &Card) -> Option<Relation> {
     let (mut independent, mut dependent, mut follows) = (Vec::new(), Vec::new(), false);
     let mut fields = filled(card, 1);
@@ -283,7 +283,7 @@ fn rbe1(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent, dependent })
 }
 
-/// Fields: EID, GA, GB, CMA, CMB, ALPHA.
+/// Reads RROD with the fields EID, GA, GB, CMA, CMB, ALPHA.
 fn rrod(card: &Card) -> Option<Relation> {
     let grids = [grid(card, 1)?, grid(card, 2)?];
     let own = [components(card.field(3))?, components(card.field(4))?];
@@ -295,7 +295,7 @@ fn rrod(card: &Card) -> Option<Relation> {
     Some(Relation::Rod { grids, dependent })
 }
 
-/// Fields: EID, blank, REFGRID, REFC, then groups of weight, components and grids, UM, ALPHA.
+/// Reads RBE3 with the fields EID, blank, REFGRID, REFC, then groups of weight, components and grids, UM, ALPHA.
 fn rbe3(card: &Card) -> Option<Relation> {
     let reference = grid(card, 2)?;
     let own = components(card.field(3)).filter(|own| !own.is_empty() && !own.contains(&0))?;
@@ -321,7 +321,7 @@ fn rbe3(card: &Card) -> Option<Relation> {
     Some(Relation::Average { reference, components: own, weighted })
 }
 
-/// Fields: SID, then groups of grid, component and coefficient, two per line of eight fields.
+/// Reads MPC with the fields SID, then groups of grid, component and coefficient, two per line of eight fields.
 fn sum(card: &Card) -> Option<Relation> {
     let set = grid(card, 0)?;
     let mut terms = Vec::new();

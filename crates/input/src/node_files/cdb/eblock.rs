@@ -16,7 +16,7 @@ const SOLIDS: &[i64] = &[
 /// Numbers of shell and plane element types.
 const SHELLS: &[i64] =
     &[2, 28, 41, 42, 43, 63, 82, 91, 93, 99, 143, 145, 146, 150, 162, 163, 181, 182, 183, 281];
-/// Numbers of beam and link element types with two end nodes.
+/// Numbers of beam, pipe and link element types with two end nodes.
 const BEAMS: &[i64] = &[1, 3, 4, 8, 10, 16, 23, 24, 44, 54, 59, 161, 180, 188, 288];
 /// Numbers of beam element types with a middle node.
 const LONG_BEAMS: &[i64] = &[189, 289];
