@@ -64,7 +64,7 @@ struct FoundSet {
     set: &'static Together,
     /// Keys of the entries; true for each that the file holds.
     entries: Vec<(String, bool)>,
-    /// True if the set misses an entry that it needs.
+    /// True if an entry is missing that the set requires.
     is_incomplete: bool,
 }
 
