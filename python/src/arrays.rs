@@ -1,4 +1,4 @@
-//! Arrays of numpy, out and in.
+//! Conversion of arrays to and from numpy.
 
 use flexbody::Matrix;
 use nalgebra::{Matrix3, Vector3};
@@ -8,40 +8,40 @@ use pyo3::prelude::*;
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
 
-/// A vector as an array.
+/// Returns a vector as an array.
 pub fn vector<'py>(py: Python<'py>, values: &[f64]) -> Bound<'py, PyAny> {
     PyArray1::from_slice(py, values).into_any()
 }
 
-/// A matrix as an array, its rows one after the other.
+/// Returns a matrix as an array, row by row.
 pub fn matrix<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Bound<'py, PyAny>> {
     let (rows, columns) = (matrix.rows(), matrix.columns());
     let by_rows = (0..rows).flat_map(|i| (0..columns).map(move |j| matrix[(i, j)])).collect();
     shaped(py, by_rows, [rows, columns])
 }
 
-/// The columns of a matrix with three rows for each node, as an array columns x nodes x 3.
+/// Returns a matrix with three rows for each node as an array (columns x nodes x 3).
 pub fn by_node<'py>(py: Python<'py>, matrix: &Matrix) -> PyResult<Bound<'py, PyAny>> {
     let all = PyArray1::from_slice(py, matrix.values());
     Ok(all.reshape([matrix.columns(), matrix.rows() / 3, 3])?.into_any())
 }
 
-/// Numbers that stand row by row.
+/// Returns numbers that are stored row by row as an array of this shape.
 pub fn shaped<'py>(py: Python<'py>, values: Vec<f64>, shape: [usize; 2]) -> PyResult<Bound<'py, PyAny>> {
     Ok(PyArray1::from_vec(py, values).reshape(shape)?.into_any())
 }
 
-/// A 3 x 3 matrix.
+/// Returns a 3 x 3 matrix as an array.
 pub fn matrix3<'py>(py: Python<'py>, matrix: &Matrix3<f64>) -> PyResult<Bound<'py, PyAny>> {
     shaped(py, matrix.transpose().as_slice().to_vec(), [3, 3])
 }
 
-/// Rows of three.
+/// Returns rows of three as an array (n x 3).
 pub fn triples<'py>(py: Python<'py>, rows: &[[f64; 3]]) -> PyResult<Bound<'py, PyAny>> {
     shaped(py, rows.as_flattened().to_vec(), [rows.len(), 3])
 }
 
-/// The rows of an array n x 3.
+/// Returns the rows of an array (n x 3).
 pub fn rows_of_three(array: &Bound<'_, PyArray2<f64>>, name: &str) -> PyResult<Vec<[f64; 3]>> {
     let array = array.readonly();
     let array = array.as_array();
@@ -51,10 +51,10 @@ pub fn rows_of_three(array: &Bound<'_, PyArray2<f64>>, name: &str) -> PyResult<V
     Ok(array.rows().into_iter().map(|row| [row[0], row[1], row[2]]).collect())
 }
 
-/// Numbers that a caller gives, as an array or a sequence.
+/// Numbers from a caller, as an array or a sequence.
 pub type Given<'py> = PyArrayLike1<'py, f64, AllowTypeChange>;
 
-/// `length` finite numbers of a caller; zeros where nothing is given.
+/// Returns `length` finite numbers from a caller; zeros if nothing is given.
 pub fn numbers(given: Option<&Given<'_>>, length: usize, name: &str) -> PyResult<Vec<f64>> {
     let Some(given) = given else { return Ok(vec![0.0; length]) };
     let values: Vec<f64> = given.as_array().iter().copied().collect();
@@ -68,17 +68,17 @@ pub fn numbers(given: Option<&Given<'_>>, length: usize, name: &str) -> PyResult
     Ok(values)
 }
 
-/// Three numbers of a caller.
+/// Returns three numbers from a caller.
 pub fn vector3(given: &Given<'_>, name: &str) -> PyResult<Vector3<f64>> {
     Ok(Vector3::from_column_slice(&numbers(Some(given), 3, name)?))
 }
 
-/// Arrays that were made once, for attributes: read-only, since all users share them.
+/// Cache of arrays for attributes. The arrays are read-only, since all users share them.
 #[derive(Default)]
 pub struct Kept(Mutex<HashMap<&'static str, Py<PyAny>>>);
 
 impl Kept {
-    /// The array of that name, made where it is asked for the first time.
+    /// Returns the array of this name, which `make` creates at the first request.
     pub fn get<'py>(
         &self,
         py: Python<'py>,
@@ -89,7 +89,7 @@ impl Kept {
         if let Some(array) = known().get(name) {
             return Ok(array.bind(py).clone());
         }
-        // Not under the lock: making an array may let other threads of Python go on.
+        // The array is made without the lock: making it may let other Python threads run.
         let made = make()?;
         if !made.is_none() {
             made.call_method1("setflags", (false,))?;

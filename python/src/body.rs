@@ -23,14 +23,14 @@ impl Body {
         self.inner.name()
     }
 
-    /// Units of length, mass and time, as they were stated: ("mm", "t", "s"), or factors to SI.
+    /// Units of length, mass and time as stated: ("mm", "t", "s"), or factors to SI.
     #[getter]
     fn units(&self) -> (&str, &str, &str) {
         let [length, mass, time] = self.inner.units();
         (length, mass, time)
     }
 
-    /// 3, or 2 for a body that moves in its plane z = 0 only.
+    /// Number of dimensions: 3, or 2 for a body that moves only in its plane z = 0.
     #[getter]
     fn dimension(&self) -> usize {
         self.inner.dimension()
@@ -48,13 +48,13 @@ impl Body {
         self.inner.n_modes()
     }
 
-    /// Number of rows of the matrices; 0 where it is not known.
+    /// Number of rows of the matrices; 0 if it is not known.
     #[getter]
     fn n_dofs(&self) -> usize {
         self.inner.n_dofs()
     }
 
-    /// "rotation-invariant", "diagonal" or "general": the structure of the mass matrix.
+    /// Structure of the mass matrix: "rotation-invariant", "diagonal" or "general".
     #[getter]
     fn mass_structure(&self) -> &str {
         self.inner.mass_structure()
@@ -66,7 +66,7 @@ impl Body {
         loads(py, &self.inner.settings_json())
     }
 
-    /// The files that the body was made of: list of (role, name, SHA-256). Empty for matrices in memory.
+    /// Files that the body was made from: list of (role, name, SHA-256). Empty for matrices in memory.
     #[getter]
     fn sources(&self) -> Vec<(String, String, String)> {
         let files = self.inner.source_files().into_iter();
@@ -85,7 +85,7 @@ impl Body {
         self.kept.get(py, "node_ids", || Ok(PyArray1::from_slice(py, self.inner.node_ids()).into_any()))
     }
 
-    /// Positions of the nodes, body frame (n x 3). Unit: length.
+    /// Positions of the nodes in the body frame (n x 3). Unit: length.
     #[getter]
     fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.kept.get(py, "positions", || triples(py, self.inner.positions()))
@@ -115,7 +115,7 @@ impl Body {
         self.numbers(py, "eigenvalues", self.inner.eigenvalues())
     }
 
-    /// |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) of the modes (nf).
+    /// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) of the modes (nf).
     #[getter]
     fn residuals<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, "residuals", self.inner.residuals())
@@ -127,13 +127,13 @@ impl Body {
         self.numbers(py, "damping_ratios", self.inner.damping_ratios())
     }
 
-    /// Where each mode comes from: "free mode", "imported shape", ...; empty where it is not known.
+    /// Origin of each mode: "free mode", "imported shape", ...; empty if it is not known.
     #[getter]
     fn mode_origins(&self) -> Vec<String> {
         self.inner.mode_origins().to_vec()
     }
 
-    /// How many of the lowest modes are proved to be all that there are; None without a proof.
+    /// Number of lowest modes among which no mode is missing, by proof; None without a proof.
     #[getter]
     fn proved_complete(&self) -> Option<usize> {
         self.inner.proved_complete()
@@ -145,8 +145,8 @@ impl Body {
         self.kept.get(py, "shapes", || by_node(py, &self.inner.shapes()))
     }
 
-    /// Rotations of the nodes in each mode (nf x n x 3), zero at nodes without; None of models of
-    /// displacements. Unit: 1/(length sqrt(mass)).
+    /// Rotations of the nodes in each mode (nf x n x 3), zero at nodes without rotations; None for models with
+    /// displacements only. Unit: 1/(length sqrt(mass)).
     #[getter]
     fn rotations<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.kept.get(py, "rotations", || match self.inner.rotations() {
@@ -155,19 +155,19 @@ impl Body {
         })
     }
 
-    /// m. Unit: mass.
+    /// Mass m. Unit: mass.
     #[getter]
     fn mass(&self) -> f64 {
         self.inner.mass()
     }
 
-    /// c = sum m x (3), the first moment. Unit: mass length.
+    /// First moment c = sum m x (3). Unit: mass length.
     #[getter]
     fn first_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, "first_moment", self.inner.first_moment().as_slice())
     }
 
-    /// J = sum m x x' (3 x 3). Unit: mass length^2.
+    /// Second moment J = sum m x x' (3 x 3). Unit: mass length^2.
     #[getter]
     fn second_moment<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.kept.get(py, "second_moment", || matrix3(py, &self.inner.second_moment()))
@@ -185,20 +185,21 @@ impl Body {
         self.matrix(py, "W0", |body| Some(body.w0()))
     }
 
-    /// W1 (3 x 3nf): inertia linear in q, I(q) = I0 + W1 Q + Q'W2 Q with Q = kron(eye(3), q). None where the
-    /// body was made for a scene that does without. Unit: sqrt(mass) length.
+    /// W1 (3 x 3nf): inertia linear in q, I(q) = I0 + W1 Q + Q'W2 Q with Q = kron(eye(3), q). None for a body made for
+    /// a scene that does not need it. Unit: sqrt(mass) length.
     #[getter(W1)]
     fn w1<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "W1", FlexBody::w1)
     }
 
-    /// W2 (3nf x 3nf): inertia quadratic in q. None as W1. Unit: 1.
+    /// W2 (3nf x 3nf): inertia quadratic in q. None for a body made for a scene that does not need it. Unit: 1.
     #[getter(W2)]
     fn w2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "W2", FlexBody::w2)
     }
 
-    /// W3 (3nf x nf): coupling of rotation and modes through q. None as W1. Unit: 1.
+    /// W3 (3nf x nf): coupling of rotation and modes through q. None for a body made for a scene that does not need it.
+    /// Unit: 1.
     #[getter(W3)]
     fn w3<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "W3", FlexBody::w3)
@@ -210,33 +211,33 @@ impl Body {
         self.matrix(py, "C1", |body| Some(body.c1()))
     }
 
-    /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes. Unit:
-    /// sqrt(mass) length.
+    /// C2 (3 x nf): coupling of rotation and modes in the undeformed body; zero for free modes. Unit: sqrt(mass)
+    /// length.
     #[getter(C2)]
     fn c2<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "C2", |body| Some(body.c2()))
     }
 
-    /// m_ff (nf x nf) = Psi' M Psi. Unit: 1.
+    /// Modal mass m_ff = Psi' M Psi (nf x nf). Unit: 1.
     #[getter]
     fn modal_mass<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "modal_mass", |body| Some(body.modal_mass()))
     }
 
-    /// K_ff (nf x nf) = Psi' K Psi. Unit: 1/time^2.
+    /// Modal stiffness K_ff = Psi' K Psi (nf x nf). Unit: 1/time^2.
     #[getter]
     fn modal_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "modal_stiffness", |body| Some(body.modal_stiffness()))
     }
 
-    /// D (nf x nf): modal damping; diag(2 zeta_j omega_j) where ratios are all that is known. Unit: 1/time.
+    /// D (nf x nf): modal damping; diag(2 zeta_j omega_j) if only ratios are known. Unit: 1/time.
     #[getter]
     fn damping<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.matrix(py, "damping", |body| Some(body.damping()))
     }
 
-    /// Psi' K_geo Psi (nf x nf) of unit loads: dict of load ("spin_xx", "force_z_tip", ...) to array. Unit:
-    /// 1/time^2 over that of the load.
+    /// Geometric stiffness Psi' K_geo Psi (nf x nf) of unit loads: dict of load ("spin_xx", "force_z_tip", ...) to
+    /// array. Unit: 1/time^2 per unit of the load.
     #[getter]
     fn geometric_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
@@ -247,8 +248,8 @@ impl Body {
     }
 
     /// Stiffness of inertia (nf x nf) of nodes whose rotations carry mass, for unit loads: dict of load
-    /// ("acceleration_x", "angular_acceleration_x", "spin_xx", ...) to array; empty where no rotation does. Added
-    /// to K_ff as geometric stiffness is. Unit: 1/time^2 over that of the load.
+    /// ("acceleration_x", "angular_acceleration_x", "spin_xx", ...) to array; empty if no rotation carries mass. It is
+    /// added to K_ff like geometric stiffness. Unit: 1/time^2 per unit of the load.
     #[getter]
     fn inertia_stiffness<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
@@ -276,8 +277,8 @@ impl Body {
         Ok(all)
     }
 
-    /// K and M in the nc coordinates of a Craig-Bampton body at its interfaces: InterfaceCoordinates (names,
-    /// stiffness, mass, of_modes); None of other bodies.
+    /// K and M in the nc interface coordinates of a Craig-Bampton body: InterfaceCoordinates (names, stiffness, mass,
+    /// of_modes); None for other bodies.
     #[getter]
     fn interface_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         let Some(own) = self.inner.interface_coordinates() else { return Ok(None) };
@@ -286,14 +287,14 @@ impl Body {
         class.call1((own.names, stiffness, mass, matrix(py, &own.of_modes)?)).map(Some)
     }
 
-    /// What was decided about the groups of the kinetic energy: list of (name, whether it is kept, reason).
-    /// Empty where nobody asked, and then all are kept.
+    /// Decisions about the groups of the kinetic energy: list of (name, true if it is kept, reason). Empty if no
+    /// decision was made; all groups are then kept.
     #[getter]
     fn terms(&self) -> Vec<(&str, bool, &str)> {
         self.inner.terms()
     }
 
-    /// What lumped masses would have given: dict of scheme to a dict of error norm to value, relative.
+    /// Errors of lumped masses: dict of scheme to a dict of error norm to relative error.
     #[getter]
     fn lumped_errors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
@@ -305,39 +306,38 @@ impl Body {
         Ok(all)
     }
 
-    /// Everything that must hold of the numbers of the body, checked anew: list of Identity (name, value,
-    /// limit, holds).
+    /// Checks all identities of the numbers of the body: list of Identity (name, value, limit, holds).
     fn identities<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let class = py.import("flexbody._types")?.getattr("Identity")?;
         let all = brief(py, || Ok(self.inner.identities()))?;
         all.iter().map(|one| class.call1((one.name, one.value, one.limit, one.holds))).collect()
     }
 
-    /// The equations of motion of the body, with all terms that it holds.
+    /// Returns the equations of motion of the body, with all terms that it holds.
     fn equations_of_motion(&self) -> EquationsOfMotion {
         EquationsOfMotion::new(Arc::clone(&self.inner))
     }
 
-    /// Writes a flex-body file (HDF5, docs/format.md): it appears whole or not at all. The bytes are those
-    /// of `flexbody convert` for the same model and settings.
+    /// Writes a flex-body file (HDF5, docs/format.md), which appears complete or not at all. The bytes are those of
+    /// `flexbody convert` for the same model and settings.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         brief(py, || self.inner.write(&path))
     }
 
-    /// Writes the body in a format of another program, by its name on the command line (docs/export.md):
-    /// the file, and others that belong beside it. What the format cannot hold is warned of; these warnings
-    /// and notes are returned.
+    /// Writes the body in a format of another program, by its name on the command line (docs/export.md): the file, and
+    /// further files beside it. Properties that the format cannot hold cause warnings. Returns these warnings and
+    /// notes.
     fn export<'py>(&self, py: Python<'py>, format: &str, path: PathBuf) -> PyResult<Bound<'py, PyTuple>> {
         let said = brief(py, || self.inner.export(format, &path))?;
         warn(py, &said)?;
         diagnostics(py, &said)
     }
 
-    /// Writes a picture of the body in the motion that a simulation of it gave: "vtk" for ParaView (a .pvd
-    /// file with a .vtu file for each instant beside it), "gltf" for viewers and pages (a .glb file). What
-    /// the picture leaves out is warned of; these warnings and notes are returned.
+    /// Writes a picture of the body in the motion of its simulation: "vtk" for ParaView (a .pvd file with a .vtu file
+    /// for each instant beside it), "gltf" for viewers and web pages (a .glb file). Properties that the picture leaves
+    /// out cause warnings. Returns these warnings and notes.
     ///
-    /// Raises InputError for a format that shows no motion and for the motion of another body.
+    /// Raises InputError for a format without motion, and for the motion of another body.
     fn export_motion<'py>(
         &self,
         py: Python<'py>,
@@ -350,8 +350,8 @@ impl Body {
         diagnostics(py, &said)
     }
 
-    /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path
-    /// of a scene file.
+    /// Decides which terms and modes the body needs in a scene: a Scene, a list of load cases, or the path of a scene
+    /// file.
     fn select(&self, py: Python<'_>, scene: &Bound<'_, PyAny>) -> PyResult<Selection> {
         let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
         Selection::told(py, run(py, move |listener| body.select_heard(&scene, listener))?)
@@ -363,7 +363,7 @@ impl Body {
         Motion::told(py, run(py, move |listener| body.simulate_heard(&scene, listener))?)
     }
 
-    /// Measures what accuracy costs in a scene, of parts of this body. `Model.trade` compares conversions.
+    /// Measures accuracy against cost in a scene for reduced versions of this body. `Model.trade` compares conversions.
     #[pyo3(signature = (scene, *, repeat=3))]
     fn trade(&self, py: Python<'_>, scene: &Bound<'_, PyAny>, repeat: usize) -> PyResult<Trade> {
         let (scene, body) = (Scene::whole(py, scene)?, Arc::clone(&self.inner));
@@ -371,7 +371,7 @@ impl Body {
         Trade::told(py, run(py, move |listener| body.trade(&scene, &options, listener))?)
     }
 
-    /// The report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.
+    /// Returns the report of `flexbody inspect`: a dict with all numbers, or "json", "text", "html" as a str.
     #[pyo3(signature = (form="dict"))]
     fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
@@ -388,14 +388,14 @@ impl Body {
 
 /// Reads a flex-body file.
 ///
-/// Raises InputError when it cannot be read or is of a newer format, CheckError when it breaks its schema or
-/// was changed since it was written.
+/// Raises InputError if it cannot be read or has a newer format, CheckError if it violates its schema or was changed
+/// since it was written.
 #[pyfunction]
 pub fn read(py: Python<'_>, path: PathBuf) -> PyResult<Body> {
     Ok(Body::new(alone(py, || FlexBody::read(&path))?, Vec::new()))
 }
 
-/// Formats that `Body.export` writes: name to the programs that read it.
+/// Returns the formats that `Body.export` writes: dict of name to the programs that read it.
 #[pyfunction]
 pub fn export_formats(py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
     let all = PyDict::new(py);

@@ -1,21 +1,20 @@
-//! The class of flexible bodies, below the studies that return bodies; its methods that Python sees are in
-//! `body.rs`.
+//! The class of flexible bodies, on which the studies that return bodies depend. Its Python methods are in `body.rs`.
 
 use crate::arrays::{Kept, matrix, vector};
 use flexbody::{Diagnostic, FlexBody, Matrix};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// A flexible body with n nodes and nf modes: modes, and the constant invariants that the equations of motion
-/// of its floating frame are made of. Vectors are along the axes of the body frame, about its origin, in the
-/// units of the model. Arrays are read-only and made once: copy what you change.
+/// A flexible body with n nodes and nf modes: the modes, and the constant invariants in the equations of motion of its
+/// floating frame. Vectors are along the axes of the body frame, about its origin, in the units of the model. Arrays
+/// are read-only and made once: copy an array before you change it.
 ///
 /// `flexbody.convert` makes one, `flexbody.read` reads one.
 #[pyclass(frozen, eq, module = "flexbody")]
 pub struct Body {
     pub inner: Arc<FlexBody>,
     pub diagnostics: Vec<Diagnostic>,
-    /// Arrays that Python has asked for.
+    /// Arrays that Python has requested.
     pub kept: Kept,
 }
 
@@ -39,7 +38,7 @@ impl Body {
         self.kept.get(py, name, || Ok(vector(py, of)))
     }
 
-    /// A matrix, or None where the body has none of that name.
+    /// Returns a matrix, or None if the body has none of this name.
     pub fn matrix<'py>(
         &self,
         py: Python<'py>,

@@ -3,7 +3,7 @@
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-/// Returns the one of `all` that is called `name`, or a ValueError that lists the names of all choices of `what`.
+/// Returns the element of `all` that is called `name`, or a ValueError that lists the names of all choices of `what`.
 pub fn called<T: Copy>(
     what: &str,
     name: &str,

@@ -5,11 +5,11 @@ use flexbody::program::{self, Arguments};
 use pyo3::prelude::*;
 use std::ffi::OsString;
 
-/// Runs the command `flexbody` with `words`, the name of the command first, and returns its exit code. What
-/// it prints goes to the streams of the process.
+/// Runs the command `flexbody` with `words`, the name of the command first, and returns its exit code. Its output goes
+/// to the streams of the process.
 ///
-/// The process must be for this command alone: signals that are handled by default, and panics, end it as they end the
-/// program, without an unfinished file.
+/// The process must serve this command only: signals with the default handling, and panics, end the process as they end
+/// the program, without an unfinished file.
 #[pyfunction]
 pub fn run_command(py: Python<'_>, words: Vec<OsString>) -> PyResult<u8> {
     let arguments: &'static Arguments = match program::parse(&words) {

@@ -9,15 +9,15 @@ use pyo3::exceptions::{PyArithmeticError, PyValueError};
 use pyo3::prelude::*;
 use std::sync::Arc;
 
-/// The equations of motion of one flexible body, for any integrator:
+/// Equations of motion of one flexible body, for any integrator:
 ///
 ///     Mc(q) nu' + h(q, nu) + (0, 0, K_ff q + D q') = (F, tau, Q),    nu = (V, omega, q')
 ///
-/// q (nf) are the modal coordinates, V the velocity of the origin of the body frame and omega its angular
-/// velocity, both along body axes; nu has n = 6 + nf entries, of a plane body 3 + nf: V_x, V_y, omega_z, q'.
-/// F, tau (about the origin) and Q are generalised forces that do the power F'V + tau'omega + Q'q'. With A
-/// the rotation from body axes to the world, the place R of the origin has R' = A V, and Euler parameters p
-/// (cosine of half the angle first) have p' = p * (0, omega) / 2 as quaternions. Units are those of the body.
+/// q (nf) are the modal coordinates, V the velocity of the origin of the body frame and omega its angular velocity,
+/// both along body axes; nu has n = 6 + nf entries. A plane body has 3 + nf: V_x, V_y, omega_z, q'. F, tau (about the
+/// origin) and Q are generalised forces with the power F'V + tau'omega + Q'q'. With the rotation A from body axes to
+/// the world, the position R of the origin has the rate R' = A V, and Euler parameters p (cosine of half the angle
+/// first) have the rate p' = p * (0, omega) / 2 as quaternions. Units are those of the body.
 #[pyclass(frozen, module = "flexbody")]
 pub struct EquationsOfMotion {
     body: Arc<FlexBody>,
@@ -35,7 +35,7 @@ impl EquationsOfMotion {
     }
 }
 
-/// The equations at a state; at rest where no velocities are given.
+/// Returns the equations at a state; at rest if no velocities are given.
 fn evaluation<'e>(
     equations: &'e dynamics::EquationsOfMotion,
     q: &Given<'_>,
@@ -56,7 +56,7 @@ impl EquationsOfMotion {
         self.inner.n_modes()
     }
 
-    /// Number of rigid motions: 6, of a plane body 3.
+    /// Number of rigid motions: 6, or 3 for a plane body.
     #[getter]
     fn n_rigid(&self) -> usize {
         self.inner.n_rigid()
@@ -68,7 +68,7 @@ impl EquationsOfMotion {
         self.inner.n_velocities()
     }
 
-    /// Mc(q) (n x n).
+    /// Returns the mass matrix Mc(q) (n x n).
     fn mass_matrix<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         let n = self.inner.n_velocities();
         let mut matrix = vec![0.0; n * n];
@@ -76,7 +76,7 @@ impl EquationsOfMotion {
         shaped(py, matrix, [n, n])
     }
 
-    /// h(q, nu) (n): the forces that the inertia of the body takes without acceleration.
+    /// Returns h(q, nu) (n): the inertia forces at zero acceleration.
     fn velocity_forces<'py>(
         &self,
         py: Python<'py>,
@@ -86,8 +86,8 @@ impl EquationsOfMotion {
         Ok(vector(py, self.at(&q, Some(&nu))?.velocity_forces()))
     }
 
-    /// Mc(q) nu' + h(q, nu) + (0, 0, K_ff q + D q') (n): the forces that have to be applied for the
-    /// accelerations nu', without these the forces at rest from acceleration.
+    /// Returns Mc(q) nu' + h(q, nu) + (0, 0, K_ff q + D q') (n): the forces that must be applied for the accelerations
+    /// nu', which are zero by default.
     #[pyo3(signature = (q, nu, acceleration=None))]
     fn forces<'py>(
         &self,
@@ -103,10 +103,10 @@ impl EquationsOfMotion {
         Ok(vector(py, &forces))
     }
 
-    /// nu' (n) from Mc(q) nu' = applied - h(q, nu) - (0, 0, K_ff q + D q'); without `applied` of the free
+    /// Returns nu' (n) from Mc(q) nu' = applied - h(q, nu) - (0, 0, K_ff q + D q'); without `applied` for the free
     /// body.
     ///
-    /// Raises ArithmeticError where the mass matrix of the deformed body is not positive definite.
+    /// Raises ArithmeticError if the mass matrix of the deformed body is not positive definite.
     #[pyo3(signature = (q, nu, applied=None))]
     fn accelerations<'py>(
         &self,
@@ -123,8 +123,8 @@ impl EquationsOfMotion {
         Ok(vector(py, &acceleration))
     }
 
-    /// Derivatives of `forces` by q (n x nf) and by nu (n x n), at constant accelerations; that by the
-    /// accelerations is the mass matrix.
+    /// Returns the derivatives of `forces` by q (n x nf) and by nu (n x n), at constant accelerations. The derivative
+    /// by the accelerations is the mass matrix.
     #[pyo3(signature = (q, nu, acceleration=None))]
     fn jacobians<'py>(
         &self,
@@ -140,15 +140,16 @@ impl EquationsOfMotion {
         Ok((shaped(py, by_q, [n, nf])?, shaped(py, by_nu, [n, n])?))
     }
 
-    /// Generalised forces (n) of uniform gravity, given along body axes, A'g (3). Unit: length/time^2.
+    /// Returns the generalised forces (n) of uniform gravity A'g (3), given along body axes. Unit of gravity:
+    /// length/time^2.
     fn gravity<'py>(&self, py: Python<'py>, q: Given<'py>, g: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         let mut forces = vec![0.0; self.inner.n_velocities()];
         self.at(&q, None)?.add_gravity(&vector3(&g, "g")?, &mut forces);
         Ok(vector(py, &forces))
     }
 
-    /// Mc(q) nu (n): linear momentum, angular momentum about the origin, both along body axes, and those of
-    /// the modes.
+    /// Returns Mc(q) nu (n): linear momentum, angular momentum about the origin, both along body axes, and the momenta
+    /// of the modes.
     fn momenta<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         let n = self.inner.n_velocities();
         let rates = numbers(Some(&nu), n, "nu")?;
@@ -158,34 +159,34 @@ impl EquationsOfMotion {
         Ok(vector(py, &matrix.chunks_exact(n).map(product).collect::<Vec<f64>>()))
     }
 
-    /// T = nu' Mc(q) nu / 2. Unit: mass length^2/time^2.
+    /// Returns the kinetic energy T = nu' Mc(q) nu / 2. Unit: mass length^2/time^2.
     fn kinetic_energy(&self, q: Given<'_>, nu: Given<'_>) -> PyResult<f64> {
         Ok(self.at(&q, Some(&nu))?.kinetic_energy())
     }
 
-    /// U = q' K_ff q / 2. Unit: mass length^2/time^2.
+    /// Returns the elastic energy U = q' K_ff q / 2. Unit: mass length^2/time^2.
     fn elastic_energy(&self, q: Given<'_>) -> PyResult<f64> {
         Ok(self.inner.elastic_energy(&numbers(Some(&q), self.inner.n_modes(), "q")?))
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q (3 x 3), about the origin, body axes. Unit: mass length^2.
+    /// Returns I(q) = I0 + W1 Q + Q'W2 Q (3 x 3), about the origin, in body axes. Unit: mass length^2.
     fn inertia<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         matrix3(py, &self.at(&q, None)?.inertia())
     }
 
-    /// c + C1 q (3): first moment of the deformed body. Unit: mass length.
+    /// Returns the first moment c + C1 q (3) of the deformed body. Unit: mass length.
     fn first_moment<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(vector(py, self.at(&q, None)?.first_moment().as_slice()))
     }
 
-    /// Node of that number (`Body.node_ids`; of a model that was made without `node_ids` its position from 0): where
-    /// forces act and motion is read.
+    /// Returns the node of this number (`Body.node_ids`; without `node_ids` its index from 0) as a point for forces and
+    /// motion.
     fn node(&self, py: Python<'_>, number: i64) -> PyResult<Point> {
         let inner = self.body.node_point(number).map_err(|error| exception(py, &error))?;
         Ok(Point { equations: Arc::clone(&self.inner), inner, name: format!("node {number}") })
     }
 
-    /// The reference point of the interface of that name.
+    /// Returns the reference point of the interface of this name.
     fn interface(&self, py: Python<'_>, name: &str) -> PyResult<Point> {
         let inner = self.body.interface_point(name).map_err(|error| exception(py, &error))?;
         Ok(Point { equations: Arc::clone(&self.inner), inner, name: format!("interface {name}") })
@@ -196,7 +197,7 @@ impl EquationsOfMotion {
     }
 }
 
-/// A point of a body: a node, or the reference point of an interface. All vectors are along body axes.
+/// Point of a body: a node, or the reference point of an interface. All vectors are along body axes.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Point {
     equations: Arc<dynamics::EquationsOfMotion>,
@@ -206,23 +207,23 @@ pub struct Point {
 
 #[pymethods]
 impl Point {
-    /// Whether the point has an orientation: it then has angular velocity, and takes torques.
+    /// True if the point has an orientation: it then has an angular velocity, and accepts torques.
     #[getter]
     fn turns(&self) -> bool {
         self.inner.turns()
     }
 
-    /// r(q) (3): place in the deformed body. Unit: length.
+    /// Returns the position r(q) (3) in the deformed body. Unit: length.
     fn place<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(vector(py, self.inner.place(&evaluation(&self.equations, &q, None)?).as_slice()))
     }
 
-    /// V + omega x r + dr/dt (3). Unit: length/time.
+    /// Returns the velocity V + omega x r + dr/dt (3). Unit: length/time.
     fn velocity<'py>(&self, py: Python<'py>, q: Given<'py>, nu: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(vector(py, self.inner.velocity(&evaluation(&self.equations, &q, Some(&nu))?).as_slice()))
     }
 
-    /// J nu' + drift (3): acceleration relative to the world. Unit: length/time^2.
+    /// Returns the acceleration J nu' + drift (3) relative to the world. Unit: length/time^2.
     fn acceleration<'py>(
         &self,
         py: Python<'py>,
@@ -235,7 +236,7 @@ impl Point {
         Ok(vector(py, self.inner.acceleration(&evaluation, &rates).as_slice()))
     }
 
-    /// Angular velocity (3) of the axes of the point, None where it has none. Unit: 1/time.
+    /// Returns the angular velocity (3) of the axes of the point; None for a point without orientation. Unit: 1/time.
     fn angular_velocity<'py>(
         &self,
         py: Python<'py>,
@@ -246,7 +247,7 @@ impl Point {
         Ok(self.inner.angular_velocity(&evaluation).map(|omega| vector(py, omega.as_slice())))
     }
 
-    /// J(q) (3 x n), velocity = J nu: a force f at the point is the generalised force J'f.
+    /// Returns the Jacobian J(q) (3 x n), with velocity = J nu: a force f at the point is the generalised force J'f.
     fn jacobian<'py>(&self, py: Python<'py>, q: Given<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (n, evaluation) = (self.equations.n_velocities(), evaluation(&self.equations, &q, None)?);
         let mut rows = vec![0.0; 3 * n];
@@ -256,7 +257,7 @@ impl Point {
         shaped(py, rows, [3, n])
     }
 
-    /// Generalised forces (n) of a force and a torque at the point.
+    /// Returns the generalised forces (n) of a force and a torque at the point.
     ///
     /// Raises ValueError for a torque at a point without orientation.
     #[pyo3(signature = (q, force, torque=None))]

@@ -1,13 +1,13 @@
-//! Diagnostics of the library as Python sees them: exceptions, warnings, and tuples of both.
+//! Diagnostics of the library in Python: exceptions, warnings, and tuples of diagnostics.
 
 use flexbody::{Diagnostic, Error, Severity};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 
-/// Where the classes of exceptions and diagnostics are defined.
+/// Module with the classes of exceptions and diagnostics.
 const ERRORS: &str = "flexbody._errors";
 
-/// The exception for an error of the library: its class goes by the exit code, its diagnostics are all.
+/// Returns the exception for an error of the library. Its class follows from the exit code; it has all diagnostics.
 pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
     let code = error.exit_code() as u8;
     let made = diagnostics(py, error.diagnostics())
@@ -18,13 +18,13 @@ pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
     }
 }
 
-/// The exception for a contradiction of the library's own.
+/// Returns the exception for an internal error of the library.
 pub fn bug(py: Python<'_>) -> PyErr {
     let message = "the library stopped at a contradiction of its own";
     exception(py, &Diagnostic::new(flexbody::Code::Internal, message).into())
 }
 
-/// Diagnostics as a tuple of `flexbody.Diagnostic`.
+/// Returns diagnostics as a tuple of `flexbody.Diagnostic`.
 pub fn diagnostics<'py>(py: Python<'py>, found: &[Diagnostic]) -> PyResult<Bound<'py, PyTuple>> {
     let class = py.import(ERRORS)?.getattr("Diagnostic")?;
     let one = |diagnostic: &Diagnostic| {
@@ -40,8 +40,8 @@ pub fn diagnostics<'py>(py: Python<'py>, found: &[Diagnostic]) -> PyResult<Bound
     PyTuple::new(py, found.iter().map(one).collect::<PyResult<Vec<_>>>()?)
 }
 
-/// Warns of the warnings among `found`, in the name of the Python code that called. An error where the user
-/// made warnings errors.
+/// Issues the warnings among `found` on behalf of the calling Python code. Returns an error if the user has turned
+/// warnings into errors.
 pub fn warn(py: Python<'_>, found: &[Diagnostic]) -> PyResult<()> {
     let warnings: Vec<Diagnostic> =
         found.iter().filter(|one| one.severity() == Severity::Warning).cloned().collect();

@@ -1,5 +1,5 @@
-//! The extension module `flexbody._flexbody`: the front door of the library for Python. The package around it
-//! is in `python/flexbody`, its types in `_flexbody.pyi`.
+//! The extension module `flexbody._flexbody`: the front door of the library for Python. The package around it is in
+//! `python/flexbody`, its types in `_flexbody.pyi`.
 
 mod arrays;
 mod body;

@@ -18,16 +18,16 @@ use pyo3::types::PyTuple;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A finite element model that passed every check: K and M are symmetric, K has the rigid motions and no
-/// other zero-energy motion, M is positive semidefinite and fits the nodes.
+/// A finite element model that passed every check: K and M are symmetric, K has the rigid motions and no other
+/// zero-energy motion, M is positive semidefinite and fits the nodes.
 ///
-/// `flexbody.model` makes one of matrices, `flexbody.read_model` one of files.
+/// `flexbody.model` makes one from matrices, `flexbody.read_model` from files.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Model {
     inner: Arc<flexbody::Model>,
 }
 
-/// A square matrix in compressed columns: number of rows, pointers, rows, values.
+/// Square matrix in compressed columns: number of rows, pointers, rows, values.
 #[derive(FromPyObject)]
 pub struct Compressed<'py>(
     usize,
@@ -48,24 +48,24 @@ impl Compressed<'_> {
     }
 }
 
-/// An interface as `flexbody.model` hands it on: name, nodes, coupling, reference point.
+/// Interface from `flexbody.model`: name, nodes, coupling, reference point.
 type GivenInterface = (String, Vec<i64>, Option<String>, Option<[f64; 3]>);
 
-/// The coupling of that name.
+/// Returns the coupling of this name.
 pub fn coupling(name: Option<&str>) -> PyResult<Option<Coupling>> {
     name.map(|name| called("coupling", name, Coupling::ALL, Coupling::name)).transpose()
 }
 
-/// Damping as `flexbody.model` hands it on.
+/// Damping from `flexbody.model`.
 #[derive(FromPyObject)]
 pub enum Damping<'py> {
     /// One ratio for every mode.
     Ratio(f64),
-    /// alpha and beta of D = alpha M + beta K.
+    /// Factors alpha and beta of D = alpha M + beta K.
     Rayleigh(f64, f64),
-    /// Ratios by frequency: ends in hertz, the last infinite, and ratios.
+    /// Ends of frequency bands in hertz, the last one infinite, each with its ratio.
     Bands(Vec<(f64, f64)>),
-    /// D.
+    /// Damping matrix D.
     Matrix(Compressed<'py>),
 }
 
@@ -78,7 +78,7 @@ fn damped(py: Python<'_>, builder: ModelBuilder, damping: &Damping<'_>) -> PyRes
     })
 }
 
-/// What is asked of a conversion, by names.
+/// Returns the options of a conversion from names.
 #[allow(clippy::too_many_arguments)] // the keywords of a Python function
 fn convert_options(
     modes: Option<usize>,
@@ -107,7 +107,7 @@ fn convert_options(
         options = options.without_comparators();
     }
     let unknown = |expected| PyValueError::new_err(format!("frame is `{frame}`, {expected}"));
-    // Imported shapes are read from a file, which is an option of the program.
+    // Imported shapes are read from a file, which is an option of the program only.
     let computed = Basis::ALL.into_iter().filter(|basis| *basis != Basis::Imported);
     Ok(options
         .basis(called("basis", basis, computed, Basis::name)?)
@@ -124,7 +124,7 @@ impl Model {
 
 #[pymethods]
 impl Model {
-    /// Makes a model of arrays; `flexbody.model` prepares them.
+    /// Makes a model from arrays, which `flexbody.model` prepares.
     #[staticmethod]
     #[pyo3(name = "_assembled")]
     #[pyo3(signature = (name, stiffness, mass, node_ids, positions, *, plane, dofs, interfaces, units, damping, residual_vectors, allow_implausible))]
@@ -153,7 +153,7 @@ impl Model {
             builder = builder.plane();
         }
         if let Some(labels) = dofs {
-            // The caller has checked the directions; others are refused with the model.
+            // The caller has checked the directions. Invalid ones are refused with the model.
             let label = |row: ArrayView1<'_, i64>| (row[0], u8::try_from(row[1]).unwrap_or(u8::MAX));
             builder = builder.dofs(labels.as_array().rows().into_iter().map(label).collect::<Vec<_>>());
         }
@@ -177,7 +177,7 @@ impl Model {
         Self::told(py, run(py, move |_| builder.build())?)
     }
 
-    /// Reads the model of a manifest, or of the job of an FE program; `flexbody.read_model` calls it.
+    /// Reads the model of a manifest, or of the job of an FE program, for `flexbody.read_model`.
     #[staticmethod]
     #[pyo3(name = "_read")]
     fn read(
@@ -208,7 +208,7 @@ impl Model {
         Self::told(py, read)
     }
 
-    /// Name.
+    /// Name of the model.
     #[getter]
     fn name(&self) -> &str {
         self.inner.name()
@@ -238,10 +238,10 @@ impl Model {
         diagnostics(py, self.inner.diagnostics())
     }
 
-    /// Computes modes and invariants, as `flexbody.convert` does.
+    /// Computes modes and invariants, like `flexbody.convert`.
     ///
-    /// With a `scene` (a `Scene`, the path of a scene file, or a list of load cases) the body has the terms
-    /// and modes alone that the scene needs; `Body.terms` says why.
+    /// With a `scene` (a `Scene`, the path of a scene file, or a list of load cases) the body has only the terms and
+    /// modes that the scene needs; `Body.terms` gives the reasons.
     ///
     /// Raises InputError, NumericalError or ResourceError.
     #[pyo3(signature = (*, modes=None, max_frequency=None, basis="free", accuracy="standard", frame="com", comparators=true, scene=None))]
@@ -272,13 +272,13 @@ impl Model {
             }
         };
         warn(py, &found)?;
-        // What was said about the model was warned of when it was made.
+        // Warnings about the model were issued when it was made.
         found.splice(0..0, self.inner.diagnostics().iter().cloned());
         Ok(Body::new(body, found))
     }
 
-    /// Measures what accuracy costs in a scene: candidate bodies beside a reference, as `flexbody.trade`. Of
-    /// several load cases every candidate is measured in each, and is as good as it is in the worst.
+    /// Measures accuracy against cost in a scene: candidate bodies against a reference, like `flexbody.trade`. With
+    /// several load cases every candidate is measured in each of them and judged by the worst.
     #[pyo3(signature = (scene, *, modes=20, repeat=3, reference="full"))]
     fn trade(
         &self,

@@ -1,10 +1,10 @@
-//! Reports in the forms that Python asks for.
+//! Reports in the forms that Python requests.
 
 use crate::choice::called;
 use flexbody::ReportFormat;
 use pyo3::prelude::*;
 
-/// A report as a dict of its JSON, or as a text in one of its formats.
+/// Returns a report as a dict of its JSON, or as a text in one of its formats.
 pub fn report<'py>(
     py: Python<'py>,
     form: &str,
@@ -23,7 +23,7 @@ pub fn report<'py>(
     Ok(text.into_pyobject(py)?.into_any())
 }
 
-/// A JSON text as objects of Python.
+/// Returns a JSON text as Python objects.
 pub fn loads<'py>(py: Python<'py>, json: &str) -> PyResult<Bound<'py, PyAny>> {
     py.import("json")?.call_method1("loads", (json,))
 }

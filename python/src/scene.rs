@@ -1,4 +1,4 @@
-//! Scenes, what bodies do in them, and what they need for that.
+//! Scenes, the motion of bodies in them, and the selection of terms and modes.
 
 use crate::arrays::{Kept, shaped, triples, vector};
 use crate::errors::{diagnostics, warn};
@@ -9,9 +9,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use std::path::PathBuf;
 
-/// What a body is to do: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).
+/// A scene for a body: gravity, loads, prescribed motion, duration, tolerances (docs/simulate.md).
 ///
-/// Scene(path, case=None) reads a scene file, of one with load cases the one that is named.
+/// Scene(path, case=None) reads a scene file; `case` names the load case of a file that has several.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Scene {
     inner: flexbody::Scene,
@@ -26,14 +26,14 @@ impl Scene {
         Ok(Self { inner })
     }
 
-    /// All load cases of a scene file, in its order; of a file without cases that is one scene.
+    /// Returns all load cases of a scene file, in its order; the single scene of a file without cases.
     #[staticmethod]
     fn cases(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Scene>> {
         let scene = alone(py, || flexbody::Scene::read(&path))?;
         Ok(scene.cases().into_iter().map(|inner| Self { inner }).collect())
     }
 
-    /// Name; of a load case that of the scene, a colon and its own.
+    /// Name of the scene; for a load case the name of the scene, a colon and the name of the case.
     #[getter]
     fn name(&self) -> &str {
         self.inner.name()
@@ -45,7 +45,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// The one scene that a caller names: a `Scene`, or the path of a file without load cases.
+    /// Returns the single scene that a caller gives: a `Scene`, or the path of a file without load cases.
     pub fn one(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
         if let Ok(scene) = given.cast::<Self>() {
             return Ok(scene.get().inner.clone());
@@ -54,7 +54,7 @@ impl Scene {
         alone(py, || flexbody::Scene::read_case(&path, None))
     }
 
-    /// The scene with all load cases that a caller names: a `Scene`, a list of them, or the path of a file.
+    /// Returns the scene with all load cases that a caller gives: a `Scene`, a list of them, or the path of a file.
     pub fn whole(py: Python<'_>, given: &Bound<'_, PyAny>) -> PyResult<flexbody::Scene> {
         if let Ok(scene) = given.cast::<Self>() {
             return Ok(scene.get().inner.clone());
@@ -69,7 +69,7 @@ impl Scene {
     }
 }
 
-/// Which terms and modes a body needs in a scene.
+/// The terms and modes that a body needs in a scene.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Selection {
     inner: flexbody::Selection,
@@ -84,19 +84,19 @@ impl Selection {
 
 #[pymethods]
 impl Selection {
-    /// The modes that are kept, from 0.
+    /// Indices of the kept modes, from 0.
     #[getter]
     fn modes<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
         PyArray1::from_iter(py, self.inner.modes().iter().map(|&mode| mode as i64))
     }
 
-    /// The groups of terms of the kinetic energy: list of (name, whether it is kept, reason).
+    /// Groups of terms of the kinetic energy: list of (name, true if it is kept, reason).
     #[getter]
     fn groups(&self) -> Vec<(&str, bool, &str)> {
         self.inner.groups()
     }
 
-    /// Whether the tolerances of the scene hold, as far as they were measured.
+    /// True if the tolerances of the scene hold, as far as they were measured.
     #[getter]
     fn holds(&self) -> bool {
         self.inner.holds()
@@ -108,7 +108,7 @@ impl Selection {
         diagnostics(py, self.inner.diagnostics())
     }
 
-    /// The report of `flexbody select`: a dict with all numbers, or "json", "text", "html" as a str.
+    /// Returns the report of `flexbody select`: a dict with all numbers, or "json", "text", "html" as a str.
     #[pyo3(signature = (form="dict"))]
     fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
@@ -121,10 +121,10 @@ impl Selection {
     }
 }
 
-/// The motion of a body in a scene, at nt instants, in the units of the body.
+/// Motion of a body in a scene, at nt instants, in the units of the body.
 ///
-/// The frame that it is told by has its origin at the centre of mass of the undeformed body, or at the
-/// reference point of what carries it, and the axes of the model, which turn with the body.
+/// The motion is that of a frame with its origin at the centre of mass of the undeformed body, or at the reference
+/// point of its carrier, and with the axes of the model, which turn with the body.
 #[pyclass(frozen, module = "flexbody")]
 pub struct Motion {
     inner: flexbody::Motion,
@@ -137,12 +137,12 @@ impl Motion {
         Ok(Self { inner, kept: Kept::default() })
     }
 
-    /// The motion of the library.
+    /// Returns the motion of the library.
     pub fn inner(&self) -> &flexbody::Motion {
         &self.inner
     }
 
-    /// An array with a row for each instant.
+    /// Returns an array with a row for each instant.
     fn rows<'py, R: AsRef<[f64]>>(
         &self,
         py: Python<'py>,
@@ -157,7 +157,7 @@ impl Motion {
         })
     }
 
-    /// An array with a number for each instant.
+    /// Returns an array with a number for each instant.
     fn numbers<'py>(
         &self,
         py: Python<'py>,
@@ -179,25 +179,25 @@ impl Motion {
         self.kept.get(py, "time", || Ok(vector(py, self.inner.times())))
     }
 
-    /// q (nt x nf): modal coordinates. Unit: sqrt(mass) length.
+    /// Modal coordinates q (nt x nf). Unit: sqrt(mass) length.
     #[getter]
     fn modal_coordinates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, "modal_coordinates", |instant| self.inner.modal_coordinates(instant).to_vec())
     }
 
-    /// dq/dt (nt x nf).
+    /// Rates dq/dt of the modal coordinates (nt x nf). Unit: sqrt(mass) length/time.
     #[getter]
     fn modal_velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, "modal_velocities", |instant| self.inner.modal_velocities(instant).to_vec())
     }
 
-    /// Place of the origin of the frame, world axes (nt x 3). Unit: length.
+    /// Position of the origin of the frame, in world axes (nt x 3). Unit: length.
     #[getter]
     fn origin<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, "origin", |instant| <[f64; 3]>::from(self.inner.origin(instant)))
     }
 
-    /// Velocity of the origin, world axes (nt x 3). Unit: length/time.
+    /// Velocity of the origin, in world axes (nt x 3). Unit: length/time.
     #[getter]
     fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, "velocity", |instant| <[f64; 3]>::from(self.inner.velocity(instant)))
@@ -215,38 +215,38 @@ impl Motion {
         self.rows(py, "angular_velocity", |instant| <[f64; 3]>::from(self.inner.angular_velocity(instant)))
     }
 
-    /// Kinetic energy (nt).
+    /// Kinetic energy (nt). Unit: mass length^2/time^2.
     #[getter]
     fn kinetic_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, "kinetic_energy", |instant| self.inner.kinetic_energy(instant))
     }
 
-    /// Elastic energy (nt).
+    /// Elastic energy (nt). Unit: mass length^2/time^2.
     #[getter]
     fn elastic_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, "elastic_energy", |instant| self.inner.elastic_energy(instant))
     }
 
-    /// Work of forces, damping and prescribed motion since the start (nt).
+    /// Work of forces, damping and prescribed motion since the start (nt). Unit: mass length^2/time^2.
     #[getter]
     fn work<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.numbers(py, "work", |instant| self.inner.work(instant))
     }
 
-    /// Linear momentum, world axes (nt x 3).
+    /// Linear momentum, in world axes (nt x 3). Unit: mass length/time.
     #[getter]
     fn linear_momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, "linear_momentum", |instant| <[f64; 3]>::from(self.inner.linear_momentum(instant)))
     }
 
-    /// Angular momentum about where the origin was at the start, world axes (nt x 3).
+    /// Angular momentum about the initial position of the origin, in world axes (nt x 3). Unit: mass length^2/time.
     #[getter]
     fn angular_momentum<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.rows(py, "angular_momentum", |instant| <[f64; 3]>::from(self.inner.angular_momentum(instant)))
     }
 
-    /// Force and torque about the origin that prescribed motion takes, along the axes of the frame (nt x 6);
-    /// None where nothing is prescribed.
+    /// Force, and torque about the origin, of the prescribed motion, along the axes of the frame (nt x 6); None if no
+    /// motion is prescribed.
     #[getter]
     fn reactions<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
         if self.inner.times().is_empty() || self.inner.reaction(0).is_none() {
@@ -259,7 +259,7 @@ impl Motion {
         self.rows(py, "reactions", row).map(Some)
     }
 
-    /// Paths of the watched points: dict of name to PointPath, arrays (nt x 3) of place, deflection, velocity
+    /// Paths of the watched points: dict of name to PointPath, with arrays (nt x 3) of position, deflection, velocity
     /// and acceleration.
     #[getter]
     fn paths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -273,21 +273,21 @@ impl Motion {
         Ok(all)
     }
 
-    /// The largest deflection of any node, also between the instants. Unit: length.
+    /// Largest deflection of any node, also between the instants. Unit: length.
     #[getter]
     fn largest_deflection(&self) -> f64 {
         self.inner.largest_deflection()
     }
 
-    /// How far energy less work, linear and angular momentum less their impulses drifted, relative to the
-    /// largest of the motion: (energy, linear, angular).
+    /// Drift of energy less work, and of linear and angular momentum less their impulses, relative to the largest of
+    /// the motion: (energy, linear, angular).
     #[getter]
     fn drift(&self) -> (f64, f64, f64) {
         let [energy, linear, angular] = self.inner.drift();
         (energy, linear, angular)
     }
 
-    /// Steps of the integration.
+    /// Number of steps of the integration.
     #[getter]
     fn steps(&self) -> u64 {
         self.inner.steps()
@@ -299,18 +299,18 @@ impl Motion {
         diagnostics(py, self.inner.diagnostics())
     }
 
-    /// Writes the motion to an HDF5 file as `flexbody simulate -o` does: it appears whole or not at all.
+    /// Writes the motion to an HDF5 file, like `flexbody simulate -o`. The file appears complete or not at all.
     fn write(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         brief(py, || self.inner.write(&path))
     }
 
-    /// The report of `flexbody simulate`: a dict with all numbers, or "json", "text", "html" as a str.
+    /// Returns the report of `flexbody simulate`: a dict with all numbers, or "json", "text", "html" as a str.
     #[pyo3(signature = (form="dict"))]
     fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
 
-    /// The table of `flexbody simulate --csv`, as a str.
+    /// Returns the table of `flexbody simulate --csv`, as a str.
     fn csv(&self) -> String {
         self.inner.csv()
     }

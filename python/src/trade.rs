@@ -1,4 +1,4 @@
-//! What accuracy costs in a scene.
+//! The cost of accuracy in a scene.
 
 use crate::body_class::Body;
 use crate::choice::called;
@@ -14,7 +14,7 @@ pub struct Trade {
     inner: flexbody::Trade,
 }
 
-/// What is asked of a study; `reference` is `full`, `fine` or `nodal`.
+/// Returns the options of a study; `reference` is `full`, `fine` or `nodal`.
 pub fn options(modes: usize, repeat: usize, reference: &str) -> PyResult<TradeOptions> {
     let reference = called("reference", reference, ReferenceChoice::ALL, ReferenceChoice::name)?;
     Ok(TradeOptions::default().modes(modes).repeat(repeat).reference(reference))
@@ -29,26 +29,26 @@ impl Trade {
 
 #[pymethods]
 impl Trade {
-    /// The candidates, a dict each with what `flexbody trade` says of it: source, kind, modes, groups,
-    /// errors, worst error over its tolerance, multiplications, bytes, seconds. The first is the reference.
+    /// Candidates, each as a dict with the properties from `flexbody trade`: source, kind, modes, groups, errors, worst
+    /// error over its tolerance, multiplications, bytes, seconds. The first candidate is the reference.
     #[getter]
     fn candidates<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         report(py, "dict", |format| self.inner.report(format))?.get_item("rows")
     }
 
-    /// The candidate to take, from 0; None where none holds the tolerances or is as cheap as allowed.
+    /// Index of the recommended candidate, from 0; None if no candidate keeps the tolerances at an allowed cost.
     #[getter]
     fn recommended(&self) -> Option<usize> {
         self.inner.recommended()
     }
 
-    /// The candidates, from 0, that no other is cheaper than and as accurate as, ascending in cost.
+    /// Indices of the candidates, from 0, for which no other candidate is cheaper and as accurate, ascending in cost.
     #[getter]
     fn front(&self) -> Vec<usize> {
         self.inner.front().to_vec()
     }
 
-    /// Whether there is a candidate to take, and what it was measured against can be trusted.
+    /// True if there is a recommended candidate and the reference can be trusted.
     #[getter]
     fn holds(&self) -> bool {
         self.inner.holds()
@@ -60,19 +60,19 @@ impl Trade {
         diagnostics(py, self.inner.diagnostics())
     }
 
-    /// The body of a candidate, from 0.
+    /// Returns the body of a candidate, counted from 0.
     fn body(&self, py: Python<'_>, candidate: usize) -> PyResult<Body> {
         let body = self.inner.body(candidate).map_err(|error| exception(py, &error))?;
         Ok(Body::new(body, Vec::new()))
     }
 
-    /// The report of `flexbody trade`: a dict with all numbers, or "json", "text", "html" as a str.
+    /// Returns the report of `flexbody trade`: a dict with all numbers, or "json", "text", "html" as a str.
     #[pyo3(signature = (form="dict"))]
     fn report<'py>(&self, py: Python<'py>, form: &str) -> PyResult<Bound<'py, PyAny>> {
         report(py, form, |format| self.inner.report(format))
     }
 
-    /// The table of `flexbody trade --csv`, as a str.
+    /// Returns the table of `flexbody trade --csv`, as a str.
     fn csv(&self) -> String {
         self.inner.csv()
     }

@@ -1,4 +1,4 @@
-//! Long work: on a thread of its own, without the lock of the interpreter, and stopped by Ctrl-C.
+//! Long computations: on a separate thread, without the lock of the interpreter, interruptible by Ctrl-C.
 
 use crate::errors::{bug, exception};
 use flexbody::program::use_threads;
@@ -11,17 +11,17 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
-/// How often signals are looked at.
+/// Interval between checks for signals.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// Stack of the thread, as that of the program.
+/// Stack size of the thread, equal to that of the program.
 const STACK: usize = 8 << 20;
 
-/// Process whose threads compute; 0 before the first work.
+/// Process whose threads compute; 0 before the first computation.
 static OWNER: AtomicU32 = AtomicU32::new(0);
 
-/// Starts the threads that compute, once. A process that was forked after that has none of them, and would wait for ever
-/// for their results: it gets an exception.
+/// Starts the threads that compute, once. A process that was forked afterwards has none of them and would wait for
+/// their results forever: it gets an exception.
 fn start_threads(py: Python<'_>) -> PyResult<()> {
     let own = std::process::id();
     match OWNER.compare_exchange(0, own, Ordering::SeqCst, Ordering::SeqCst) {
@@ -37,10 +37,10 @@ fn start_threads(py: Python<'_>) -> PyResult<()> {
     }
 }
 
-/// Does `work` on a thread of its own, while other threads of Python go on.
+/// Performs `work` on a separate thread, while other Python threads run.
 ///
-/// Where Python has an exception for a signal (KeyboardInterrupt), the caller gets it at once. The work hears
-/// of it by its listener and ends at its next step; it holds nothing of Python.
+/// If Python raises an exception for a signal (KeyboardInterrupt), the caller gets it at once. The work learns of it
+/// from its listener and ends at its next step; it holds no Python objects.
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(Listener<'_>) -> Result<T> + Send + 'static,
@@ -55,7 +55,7 @@ pub fn run<T: Send + 'static>(
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
         };
-        // Nobody hears of the outcome when the caller was interrupted.
+        // The result is dropped if the caller was interrupted.
         let _ = send.send(catch_unwind(AssertUnwindSafe(|| work(&listener))));
     })?;
     loop {
@@ -71,14 +71,14 @@ pub fn run<T: Send + 'static>(
     }
 }
 
-/// Does short work that may take several threads, such as writing a file, without the lock of the interpreter.
+/// Performs short work that may use several threads, such as writing a file, without the lock of the interpreter.
 pub fn brief<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
     start_threads(py)?;
     alone(py, work)
 }
 
-/// Does short work on this thread alone, such as reading a file, without the lock of the interpreter. A process that was
-/// forked can do it, too.
+/// Performs short work on this thread only, such as reading a file, without the lock of the interpreter. A forked
+/// process can do so, too.
 pub fn alone<T: Send>(py: Python<'_>, work: impl FnOnce() -> Result<T> + Send) -> PyResult<T> {
     match py.detach(|| catch_unwind(AssertUnwindSafe(work))) {
         Ok(done) => done.map_err(|error| exception(py, &error)),

@@ -1,43 +1,44 @@
-//! An attempt to find modes: whether it can be used for the problem at hand, what it takes, and its search.
+//! The interface of an attempt to find modes: suitability for the problem, memory and time, and the search.
 
 use super::failure::EigenFailure;
 use super::needs::{Needs, Unusable};
 use super::problem::Task;
 use super::refine::FoundModes;
 
-/// The aim of a search.
+/// Goal of a search for modes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Goal {
     /// Number of modes, extended to the end of the cluster of the last one.
     pub wanted: usize,
-    /// K-residual.
+    /// Largest K-residual allowed for the modes.
     pub tolerance: f64,
-    /// Distance of eigenvalues, relative to the size of the matrix along their modes, that the count needs above the
-    /// last mode: corrections go on to the next such gap where it is near.
+    /// Smallest gap above the last mode that the later count needs, relative to the size of the matrix along the modes;
+    /// 0 if any gap will do. If the gap is smaller, corrections also search the modes up to the next gap that is wide
+    /// enough, provided that it is near.
     pub separation: f64,
-    /// Number of the search for the same modes: a search repeated after a count that found more modes starts from
-    /// other random vectors.
+    /// Number of this search among the searches for the same modes. A search repeated after a count that found more
+    /// modes starts from other random vectors.
     pub round: usize,
 }
 
-/// The algorithm of a [`Way`](super::plan::Way).
+/// Algorithm behind a [`Way`](super::plan::Way).
 pub(super) trait Attempt: Sync {
-    /// Returns what a search for so many modes takes.
+    /// Returns the memory and time that a search for `wanted` modes takes.
     ///
     /// # Errors
-    /// [`Unusable`] where it cannot be used, or another one takes less time.
+    /// [`Unusable`] if the attempt cannot be used, or another attempt takes less time.
     fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable>;
 
-    /// Searches.
+    /// Searches for the modes.
     ///
     /// # Errors
-    /// [`EigenFailure`] says why there are no modes that keep the tolerance.
+    /// [`EigenFailure`] with the reason why no modes keep the tolerance.
     fn search(&self, task: &Task<'_>, goal: &Goal) -> Result<FoundModes, EigenFailure>;
 
-    /// Returns true when a failure says something about the model: no other attempt would succeed.
+    /// Returns true when the failure reveals a property of the model, so that no other attempt would succeed.
     fn is_conclusive(&self, failure: &EigenFailure) -> bool;
 
-    /// Returns true when the attempt is made again in a search that repeats one in which modes were missed.
+    /// Returns true when the attempt is also made in a repeated search, after a count that found missing modes.
     fn is_repeated(&self) -> bool {
         true
     }

@@ -1,11 +1,11 @@
-//! Guaranteed lower and upper bounds of every eigenvalue, about the exact K and M as they are stored (theory
-//! section 8, "Certified").
+//! Guaranteed lower and upper bounds of every eigenvalue of the exact K and M as they are stored (theory section 8,
+//! "Certified").
 //!
-//! With A = K + tau M = L L', omega = lambda + tau are the eigenvalues of the pencil (A, M), and mu = 1 /
-//! omega those of S = L^-1 M L^-T: M may be singular. The Lehmann-Goerisch method turns a count of the
-//! eigenvalues on the other side of a shift s into bounds of those on this side, whose distance from the
-//! truth is quadratic in the residuals (Kato-Temple for one mode, a block for repeated ones). Everything that
-//! enters is evaluated in double-double arithmetic, with a bound of its own rounding.
+//! With A = K + tau M = L L', the eigenvalues of the pencil (A, M) are omega = lambda + tau, and those of S = L^-1 M
+//! L^-T are mu = 1 / omega: M may be singular. The Lehmann-Goerisch method turns a count of the eigenvalues on one side
+//! of a shift s into bounds of the eigenvalues on the other side. The bounds differ from the eigenvalues by the square
+//! of the residuals (Kato-Temple for one mode, a block for repeated ones). All quantities are evaluated in
+//! double-double arithmetic, with a bound of the rounding of that arithmetic.
 
 use super::canonical::clusters;
 use super::completeness::count_below;
@@ -22,29 +22,30 @@ use flexbody_linalg::{
 /// Unit roundoff of f64.
 const U: f64 = f64::EPSILON / 2.0;
 
-/// Room for the rounding of the bounds themselves where they are evaluated in f64.
+/// Factor that covers the rounding of the bounds themselves where they are evaluated in f64.
 const ROOM: f64 = 1.0 + 1e-6;
 
-/// Shift between rigid and flexible modes relative to the first eigenvalue: rigid modes whose rounding comes
-/// near are refused before.
+/// Shift between the rigid and the flexible modes, relative to the first flexible eigenvalue. Rigid modes whose
+/// rounding comes near this shift have been refused before.
 const PART_BELOW: f64 = 0.5;
 
-/// tau relative to the first eigenvalue: the larger it is the better conditioned is K + tau M, and the wider
-/// are the bounds.
+/// Values of tau relative to the first eigenvalue, in the order of their use. A larger tau makes K + tau M better
+/// conditioned and the bounds wider.
 const SHIFTS: [f64; 4] = [1.0, 1e2, 1e4, 1e6];
 
-/// Counts the eigenvalues below the modes and encloses those between the two shifts.
+/// Counts the eigenvalues below the modes and encloses the eigenvalues between the two shifts.
 ///
 /// * `vectors` (N x m, m > 0): nearly M-orthonormal approximate modes, one for every flexible eigenvalue
 ///   below `high`.
-/// * `eigenvalues`: their approximate eigenvalues, ascending.
-/// * `high`: shift above them, below which a count found m eigenvalues and the rigid ones.
-/// * `gap`: as in [`clusters`].
+/// * `eigenvalues`: approximate eigenvalues of `vectors`, ascending.
+/// * `high`: shift above all of `eigenvalues`; an inertia count found m flexible eigenvalues and the rigid ones below
+///   it.
+/// * `gap`: relative gap between clusters, see [`clusters`].
 ///
 /// # Errors
-/// [`EigenFailure::CountDiffers`] when there are others than the rigid modes below half the first eigenvalue,
-/// [`EigenFailure::NotCertified`] when K + tau M cannot be proved positive definite in f64 or the counts are
-/// wrong.
+/// [`EigenFailure::CountDiffers`] if the number of eigenvalues below half the first flexible one is not the number of
+/// rigid modes; [`EigenFailure::NotCertified`] if K + tau M cannot be proved positive definite in f64, or if bounds
+/// contradict the counts.
 pub(super) fn enclose(
     task: &Task<'_>,
     vectors: MatRef<'_, f64>,
@@ -80,7 +81,7 @@ pub(super) fn enclose(
     };
     let mut lower = bounds(below, low, DoubleDouble::below);
     let mut upper = bounds(above, high, DoubleDouble::above);
-    // What the counts say by themselves; ascending, as the eigenvalues are.
+    // Bounds that follow from the counts alone; both lists ascend as the eigenvalues do.
     for j in 0..count {
         lower[j] = lower[j].max(low).max(if j > 0 { lower[j - 1] } else { low });
     }
@@ -88,30 +89,30 @@ pub(super) fn enclose(
         upper[j] = upper[j].min(high).min(if j + 1 < count { upper[j + 1] } else { high });
     }
     if lower.iter().zip(&upper).any(|(lower, upper)| lower > upper) {
-        // Bounds are right if the counts are.
+        // Bounds hold if the counts do: crossed bounds disprove a count.
         return Err(EigenFailure::NotCertified { why: "bounds of the eigenvalues contradict their counts" });
     }
     let shape_error = trial.shape_errors(&lower, &upper, (low, high), tau, &clusters(eigenvalues, gap));
     Ok(EigenvalueBounds { lower, upper, shape_error, shift_below: low, pivots_below })
 }
 
-/// Cholesky factor of A - alpha D with A = K + tau M and D its diagonal. That it exists proves A >= margin D,
-/// with all rounding counted.
+/// Cholesky factor of A - alpha D, with A = K + tau M and the diagonal D of A. The existence of the factor proves A >=
+/// margin D, with all rounding counted.
 struct ProvedFactor<'a> {
     pencil: Pencil<'a>,
     factor: Cholesky<'a>,
     tau: f64,
-    /// D.
+    /// Diagonal D of A.
     diagonal: Vec<f64>,
     margin: f64,
-    /// |D^-1/2 (|K| + tau |M|) D^-1/2| in the 2-norm.
+    /// Upper bound of |D^-1/2 (|K| + tau |M|) D^-1/2| in the 2-norm.
     size: f64,
-    /// Most entries in a row of K or M.
+    /// Largest number of entries in a row of K or M.
     row: f64,
 }
 
 impl<'a> ProvedFactor<'a> {
-    /// `None` when A is not positive definite, or not by more than rounding.
+    /// Factors A - alpha D. Returns `None` if A is not positive definite by more than rounding.
     ///
     /// If the Cholesky factorisation of a matrix with the diagonal d runs to its end, its factor is that of a
     /// matrix whose entries differ by at most gamma sqrt(d_i d_j) with gamma = (k + 2) u and k entries in the
@@ -148,23 +149,23 @@ impl<'a> ProvedFactor<'a> {
         Some(Self { pencil: *pencil, factor, tau, diagonal, margin, size, row: row as f64 })
     }
 
-    /// An upper bound of |x| in the norm of D.
+    /// Returns an upper bound of |x| in the norm of D.
     fn norm(&self, x: impl Iterator<Item = f64>) -> f64 {
         ROOM * x.zip(&self.diagonal).map(|(x, d)| x * x * d).sum::<f64>().sqrt()
     }
 
-    /// An upper bound of |r| in the norm of D^-1.
+    /// Returns an upper bound of |r| in the norm of D^-1.
     fn dual_norm(&self, r: impl Iterator<Item = f64>) -> f64 {
         ROOM * r.zip(&self.diagonal).map(|(r, d)| r * r / d).sum::<f64>().sqrt()
     }
 
-    /// K X and M X.
+    /// Returns K X and M X in double-double arithmetic.
     fn products(&self, x: MatRef<'_, f64>) -> (CompensatedBlock, CompensatedBlock) {
         let k = multiply_compensated(self.pencil.stiffness(), 1, x);
         (k, multiply_compensated(self.pencil.mass(), self.pencil.block(), x))
     }
 
-    /// Upper bounds of |r|^2 in the norm of A^-1 for the columns r of a block.
+    /// Returns upper bounds of |r|^2 in the norm of A^-1 for the columns r of a block.
     ///
     /// For any z, r = A z + e gives |r| <= sqrt(z'Az) + |e|, and |e|^2 <= |e|^2_(D^-1) / margin.
     fn residual_norms(&self, r: MatRef<'_, f64>, context: &Context<'_>) -> Vec<f64> {
@@ -177,6 +178,7 @@ impl<'a> ProvedFactor<'a> {
                 (DoubleDouble::from(r[(i, c)]) - kz.get(i, c) - mz.get(i, c) * self.tau).hi
             })
         };
+        // Two steps of iterative refinement of A z = r.
         for _ in 0..2 {
             let mut correction = rest(&z);
             self.factor.solve_in_place(correction.as_mut());
@@ -192,7 +194,7 @@ impl<'a> ProvedFactor<'a> {
             .map(|c| {
                 let (z, r, e) = (z.col(c), r.col(c), e.col(c));
                 let along: f64 = z.iter().zip(r.iter()).map(|(z, r)| z * r).sum();
-                // z'Az = z'r - z'e; the sum itself may be off by n u of its magnitudes.
+                // z'Az = z'r - z'e; the computed sum may be off by n u of the sum of its magnitudes.
                 let slack: f64 =
                     (0..n).map(|i| z[i].abs() * (e[i].abs() + (n as f64 + 2.0) * U * r[i].abs())).sum();
                 // e was rounded to f64 and evaluated to 8 u^2 of its terms.
@@ -205,21 +207,22 @@ impl<'a> ProvedFactor<'a> {
     }
 }
 
-/// On which side of all eigenvalues in question the shift lies.
+/// Side of all enclosed eigenvalues on which the shift lies.
 #[derive(Clone, Copy, PartialEq)]
 enum Side {
     Above,
     Below,
 }
 
-/// Approximate modes X with what the bounds need of them.
+/// Approximate modes X with the quantities that their bounds need.
 struct Trial {
     /// Nearest f64 to lambda + tau.
     omega: Vec<f64>,
-    /// X'AX and X'MX.
+    /// Gram matrices X'AX and X'MX.
     stiffness: Vec<Vec<DoubleDouble>>,
     mass: Vec<Vec<DoubleDouble>>,
-    /// Entry (i, j) of X'AX is exact to `error[i] error[j]`, that of X'MX to a tau-th of it.
+    /// Factors of the error bounds: entry (i, j) of X'AX is exact to `error[i] * error[j]`, and entry (i, j) of X'MX to
+    /// that bound divided by tau.
     error: Vec<f64>,
     tau: f64,
     /// Upper bounds of |A x - omega M x|^2 in the norm of A^-1.
@@ -240,6 +243,7 @@ impl Trial {
             context.count(|work| work.mass_columns += width as u64);
             let (kx, mx) = factor.products(block);
             let (gk, gm) = (gram_compensated(x, &kx), gram_compensated(x, &mx));
+            // Both triangles from the upper one: the Gram matrices are symmetric.
             for c in 0..width {
                 for i in 0..=start + c {
                     let value = gk[i][c] + gm[i][c] * tau;
@@ -249,6 +253,7 @@ impl Trial {
                     trial.mass[start + c][i] = gm[i][c];
                 }
             }
+            // Residuals R = A X - M X Omega = K X + M X (tau - Omega).
             let shifts: Vec<DoubleDouble> =
                 (0..width).map(|c| DoubleDouble::sum(tau, -trial.omega[start + c])).collect();
             let r = Mat::from_fn(n, width, |i, c| (kx.get(i, c) + mx.get(i, c) * shifts[c]).hi);
@@ -267,8 +272,8 @@ impl Trial {
         trial
     }
 
-    /// Lehmann-Goerisch bounds of omega, ascending: lower ones for a shift s above, upper ones for a shift
-    /// below. `None` for all or for one when the trial vectors are not good enough.
+    /// Returns the Lehmann-Goerisch bounds of omega, ascending: lower bounds for a shift s above the eigenvalues, upper
+    /// bounds for a shift below. `None` for all, or for one, means that the trial vectors are not accurate enough.
     ///
     /// For G_A = X'AX, G_M = X'MX and T >= X'M A^-1 M X, the eigenvalues kappa of (G_A - s G_M) v = kappa
     /// (G_A - 2 s G_M + s^2 T) v give the bounds s - s / (1 - kappa). With R = A X - M X Omega, Omega T Omega
@@ -278,6 +283,8 @@ impl Trial {
         let sign = if side == Side::Above { -1.0 } else { 1.0 };
         let empty = || vec![vec![DoubleDouble::default(); count]; count];
         let (mut p, mut q) = (empty(), empty());
+        // The two matrices of the small pencil, scaled by Omega from both sides, with bounds of the errors of their
+        // entries.
         let (mut p_error, mut q_error) = (vec![vec![0.0; count]; count], vec![vec![0.0; count]; count]);
         for i in 0..count {
             for j in 0..count {
@@ -288,7 +295,7 @@ impl Trial {
                 let scaled = |value: DoubleDouble| value * wi * wj;
                 p[i][j] = scaled(a - s * m) * sign;
                 q[i][j] = scaled(a - s * m * 2.0) + s * s * t;
-                // Entries of the Gram matrices, and 32 u^2 of all terms for these lines themselves.
+                // Errors of the Gram matrices, and 32 u^2 of all terms for the rounding of the lines above.
                 let (da, dm) = (self.error[i] * self.error[j], self.error[i] * self.error[j] / self.tau);
                 let da = da + 32.0 * U * U * a.hi.abs();
                 let dm = dm + 32.0 * U * U * m.hi.abs();
@@ -299,6 +306,7 @@ impl Trial {
             }
         }
         let (p_slack, q_slack) = (Slack::of(&p, &p_error)?, Slack::of(&q, &q_error)?);
+        // Both matrices are scaled so that Q has a diagonal of ones.
         for matrix in [&mut p, &mut q] {
             for (row, si) in matrix.iter_mut().zip(&q_slack.scale) {
                 for (value, sj) in row.iter_mut().zip(&q_slack.scale) {
@@ -307,6 +315,7 @@ impl Trial {
             }
         }
         let kappa = small_pencil(p, &q)?.values;
+        // Every kappa is moved by its relative error to the side where the bound still holds.
         let slack = p_slack.relative + q_slack.relative + (count as f64 + 10.0) * 2f64.powi(-96);
         let one = DoubleDouble::from(1.0);
         let bound = |kappa: DoubleDouble| {
@@ -323,7 +332,7 @@ impl Trial {
         Some(bounds)
     }
 
-    /// For each mode, a bound of its distance to the exact eigenspace of its cluster in the norm of M:
+    /// Returns for each mode a bound of its distance from the exact eigenspace of its cluster, in the norm of M:
     /// |r| sqrt(omega') / |omega - omega'| with the nearest eigenvalue omega' outside the cluster, on either side.
     fn shape_errors(
         &self,
@@ -337,7 +346,8 @@ impl Trial {
         for cluster in clusters {
             let below = if cluster.start == 0 { low } else { upper[cluster.start - 1] } + tau;
             let above = if cluster.end == lower.len() { high } else { lower[cluster.end] } + tau;
-            // Within a cluster the modes are rotated afterwards: none is worse than all together.
+            // The modes of a cluster are rotated afterwards: no rotated mode is worse than all modes of the cluster
+            // together.
             let square: f64 = cluster
                 .clone()
                 .map(|j| {
@@ -346,23 +356,24 @@ impl Trial {
                     self.residual[j] * distance(below, omega - below).max(distance(above, above - omega))
                 })
                 .sum();
-            // No unit vector is further away than 1.
+            // Two unit vectors are at most 1 apart in this measure.
             errors.extend(cluster.clone().map(|_| (ROOM * square.sqrt()).min(1.0)));
         }
         errors
     }
 }
 
-/// Bound of the distance of a symmetric matrix from the exact one.
+/// Bound of the distance of a computed symmetric matrix from the exact one.
 struct Slack {
-    /// Scales its diagonal to ones.
+    /// Factors that scale the diagonal of the matrix to ones.
     scale: Vec<f64>,
-    /// The exact matrix lies between 1 -+ this times the computed one.
+    /// Relative distance d: the exact matrix lies between (1 - d) and (1 + d) times the computed one.
     relative: f64,
 }
 
 impl Slack {
-    /// From bounds of the errors of the entries; `None` when the matrix is not clearly positive definite.
+    /// Computes the distance from bounds of the errors of the entries. Returns `None` if the matrix is not clearly
+    /// positive definite.
     fn of(matrix: &[Vec<DoubleDouble>], error: &[Vec<f64>]) -> Option<Self> {
         let count = matrix.len();
         let scale: Vec<f64> = (0..count).map(|i| matrix[i][i].hi.sqrt().recip()).collect();

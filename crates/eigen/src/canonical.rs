@@ -1,5 +1,5 @@
-//! A canonical basis inside repeated eigenvalues and canonical signs, so that the same body gives the same
-//! modes whatever path computed them.
+//! Canonical bases of repeated eigenvalues and canonical signs. A body has the same modes whatever algorithm computed
+//! them.
 
 use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Mat, MatMut, MatRef};
@@ -7,16 +7,16 @@ use flexbody_linalg::{combine, contiguous_mut};
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Eigenvalues closer than this (relative) belong to one cluster, completed and put into canonical form
-/// together.
+/// Relative gap between eigenvalues below which they belong to one cluster, which is completed and put into canonical
+/// form as a whole.
 pub const CLUSTER_GAP: f64 = 1e-9;
 
-/// Components whose squares are within this part of the largest count as equally large; the first of them in row order
-/// is taken, so that neither rounding nor what [`Accuracy::Fast`](super::Accuracy::Fast) leaves chooses between
-/// symmetric nodes.
+/// Relative difference of squared components below which the components count as equally large. The first of them in
+/// row order is chosen, so that neither rounding nor the residual that [`Accuracy::Fast`](super::Accuracy::Fast) allows
+/// decides between symmetric nodes.
 const EQUAL: f64 = 1e-4;
 
-/// Index ranges of eigenvalues (ascending) whose neighbours differ by at most `gap` relative to their size.
+/// Returns the index ranges of eigenvalues (ascending) whose neighbours differ by at most `gap` relative to their size.
 pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
     let mut ranges = Vec::new();
     let mut start = 0;
@@ -31,8 +31,8 @@ pub fn clusters(eigenvalues: &[f64], gap: f64) -> Vec<Range<usize>> {
     ranges
 }
 
-/// Number of eigenvalues up to the end of the cluster that the last of the first `wanted` belongs to,
-/// clusters as [`clusters`] forms them of the `count` eigenvalues lambda(0), lambda(1), ...
+/// Returns the number of eigenvalues up to the end of the cluster that contains the last of the first `wanted`.
+/// Clusters are formed as by [`clusters`] from the `count` eigenvalues lambda(0), lambda(1), ...
 pub(super) fn cluster_end(wanted: usize, count: usize, gap: f64, lambda: impl Fn(usize) -> f64) -> usize {
     let near = |i: usize| {
         let (below, above) = (lambda(i - 1), lambda(i));
@@ -44,9 +44,9 @@ pub(super) fn cluster_end(wanted: usize, count: usize, gap: f64, lambda: impl Fn
 
 /// Rotates the columns of each cluster into echelon form and fixes all signs.
 ///
-/// Within a cluster, the row with the largest norm is found and the columns are rotated so that only the
-/// first has a component there; then the same for the rest. Every column's component of largest magnitude is
-/// made positive.
+/// Within a cluster, the row with the largest norm is found and the columns are rotated so that only the first has a
+/// component in that row; the remaining columns are treated alike. The component of largest magnitude of every column
+/// is made positive.
 pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
     for cluster in clusters {
         let mut block = shapes.rb_mut().subcols_mut(cluster.start, cluster.len());
@@ -64,13 +64,13 @@ pub fn canonical_basis(mut shapes: MatMut<'_, f64>, clusters: &[Range<usize>]) {
     });
 }
 
-/// The sign that makes the component of largest magnitude positive, 1 or -1.
+/// Returns the sign, 1 or -1, that makes the component of largest magnitude positive.
 pub fn canonical_sign(mut shape: impl Iterator<Item = f64> + Clone) -> f64 {
     let dominant = first_largest(shape.clone().map(|x| x * x));
     if shape.nth(dominant).is_some_and(|x| x < 0.0) { -1.0 } else { 1.0 }
 }
 
-/// First row whose norm is the largest, up to [`EQUAL`].
+/// Returns the first row whose norm is the largest, up to [`EQUAL`].
 fn dominant_row(block: MatRef<'_, f64>) -> usize {
     let mut squares = vec![0.0f64; block.nrows()];
     for j in 0..block.ncols() {
@@ -81,14 +81,13 @@ fn dominant_row(block: MatRef<'_, f64>) -> usize {
     first_largest(squares.iter().copied())
 }
 
-/// Place of the first square that is the largest, up to [`EQUAL`].
+/// Returns the index of the first square that is the largest, up to [`EQUAL`].
 fn first_largest(mut squares: impl Iterator<Item = f64> + Clone) -> usize {
     let largest = squares.clone().fold(0.0, f64::max);
     squares.position(|square| square >= largest * (1.0 - EQUAL)).unwrap_or(0)
 }
 
-/// Applies the Householder reflection of the columns that leaves only the first one with a component in
-/// `row`.
+/// Applies the Householder reflection of the columns after which only the first column has a component in `row`.
 fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
     let k = block.ncols();
     let target: Vec<f64> = (0..k).map(|j| block[(row, j)]).collect();
@@ -96,8 +95,7 @@ fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
     if norm == 0.0 {
         return;
     }
-    // u = target + sign * norm * e1: H = I - 2 u u' / u'u maps target onto the first axis without
-    // cancellation.
+    // u = target + sign * norm * e1: H = I - 2 u u' / u'u maps the target onto the first axis without cancellation.
     let mut u = target;
     u[0] += if u[0] < 0.0 { -norm } else { norm };
     let square = u.iter().map(|v| v * v).sum::<f64>();
@@ -109,6 +107,7 @@ fn reflect_onto_first(mut block: MatMut<'_, f64>, row: usize) {
             block[(i, j)] -= factor * along[(i, 0)];
         }
     }
+    // The reflection makes these components zero but for rounding.
     for j in 1..k {
         block[(row, j)] = 0.0;
     }

@@ -1,4 +1,4 @@
-//! The proof that no mode is missed: by Sylvester's law the number of negative pivots of K - sigma M is the
+//! Proof that no mode is missing: by Sylvester's law of inertia, the number of negative pivots of K - sigma M is the
 //! number of eigenvalues below sigma (M positive semidefinite).
 
 use super::failure::EigenFailure;
@@ -8,17 +8,17 @@ use faer::ColRef;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{Analysis, Indefinite, Inertia};
 
-/// A backward error above this means that element growth may have spoilt a count in double precision.
+/// Backward error above which element growth may have spoilt a count in double precision.
 const GROWTH_LIMIT: f64 = 1e-4;
 
-/// Distance of a shift from an eigenvalue, beside [`size_along`] its mode, below which a count in single
-/// precision is not tried. Measured on cubes and blocks: G of
-/// [`Indefinite::perturbation`](flexbody_linalg::Indefinite::perturbation) has a norm of 4.5e-7 over
-/// this distance.
+/// Distance of a shift from an eigenvalue, relative to [`size_along`] its mode, below which the count is made in double
+/// precision, if that fits the memory. With a smaller value rounding may spoil counts in single precision. Measured on
+/// cubes and blocks: the norm of G of [`Indefinite::perturbation`](flexbody_linalg::Indefinite::perturbation) is 4.5e-7
+/// over this distance.
 pub(super) const NEAR: f64 = 2e-6;
 
-/// The size of K - sigma M along a mode: psi' diag(K + sigma M) psi. Rounding moves its eigenvalue by a
-/// roundoff of it.
+/// Returns the size of K - sigma M along a mode psi: psi' diag(K + sigma M) psi. Rounding moves the eigenvalue of the
+/// mode by about one unit roundoff of this size.
 pub(super) fn size_along(problem: &EigenProblem<'_>, sigma: f64, mode: ColRef<'_, f64>) -> f64 {
     let pencil = &problem.pencil;
     let diagonal = pencil.stiffness().diagonal().into_iter().zip(pencil.mass_diagonal());
@@ -34,7 +34,7 @@ pub enum Proof {
     NotProved,
 }
 
-/// Knowledge about missed modes.
+/// Proof that no mode is missing, or the reason why there is none.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Completeness {
     /// State of the proof.
@@ -46,12 +46,13 @@ pub struct Completeness {
     /// Flexible modes below sigma that were computed; those after the wanted ones complete a repeated
     /// eigenvalue.
     pub modes_below: usize,
-    /// Why there is no proof, or what limits it; empty when nothing does.
+    /// Reason why there is no proof, or its limits; empty if the proof has none.
     pub remark: String,
 }
 
 impl Completeness {
-    /// Flexible modes below the shift: counted where there is a count, otherwise those found.
+    /// Returns the number of flexible modes below the shift: the counted number if there is a count, else the found
+    /// number.
     pub(super) fn counted(&self, rigid: usize) -> usize {
         self.negative_pivots.map_or(self.modes_below, |negative| negative.saturating_sub(rigid))
     }
@@ -60,10 +61,10 @@ impl Completeness {
 /// Way to count eigenvalues.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Counting {
-    /// With a factor in double precision, which is not kept.
+    /// Count with a factor in double precision, which is discarded after the count.
     Double,
-    /// With a factor in single precision, whose rounding is then measured; where that may change the count,
-    /// in double precision, if that fits the memory.
+    /// Count with a factor in single precision, whose rounding is then measured. If rounding may change the count, the
+    /// count is repeated in double precision, if that fits the memory.
     Single {
         /// True when a count in double precision fits the memory.
         double_fits: bool,
@@ -74,12 +75,13 @@ pub(super) enum Counting {
 pub(super) struct Count {
     /// Number of eigenvalues below the shift, rigid modes included.
     pub below: usize,
-    /// Of a count in single precision: what rounding amounts to, one being what may change the count.
+    /// Size of the rounding of a count in single precision; 1 is the size that may change the count. `None` for double
+    /// precision.
     pub rounding: Option<f64>,
 }
 
 impl Count {
-    /// Returns the limits of a proof by this count; an empty text when there are none.
+    /// Returns the limits of a proof by this count; an empty text if there are none.
     pub(crate) fn remark(&self) -> String {
         self.rounding.map_or_else(String::new, |rounding| {
             format!(
@@ -89,10 +91,10 @@ impl Count {
     }
 }
 
-/// Eigenvalues of the pencil below `sigma`, rigid modes included.
+/// Counts the eigenvalues of the pencil below `sigma`, rigid modes included.
 ///
 /// # Errors
-/// [`EigenFailure::Inaccurate`] where rounding may change the count.
+/// [`EigenFailure::Inaccurate`] if rounding may change the count.
 pub(super) fn count(task: &Task<'_>, sigma: f64, counting: Counting) -> Result<Count, EigenFailure> {
     let Task { problem, analysis, context, .. } = task;
     if let Counting::Single { double_fits } = counting {

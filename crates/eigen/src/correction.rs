@@ -1,7 +1,7 @@
-//! Corrections of approximate modes against the true K and M until their residuals keep the tolerance: a block
-//! Davidson method (Davidson, J. Comput. Phys. 17 (1975) 87). A factor that is not exact, or cycles over levels of
-//! groups of nodes, turn the forces that the modes leave unbalanced into corrections; Rayleigh-Ritz on all vectors
-//! there are makes modes of them.
+//! Corrections of approximate modes against the true K and M until their residuals keep the tolerance, by a block
+//! Davidson method (Davidson, J. Comput. Phys. 17 (1975) 87). An inexact factor, or cycles over levels of groups of
+//! nodes, turn the residual forces of the modes into corrections; Rayleigh-Ritz on all vectors of the search space
+//! makes modes of them.
 
 use super::attempt::Goal;
 use super::canonical::{CLUSTER_GAP, cluster_end};
@@ -21,55 +21,56 @@ use flexbody_linalg::{
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// Residual of the first mode beyond the wanted ones: its eigenvalue, good to the square, bounds the gap of
-/// the count.
+/// Residual asked of the first mode beyond the wanted ones. The error of its eigenvalue, which bounds the gap of the
+/// count, is the square of this residual.
 const BEYOND: f64 = 1e-3;
 
-/// Distance of the first mode beyond the wanted ones from these, relative to its eigenvalue, up to which it may belong to
-/// the cluster of the last of them: with a residual of [`BEYOND`] its Ritz value does not tell. It is then corrected like
-/// the wanted ones, so that the cluster is seen, and its canonical basis does not depend on how far the search went.
+/// Relative distance between the last wanted eigenvalue and the next one up to which the next mode may belong to the
+/// same cluster: with a residual of [`BEYOND`] its Ritz value does not decide. Such a mode is corrected like the wanted
+/// ones, so that the cluster is seen, and its canonical basis does not depend on the progress of the search.
 const MAY_REPEAT: f64 = 1e-3;
 
 /// Largest number of rounds of corrections.
 const MAX_ROUNDS: usize = 60;
 
-/// Number of rounds in a row without a gain of a factor of two that ends the corrections.
+/// Number of successive rounds without a gain of a factor of two after which the corrections end.
 const PATIENCE: usize = 6;
 
-/// Numbers of rounds of cycles, and the factors that they must have gained until then: with less, a factor takes less time
-/// than the rounds to come. Measured gains: cubes, bars and brackets of every element 2.4 and more after two rounds, 5 to
-/// 10^5 after four; blocks with thin bars, flat elements, contrasts of stiffness and nearly incompressible bodies at most
-/// 1.25 after two. Judging after two rounds halves the time that is lost on the latter.
+/// Numbers of rounds of cycles, each with the factor by which the residuals must have fallen by then. With a smaller
+/// gain a factor takes less time than the remaining rounds. Measured gains: cubes, bars and brackets of every element
+/// 2.4 and more after two rounds, 5 to 10^5 after four; blocks with thin bars, flat elements, contrasts of stiffness
+/// and nearly incompressible bodies at most 1.25 after two. The test after two rounds halves the time lost on the
+/// latter.
 const GAINS_ASKED: [(usize, f64); 2] = [(2, 1.5), (4, 7.0)];
 
-/// A span of vectors that is corrected until its lowest Ritz pairs keep the tolerance, and the end of their
-/// cluster is seen.
+/// Search space that is corrected until its lowest Ritz pairs keep the tolerance and the end of the cluster of the last
+/// wanted mode is known.
 pub(super) struct Correction<'a> {
     problem: &'a EigenProblem<'a>,
     corrector: Corrector<'a>,
     goal: &'a Goal,
     context: Context<'a>,
     space: SearchSpace<'a>,
-    /// First size of the span.
+    /// Number of vectors at the start.
     base: usize,
-    /// Modes wanted, to the end of the cluster of the last one.
+    /// Number of wanted modes, to the end of the cluster of the last one.
     wanted: usize,
     /// Number of modes that keep the tolerance.
     converged: usize,
-    /// Rounding floors of the pairs that are looked at.
+    /// Rounding floors of the residuals of the examined pairs.
     floors: Vec<f64>,
-    /// Size of the matrix along the last of them: [`size_along`].
+    /// Size of the matrix along the last examined pair: [`size_along`].
     size: f64,
-    /// Rounds so far, and the largest excess before them.
+    /// Number of rounds so far, and the largest excess before the first of them.
     rounds: usize,
     first: f64,
-    /// Least excess so far, and the rounds since.
+    /// Least excess so far, and the number of rounds since it last halved.
     least: f64,
     since: usize,
 }
 
 impl<'a> Correction<'a> {
-    /// Begins with the span of `x`, for so many wanted modes.
+    /// Begins with the span of `x` and the number of wanted modes.
     pub(super) fn begin(
         task: &Task<'a>,
         corrector: Corrector<'a>,
@@ -100,7 +101,7 @@ impl<'a> Correction<'a> {
         })
     }
 
-    /// Corrects until the modes keep the tolerance; returns them and the eigenvalue after them.
+    /// Corrects until the modes keep the tolerance. Returns the modes and the examined eigenvalues after them.
     pub(super) fn modes(mut self) -> Result<FoundModes, EigenFailure> {
         for _ in 0..MAX_ROUNDS {
             let (forces, looked) = self.excess();
@@ -119,7 +120,8 @@ impl<'a> Correction<'a> {
         Err(EigenFailure::NotConverged { converged: self.converged, wanted: self.wanted })
     }
 
-    /// Returns the unbalanced forces of the pairs that are looked at, with their sizes and the sizes allowed.
+    /// Returns the residual forces of the examined pairs, with the relative sizes of the residuals and the sizes
+    /// allowed.
     fn excess(&mut self) -> (Tall, Vec<Pair>) {
         let (forces, relative) = self.look();
         if self.seeks_gap(&relative) {
@@ -132,7 +134,7 @@ impl<'a> Correction<'a> {
         (forces, relative.into_iter().enumerate().map(pair).collect())
     }
 
-    /// Returns the unbalanced forces of the wanted pairs and of the one after them, and their relative sizes.
+    /// Returns the residual forces of the wanted pairs and of the next one, and their relative sizes.
     fn look(&mut self) -> (Tall, Vec<f64>) {
         let Self { problem, context, space, .. } = self;
         let lambda = &space.lambda;
@@ -146,15 +148,15 @@ impl<'a> Correction<'a> {
         space.unbalanced(0..looked)
     }
 
-    /// Once the pairs are good enough to tell: where the gap above the wanted modes is too narrow for the
-    /// count, wants those up to the next one that is wide enough, if it is near.
+    /// Extends the wanted modes to the next gap wide enough for the count, if the gap above them is too narrow and such
+    /// a gap is near. Does so only when the pairs are accurate enough to decide. Returns true when it extended them.
     fn seeks_gap(&mut self, relative: &[f64]) -> bool {
         let are_good = relative.iter().all(|relative| *relative <= BEYOND);
         if self.goal.separation == 0.0 || !are_good {
             return false;
         }
         let lambda = &self.space.lambda;
-        // Half of the vectors beside the wanted ones remain what lets the last of these converge.
+        // The last wanted modes converge only if half of the vectors beside the wanted ones remain beyond them.
         let farthest = ((self.goal.wanted + self.base) / 2).min(lambda.len().saturating_sub(1));
         let is_wide =
             |end: &usize| *end > 0 && lambda[*end] - lambda[end - 1] >= self.goal.separation * self.size;
@@ -167,7 +169,7 @@ impl<'a> Correction<'a> {
         seeks
     }
 
-    /// Returns the wanted modes of the span, and the eigenvalues beyond them that were looked at.
+    /// Returns the wanted modes of the span, and the examined eigenvalues beyond them.
     fn hand_over(self, looked: usize) -> Result<FoundModes, EigenFailure> {
         let Self { problem, corrector, space, wanted, context, .. } = self;
         let next = space.lambda[wanted..looked].to_vec();
@@ -175,7 +177,7 @@ impl<'a> Correction<'a> {
         Ok(FoundModes { refined, next, tau: corrector.shift(), finite: None })
     }
 
-    /// Returns true when corrections are worth going on with when the largest excess is `worst`.
+    /// Returns true when further corrections pay, given the largest excess `worst`.
     fn gains(&mut self, worst: f64) -> bool {
         if self.rounds == 0 {
             self.first = worst;
@@ -192,24 +194,25 @@ impl<'a> Correction<'a> {
         self.since <= PATIENCE && !is_slow && !worst.is_nan()
     }
 
-    /// Extends the space by corrections of the poor pairs, of those that are looked at, and of some pairs after
-    /// them.
+    /// Extends the search space by corrections of the poor pairs among the examined ones, and of some pairs after them.
     fn correct(&mut self, forces: &Tall, poor: &[Pair]) -> Result<(), EigenFailure> {
         let Self { corrector, space, base, context, .. } = self;
         let looked = forces.ncols();
         let filled = corrector.filled(poor.len()) - poor.len();
+        // The block is filled up with the residual forces of the next Ritz pairs.
         let (after, relative) = space.unbalanced(looked..space.lambda.len().min(looked + filled));
         let later = relative.iter().zip(looked..);
         let later = later.map(|(&residual, number)| Pair { number, residual, allowed: BEYOND });
         let pairs: Vec<Pair> = poor.iter().copied().chain(later).collect();
         let poor = poor.iter().map(|pair| forces.as_ref().col(pair.number));
         let columns: Vec<_> = poor.chain(after.as_ref().col_iter()).collect();
-        // Of unit size: residuals near rounding would leave the range of single precision.
+        // Columns are scaled to unit size: residuals near rounding would leave the range of single precision.
         let unit = |size: f64| if size > 0.0 { size.recip() } else { 0.0 };
         let scales: Vec<f64> = columns.par_iter().map(|column| unit(column.norm_max())).collect();
         let mut d = Tall::with_room(self.problem.pencil.n(), columns.len());
         columns.iter().zip(scales).for_each(|(column, scale)| d.push_multiple(scale, *column));
         corrector.correct(space, &pairs, &mut d, context);
+        // A space without capacity for the corrections is first reduced to its lowest Ritz vectors.
         if d.ncols() > space.room() {
             space.contract(*base);
         }
@@ -220,46 +223,50 @@ impl<'a> Correction<'a> {
         Ok(())
     }
 }
-/// Part of the error of a correction that may be left, beside the residual of the pair: a correction is right to
-/// about the square of that, and the residual is mostly roughness that a step removes. (Measured with these two
-/// numbers on a bar and a cube of 100,000 rows, 16 to 24 modes: steps of cycles vary by a twentieth.)
+/// Part of the error of a correction that may remain, relative to the residual of the pair: a correction is accurate to
+/// about the square of the residual, and the residual is mostly roughness that one step removes. Measured with this
+/// value and [`LEAST_LEFT`] on a bar and a cube of 100,000 rows, 16 to 24 modes: the steps of cycles vary by a
+/// twentieth.
 const LEFT_OF_RESIDUAL: f64 = 0.2;
 
-/// The least part, since what the span lacks limits what a correction gains.
+/// Smallest part of the error of a correction that is aimed at: the missing directions of the span limit the gain of a
+/// more accurate correction.
 const LEAST_LEFT: f64 = 0.007;
 
-/// Part of the residual that a last correction aims at.
+/// Part of the allowed residual that a last correction aims at.
 const BELOW_ALLOWED: f64 = 0.3;
 
-/// Pairs that cycles correct, filled up to a multiple: with those above the wanted ones the last of these converge
-/// sooner. The few that are poor at the end take fewer steps than those that would fill them up.
+/// Number of pairs that cycles correct together: their number is filled up to a multiple of it. With additional pairs
+/// above the wanted ones the last wanted pairs converge sooner. Fewer poor pairs than this, near the end, are not
+/// filled up: they take fewer steps alone.
 const FILLED: usize = 8;
 
-/// Vectors that a span which levels correct has room for, with so many at first.
+/// Returns the capacity of a search space that levels correct and that starts with `base` vectors.
 pub(super) fn room_with_levels(base: usize) -> usize {
     2 * base + FILLED
 }
 
+/// Operator that turns residual forces into corrections.
 #[derive(Clone, Copy)]
 pub(super) enum Corrector<'a> {
-    /// A factor of K + tau M that is not exact: T r.
+    /// Inexact factor of K + tau M: the correction is T r.
     Factor(&'a dyn Solve),
     /// Cycles over levels, for the correction equation of each mode.
     Levels(&'a dyn Levels),
 }
 
-/// A Ritz pair that is looked at.
+/// A Ritz pair under examination.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair {
-    /// Its number, from the lowest.
+    /// Index of the pair, from the lowest.
     pub number: usize,
-    /// Its relative residual, and what that may be.
+    /// Relative residual, and the residual allowed.
     pub residual: f64,
     pub allowed: f64,
 }
 
 impl Corrector<'_> {
-    /// The shift tau.
+    /// Returns the shift tau.
     pub(super) fn shift(self) -> f64 {
         match self {
             Self::Factor(factor) => factor.shift(),
@@ -267,7 +274,7 @@ impl Corrector<'_> {
         }
     }
 
-    /// The number of pairs that is corrected where so many are poor.
+    /// Returns the number of pairs to correct when `poor` of them are poor.
     pub(super) fn filled(self, poor: usize) -> usize {
         match self {
             Self::Levels(_) if poor >= FILLED => poor.next_multiple_of(FILLED),
@@ -275,8 +282,8 @@ impl Corrector<'_> {
         }
     }
 
-    /// Times that corrections are made orthogonal to the space. Those of levels nearly are already, and Rayleigh-Ritz
-    /// accounts for what is left along it.
+    /// Returns the number of passes that orthogonalise corrections against the search space. Corrections by levels are
+    /// nearly orthogonal already, and Rayleigh-Ritz accounts for the rest.
     pub(super) fn passes(self) -> usize {
         match self {
             Self::Factor(_) => 2,
@@ -284,9 +291,9 @@ impl Corrector<'_> {
         }
     }
 
-    /// Returns true when a span of `base` vectors at first, and now so many, has to be contracted. With earlier corrections of a
-    /// factor the last modes take half the columns; corrections of levels have used up what these would tell, and
-    /// need a basis of Ritz vectors.
+    /// Returns true when a search space that started with `base` vectors and now has `vectors` must be contracted. With
+    /// earlier corrections by a factor the last modes take half the columns. Earlier corrections by levels add nothing
+    /// more, and levels need a basis of Ritz vectors.
     pub(super) fn contracts(self, vectors: usize, base: usize) -> bool {
         match self {
             Self::Factor(_) => vectors > 2 * base,
@@ -294,7 +301,7 @@ impl Corrector<'_> {
         }
     }
 
-    /// Vectors that a span of `base` vectors at first has room for.
+    /// Returns the capacity of a search space that starts with `base` vectors.
     pub(super) fn room(self, base: usize) -> usize {
         match self {
             Self::Factor(_) => 3 * base + 1,
@@ -302,8 +309,8 @@ impl Corrector<'_> {
         }
     }
 
-    /// Replaces the forces, of about unit size, which the pairs of the space leave unbalanced. The space of levels is
-    /// one of Ritz vectors.
+    /// Replaces the residual forces of the pairs, of about unit size, by corrections. For levels the space must be one
+    /// of Ritz vectors.
     pub(super) fn correct(
         self,
         space: &SearchSpace<'_>,
@@ -326,38 +333,39 @@ impl Corrector<'_> {
 }
 
 impl Pair {
+    /// Returns the part of the error that the correction of this pair may leave.
     fn aim(&self) -> Aim {
         let last = BELOW_ALLOWED * self.allowed / self.residual;
         Aim { pair: self.number, left: (LEFT_OF_RESIDUAL * self.residual).max(last).max(LEAST_LEFT) }
     }
 }
 
-/// A basis M-orthogonal to the rigid modes, nearly M-orthonormal.
+/// Nearly M-orthonormal basis, M-orthogonal to the rigid modes.
 pub(super) struct SearchSpace<'a> {
     problem: &'a EigenProblem<'a>,
     /// M times the rigid modes.
     m_rigid: Mat<f64>,
-    /// The basis, and K and M times it.
+    /// Basis X, and K X and M X.
     x: Tall,
     kx: Tall,
     mx: Tall,
-    /// Vectors that there is room for.
+    /// Largest number of vectors.
     capacity: usize,
-    /// X'M X and X'K X.
+    /// Gram matrices X'M X and X'K X.
     gm: Mat<f64>,
     gk: Mat<f64>,
     /// Ritz values, ascending.
     pub lambda: Vec<f64>,
     /// Coefficients of the Ritz vectors, which are M-orthonormal.
     ritz: Mat<f64>,
-    /// True when the basis is one of Ritz vectors.
+    /// True if the basis consists of Ritz vectors.
     is_ritz: bool,
-    /// M times vectors in work: kept, since memory that is taken anew is cleared first.
+    /// Buffer for M times vectors. It is kept, because newly allocated memory is cleared first.
     work: Tall,
 }
 
 impl<'a> SearchSpace<'a> {
-    /// The span of `x`, made M-orthogonal to the rigid modes, with room for so many vectors.
+    /// Creates the space from the span of `x`, made M-orthogonal to the rigid modes, with a capacity of `room` vectors.
     pub(super) fn new(
         problem: &'a EigenProblem<'a>,
         x: Mat<f64>,
@@ -385,16 +393,16 @@ impl<'a> SearchSpace<'a> {
         Ok(own)
     }
 
-    /// Vectors that there is room for beside those that it holds.
+    /// Returns the number of vectors that can still be added.
     pub(super) fn room(&self) -> usize {
         self.capacity - self.x.ncols()
     }
 
-    /// Adds the span of `d`, made M-orthogonal to the rigid modes and to the basis in so many passes and
-    /// M-orthonormal in itself. Directions that are only rounding are left out.
+    /// Adds the span of `d`, made M-orthogonal to the rigid modes and to the basis in `passes` passes, and
+    /// M-orthonormal in itself. Directions that consist of rounding are left out.
     ///
     /// # Panics
-    /// When there is no room for it.
+    /// If the capacity is too small.
     pub(super) fn extend(
         &mut self,
         d: &mut Tall,
@@ -403,6 +411,7 @@ impl<'a> SearchSpace<'a> {
     ) -> Result<(), EigenFailure> {
         let Self { problem, m_rigid, x, kx, mx, gm, gk, work, .. } = self;
         let (pencil, columns, used) = (&problem.pencil, d.ncols(), x.ncols());
+        // Projection off the rigid modes and the basis.
         for _ in 0..passes {
             let along = gram(m_rigid.as_ref(), d.as_ref());
             subtract_combination(d.as_mut(), problem.rigid, along.as_ref());
@@ -411,15 +420,18 @@ impl<'a> SearchSpace<'a> {
                 subtract_combination(d.as_mut(), x.as_ref(), along.as_ref());
             }
         }
+        // M-orthonormalisation of what remains; dependent directions are dropped.
         context.count(|work| work.mass_columns += columns as u64);
         pencil.mass_times(d.as_ref(), work.first_mut(columns));
         let orthonormal = independent(&gram(d.as_ref(), work.first(columns)))?;
         let added = used..used + orthonormal.ncols();
         context.count(|work| work.stiffness_columns += added.len() as u64);
+        // The basis and its products grow by the same combinations; only K times the new vectors is computed afresh.
         [&mut *x, &mut *kx, &mut *mx].into_iter().for_each(|block| block.add_zeros(added.len()));
         combine_into(x.columns_mut(added.clone()), d.as_ref(), orthonormal.as_ref());
         combine_into(mx.columns_mut(added.clone()), work.first(columns), orthonormal.as_ref());
         pencil.stiffness_times(x.columns(added.clone()), kx.columns_mut(added.clone()));
+        // The Gram matrices gain a border, and the Ritz pairs are computed from them.
         *gm = bordered(gm, &gram(x.as_ref(), mx.columns(added.clone())));
         *gk = bordered(gk, &gram(x.as_ref(), kx.columns(added)));
         (self.lambda, self.ritz) = small_ritz(gm, gk)?;
@@ -427,7 +439,7 @@ impl<'a> SearchSpace<'a> {
         Ok(())
     }
 
-    /// Keeps the span of the lowest Ritz vectors, so many of them where there are more.
+    /// Reduces the space to the span of its lowest Ritz vectors, at most `kept` of them.
     pub(super) fn contract(&mut self, kept: usize) {
         let kept = kept.min(self.lambda.len());
         let lowest = self.ritz.as_ref().subcols(0, kept);
@@ -442,7 +454,7 @@ impl<'a> SearchSpace<'a> {
         self.is_ritz = true;
     }
 
-    /// The rigid modes and the basis, as far as that is one of Ritz vectors.
+    /// Returns the rigid modes and the basis. The basis must consist of Ritz vectors.
     pub(super) fn near(&self) -> Near<'_> {
         Near {
             rigid: [self.problem.rigid, self.m_rigid.as_ref()],
@@ -453,19 +465,20 @@ impl<'a> SearchSpace<'a> {
         }
     }
 
-    /// Some of the Ritz vectors (N x k).
+    /// Returns the Ritz vectors of the range `which` (N x k).
     pub(super) fn vectors(&self, which: Range<usize>) -> Mat<f64> {
         combine(self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()))
     }
 
-    /// Returns some of the Ritz vectors (N x k), made by all threads.
+    /// Returns the Ritz vectors of the range `which` (N x k), computed by all threads.
     pub(super) fn some_vectors(&self, which: Range<usize>) -> Tall {
         let mut own = Tall::zeros(self.problem.pencil.n(), which.len());
         combine_into(own.as_mut(), self.x.as_ref(), self.ritz.as_ref().subcols(which.start, which.len()));
         own
     }
 
-    /// Returns the unbalanced forces K x - lambda M x of some Ritz pairs, and their norms over |K x| + |lambda M x|.
+    /// Returns the residual forces K x - lambda M x of the Ritz pairs `which`, and their norms relative to |K x| +
+    /// |lambda M x|.
     pub(super) fn unbalanced(&mut self, which: Range<usize>) -> (Tall, Vec<f64>) {
         let Self { problem, kx, mx, lambda, ritz, work, .. } = self;
         let (count, lambda) = (which.len(), &lambda[which.clone()]);
@@ -483,7 +496,7 @@ impl<'a> SearchSpace<'a> {
     }
 }
 
-/// [A, B; B', C] for B above C: the last columns of the matrix.
+/// Returns [A, B; B', C], where `last` holds its last columns: B above C.
 fn bordered(a: &Mat<f64>, last: &Mat<f64>) -> Mat<f64> {
     let m = a.ncols();
     Mat::from_fn(last.nrows(), last.nrows(), |i, j| match (i < m, j < m) {

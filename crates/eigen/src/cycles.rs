@@ -1,6 +1,6 @@
 //! The attempt without a factor: rough modes of a coarse level, corrected by cycles over levels of groups of nodes
-//! until their true residuals keep the tolerance. It suits compact bodies, whose factor would take most of the time
-//! and of the memory.
+//! until their true residuals keep the tolerance. It suits compact bodies, whose factor would take most of the time and
+//! of the memory.
 
 use super::attempt::{Attempt, Goal};
 use super::correction::{Correction, Corrector, room_with_levels};
@@ -12,23 +12,23 @@ use super::settings::{Accuracy, FactorChoice, Method, Wanted};
 use super::shift::first_shift;
 use flexbody_linalg::multigrid::{can_have_levels, levels};
 
-/// Modes up to which they are searched for without a factor: with more, the products of all pairs of vectors
-/// take longer than the solutions.
+/// Largest number of modes that are searched for without a factor. With more, the products of all pairs of vectors take
+/// longer than the solutions.
 const MULTIGRID_MODES: usize = 100;
 
-/// Bytes of all levels, and of what they are made from: for each stored entry of K, and for each row.
+/// Bytes of all levels and of their construction: per stored entry of K, and per row.
 const LEVEL_BYTES: (u64, u64) = (12, 400);
 
-/// Entries in a row of K of linear hexahedra, nearly.
+/// Approximate number of entries in a row of K of linear hexahedra.
 const LINEAR_COUPLINGS: f64 = 64.0;
 
-/// Most that the coupling of elements of the second order raises the threshold by, beside itself. Those of
-/// hexahedra have not been measured beyond it.
+/// Largest factor by which the stronger coupling of second-order elements raises the threshold, beside the coupling
+/// itself. Hexahedra of second order have not been measured beyond it.
 const MOST_RAISED: f64 = 2.1;
 
-/// Modes up to which the threshold is that of the settings. More raise it: corrections take the more time the more
-/// modes they are kept off, while a factor is made once. (Measured: equal times with 35 modes of a bar of 100,000
-/// rows, with 80 of a cube, whose factor takes three times the operations.)
+/// Number of modes up to which the threshold is that of the settings. More modes raise the threshold: corrections take
+/// more time the more modes they must be orthogonal to, while a factor is computed once. (Measured: equal times with 35
+/// modes of a bar of 100,000 rows, with 80 of a cube, whose factor takes three times the operations.)
 const FEW: f64 = 28.0;
 
 /// Cycles over levels of groups of nodes, without a factor.
@@ -46,7 +46,7 @@ impl Attempt for Cycles {
         if resident(needed) > task.context.available() {
             return Err(Unusable::Unsuited);
         }
-        // As with a factor of the size of K.
+        // Solutions are estimated like those with a factor of the size of K.
         let seconds = search_seconds(n, wanted, entries);
         Ok(Needs { bytes: resident(needed), factor_bytes: 0, seconds })
     }
@@ -64,14 +64,14 @@ impl Attempt for Cycles {
         Correction::begin(task, Corrector::Levels(&*levels), goal, (rough, goal.wanted))?.modes()
     }
 
-    /// A failure of cycles says nothing about the model.
+    /// Returns false: a failure of cycles does not concern the model, and another attempt may succeed.
     fn is_conclusive(&self, _: &EigenFailure) -> bool {
         false
     }
 }
 
-/// Vectors beside the wanted modes. Hexahedral cubes of 100,000 and 300,000 rows take 285 solved columns for
-/// 20 modes with 8 of them, 258 with 16, 233 with 24, and the least time with 16.
+/// Returns the number of vectors beside the wanted modes. Hexahedral cubes of 100,000 and 300,000 rows take 285 solved
+/// columns for 20 modes with 8 of them, 258 with 16, 233 with 24, and the least time with 16.
 fn guards(wanted: usize) -> usize {
     8 + 2 * wanted / 5
 }
@@ -80,8 +80,8 @@ fn guards(wanted: usize) -> usize {
 fn pays(task: &Task<'_>, wanted: usize) -> bool {
     let Task { problem, settings, analysis, .. } = task;
     let entries = problem.pencil.stiffness().as_csc().nnz() as f64;
-    // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows,
-    // which couple a quarter more, take twice the time of a factor.)
+    // Elements of the second order couple more rows, and take more cycles. (Measured: tetrahedra of 100,000 rows, which
+    // couple a quarter more, take twice the time of a factor.)
     let coupled = (entries / (problem.pencil.n() as f64 * LINEAR_COUPLINGS)).max(1.0);
     let many = (wanted as f64 / FEW).max(1.0);
     let threshold = settings.multigrid_pays * many * coupled * coupled.powi(2).min(MOST_RAISED);
@@ -94,9 +94,9 @@ fn pays(task: &Task<'_>, wanted: usize) -> bool {
         && analysis.flops() > threshold * entries
 }
 
-/// Bytes of the vectors: the span with both products; and for each vector that it begins with a product, a force, a
-/// correction, and the copies in single precision that cycles keep it apart from. Whatever else cycles hold is less
-/// than was in use before and given back.
+/// Returns the bytes of the vectors: the span with its products with K and M; and for each vector of the start a
+/// product, a force, a correction, and the copies in single precision that cycles use. All other memory of cycles is
+/// less than what was in use before and has been released.
 fn vector_bytes(n: usize, wanted: usize) -> u64 {
     let base = wanted + guards(wanted);
     8 * (n * (3 * room_with_levels(base) + 4 * base)) as u64

@@ -15,27 +15,27 @@ use flexbody_linalg::{
     Pencil, Solve, SymmetricEigen, SymmetricMatrix, dense_cholesky, gram, symmetric_eigen,
 };
 
-/// Scaled eigenvalues of Ms below this are zero: files with 10 digits leave less.
+/// Scaled eigenvalues of Ms below this value count as zero: files with 10 digits leave smaller ones.
 const NULL: f64 = 1e-10;
 
 /// Largest model that is always solved densely: all modes take less than a second.
 const DENSE_ALWAYS: usize = 600;
 
-/// Largest model that is solved densely because most of its modes are wanted (n^2 numbers, three times).
+/// Largest model that is solved densely because most of its modes are wanted (three arrays of n^2 numbers).
 const DENSE_AT_MOST: usize = 9000;
 
-/// Part of all modes beyond which the dense path does less work than a Krylov basis of twice that size.
+/// Part of all modes above which the dense path does less work than a Krylov basis of twice that size.
 const DENSE_PART: f64 = 0.2;
 
-/// Part of the shift of a dense eigenproblem below which a shift among the wanted modes is worth another one:
-/// a digit.
+/// Ratio of a shift among the wanted modes to the first shift below which the eigenproblem is solved again with the
+/// lower shift: the first one costs more than a digit.
 const FAR: f64 = 0.1;
 
 /// All modes by dense eigenproblems.
 pub(super) struct Dense;
 
-/// Returns true when the dense path finds so many modes with less work than an iterative search, or was asked for. The iterative
-/// attempts are unsuited then, whether or not it fits the memory.
+/// Returns true when the dense path finds `wanted` modes with less work than an iterative search, or was requested. The
+/// iterative attempts are then unsuited, whether or not the dense path fits the memory.
 pub(super) fn is_chosen(task: &Task<'_>, wanted: usize) -> bool {
     let n = task.problem.pencil.n();
     match task.settings.method {
@@ -51,7 +51,7 @@ pub(super) fn is_chosen(task: &Task<'_>, wanted: usize) -> bool {
 impl Attempt for Dense {
     fn needs(&self, task: &Task<'_>, wanted: usize) -> Result<Needs, Unusable> {
         let n = task.problem.pencil.n();
-        // Both matrices, their transformed product, its eigenvectors and copies in work.
+        // Both matrices, their transformed product, its eigenvectors and copies in use.
         let found = 8 * (6 * (n as u64).pow(2) + 3 * (n * wanted) as u64);
         let needs = Needs {
             bytes: resident(with_bounds(task, wanted, found.max(made_of_modes(n, wanted)))),
@@ -72,8 +72,8 @@ impl Attempt for Dense {
         let end =
             |spectrum: &Spectrum| cluster_end(goal.wanted, flexible, CLUSTER_GAP, |i| spectrum.eigenvalue(i));
         let mut last = end(&spectrum);
-        // Far above the wanted modes a shift crowds them together, which costs the digits by which they differ.
-        // Once it is known where they are, another is placed between them, if that matrix can be factored.
+        // A shift far above the wanted modes crowds them together, which costs the digits by which they differ. Once
+        // their eigenvalues are known, another shift is placed among them, if that matrix can be factored.
         let highest = if last > 0 { spectrum.eigenvalue(last - 1) } else { mean };
         let among = shift(problem.first_estimate.min(highest), highest);
         if among < FAR * mean
@@ -94,8 +94,8 @@ impl Attempt for Dense {
     }
 }
 
-/// Number of finite eigenvalues of the pencil, rigid ones included: block * rank(Ms). `None`: Ms is
-/// indefinite.
+/// Returns the number of finite eigenvalues of the pencil, rigid ones included: block * rank(Ms). `None` means that Ms
+/// is indefinite.
 fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
     let ms = dense(pencil.mass());
     let n = ms.nrows();
@@ -108,7 +108,7 @@ fn finite_eigenvalues(pencil: &Pencil<'_>) -> Option<usize> {
     (!indefinite).then_some(rank * pencil.block())
 }
 
-/// Shift for modes between `first` and `highest`: the geometric mean, so that both ends keep digits.
+/// Returns the shift for modes between `first` and `highest`: the geometric mean, so that both ends keep digits.
 fn shift(first: f64, highest: f64) -> f64 {
     (0.3 * first * highest.max(first)).sqrt()
 }
@@ -130,15 +130,15 @@ impl Solve for DenseFactor {
     }
 }
 
-/// The whole spectrum of S = L^-1 M L^-T, whose eigenvalues are 1 / (lambda + tau), rigid modes deflated.
+/// Complete spectrum of S = L^-1 M L^-T, whose eigenvalues are 1 / (lambda + tau), with deflated rigid modes.
 struct Spectrum {
-    /// The factor, for refinement.
+    /// Factor of K + tau M, for the refinement.
     factor: DenseFactor,
     eigen: SymmetricEigen,
 }
 
 impl Spectrum {
-    /// Factors and diagonalises.
+    /// Factors K + tau M and diagonalises S.
     fn new(problem: &EigenProblem<'_>, tau: f64) -> Result<Self, EigenFailure> {
         let pencil = &problem.pencil;
         let n = pencil.n();
@@ -160,13 +160,13 @@ impl Spectrum {
         Ok(Self { factor: DenseFactor { l, tau }, eigen })
     }
 
-    /// The i-th flexible eigenvalue lambda, ascending.
+    /// Returns the i-th flexible eigenvalue lambda, ascending.
     fn eigenvalue(&self, i: usize) -> f64 {
         let n = self.eigen.values.len();
         1.0 / self.eigen.values[n - 1 - i] - self.factor.tau
     }
 
-    /// The lowest `count` modes.
+    /// Returns the lowest `count` modes, M-orthonormal.
     fn vectors(&self, count: usize) -> Mat<f64> {
         let n = self.eigen.values.len();
         let mut vectors = Mat::from_fn(n, count, |i, j| {
@@ -177,8 +177,8 @@ impl Spectrum {
     }
 }
 
-/// The largest ratio K_ii / M_ii: a Rayleigh quotient, hence a lower bound of the largest eigenvalue and
-/// close to it.
+/// Returns the largest ratio K_ii / M_ii: a Rayleigh quotient, hence a lower bound of the largest eigenvalue, and close
+/// to it.
 fn highest_estimate(pencil: &Pencil<'_>) -> f64 {
     let k = pencil.stiffness().diagonal();
     let m = pencil.mass().diagonal();
@@ -189,6 +189,7 @@ fn highest_estimate(pencil: &Pencil<'_>) -> f64 {
         .fold(0.0, |largest: f64, (kii, mii)| largest.max(kii / mii))
 }
 
+/// Returns the matrix as a dense one.
 fn dense(a: &SymmetricMatrix) -> Mat<f64> {
     let mut d = Mat::zeros(a.n(), a.n());
     for i in 0..a.n() {
@@ -200,6 +201,7 @@ fn dense(a: &SymmetricMatrix) -> Mat<f64> {
     d
 }
 
+/// Returns the mass matrix as a dense one (N x N): every entry of the scalar matrix Ms on the diagonal of a block.
 fn dense_mass(pencil: &Pencil<'_>) -> Mat<f64> {
     let block = pencil.block();
     let mut d = Mat::zeros(pencil.n(), pencil.n());

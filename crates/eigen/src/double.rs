@@ -1,8 +1,8 @@
-//! The attempts with factors in double precision: Lanczos with one shift below the modes, or with a second one among
+//! The attempts with factors in double precision: Lanczos with one shift below the modes, or with a second shift among
 //! them.
 //!
-//! With a shift below all modes the last of them converge slowest, and many modes take three columns each; with one
-//! between them, two.
+//! With a shift below all modes the last modes converge slowest, and many modes take three columns each. With a second
+//! shift among the modes they take two.
 
 use super::attempt::{Attempt, Goal};
 use super::failure::EigenFailure;
@@ -19,7 +19,7 @@ use flexbody_linalg::{Analysis, Cholesky, Indefinite, Solve};
 /// Lanczos with a factor in double precision.
 pub(super) struct DoublePrecision;
 
-/// Returns true when double precision is allowed, and fits the memory and the time.
+/// Returns true when double precision is allowed, and fits the limits of memory and time.
 pub(super) fn is_double_in_reach(task: &Task<'_>, wanted: usize) -> bool {
     factor_needs(task, wanted, Precision::Double).is_ok()
 }
@@ -47,7 +47,7 @@ impl Attempt for DoublePrecision {
     }
 }
 
-/// Finds the modes with one factor, and refines them with it.
+/// Finds the modes with one factor, and refines them with the same factor.
 fn find_refined(
     task: &Task<'_>,
     mut iteration: Iteration<'_>,
@@ -63,7 +63,7 @@ fn find_refined(
     Ok(Outcome::Reached(FoundModes { refined, ..found }))
 }
 
-/// Lanczos with a second factor, at a shift among the modes, which takes the place of the first one.
+/// Lanczos with a second factor, at a shift among the modes, which replaces the first one.
 pub(super) struct SecondShift;
 
 impl Attempt for SecondShift {
@@ -72,7 +72,8 @@ impl Attempt for SecondShift {
         if task.settings.accuracy == Accuracy::Certified || !pays(task, wanted) {
             return Err(Unusable::Unsuited);
         }
-        // The first factor is given back before, and made again where its modes are to be refined.
+        // The first factor is released before the second one is computed. It is computed again if the modes need
+        // refinement.
         let vectors = vector_bytes(task.problem, wanted, Precision::Double);
         let bytes = needs.bytes.max(resident(8 * peaks(task.analysis).kept_inertia + vectors));
         if bytes > task.context.available() { Err(Unusable::Unsuited) } else { Ok(Needs { bytes, ..needs }) }
@@ -89,7 +90,7 @@ impl Attempt for SecondShift {
         })
     }
 
-    /// A failure after the change of the shift says nothing about the model.
+    /// Returns false for modes that did not converge: the reason may be the second shift instead of the model.
     fn is_conclusive(&self, failure: &EigenFailure) -> bool {
         !matches!(failure, EigenFailure::NotConverged { .. })
     }
@@ -99,7 +100,7 @@ impl Attempt for SecondShift {
     }
 }
 
-/// Goes on with a second shift where the Ritz values show a gap for it, else with the first one.
+/// Continues with a second shift if the Ritz values show a gap for it, else with the first one.
 fn from_midway(
     task: &Task<'_>,
     mut iteration: Iteration<'_>,
@@ -123,7 +124,7 @@ fn from_midway(
         }
         None => iteration.find(&again()?),
     };
-    // Whatever fails from here on fails for the sake of the second shift.
+    // From here on every failure may be due to the second shift.
     let Ok(Outcome::Reached(FoundModes { mut refined, next, finite, .. })) = found else {
         return Err(in_vain());
     };
@@ -137,38 +138,39 @@ fn from_midway(
     Ok(Outcome::Reached(FoundModes { refined, next, tau, finite }))
 }
 
-/// Part of the modes wanted that the shift is to have below it by the Ritz values of a basis of as many vectors. These
-/// are too high: it has a tenth more below it, in truth. (Columns solved for 200 modes without a second shift, and with
-/// parts of 0.6 and 0.65: bar of 100,000 rows 632, 440, 440; cube of 100,000 rows 672, 440, 520; tetrahedra of 64,000
-/// rows 600, 521, 400.)
+/// Part of the wanted modes that the second shift should have below it, by the Ritz values of a basis of as many
+/// vectors. These Ritz values are too high: in truth a tenth more modes lie below the shift. (Columns solved for 200
+/// modes without a second shift, and with parts of 0.6 and 0.65: bar of 100,000 rows 632, 440, 440; cube of 100,000
+/// rows 672, 440, 520; tetrahedra of 64,000 rows 600, 521, 400.)
 const PART: f64 = 0.65;
 
-/// Part of the modes wanted within which the widest gap is taken, on either side.
+/// Part of the wanted modes, on either side of [`PART`], within which the widest gap is chosen.
 const REACH: f64 = 0.025;
 
-/// With more modes below it than so many for each one wanted the shift is useless.
+/// Largest number of modes below the shift, per wanted mode, with which the second shift is used.
 const MOST_BELOW: f64 = 1.2;
 
-/// Backward error of the factor beyond which the shift is left: the modes are asked for to 1e-9 at the best.
+/// Backward error of the factor above which the second shift is not used: modes are requested to 1e-9 at the best.
 const LARGEST_ERROR: f64 = 1e-12;
 
-/// Modes wanted below which a basis of as many vectors tells too little of them.
+/// Smallest number of wanted modes for a second shift: with fewer, a basis of as many vectors is a poor estimate.
 const LEAST: usize = 40;
 
-/// Columns that the shift saves for each mode wanted.
+/// Columns that the second shift saves per wanted mode.
 const SAVED: f64 = 0.9;
 
-/// Operations of a factorisation that take as long as one of solving and orthogonalising.
+/// Operations of a factorisation that take as long as one operation of solving and orthogonalising.
 const DENSER: f64 = 1.4;
 
-/// The factor at a shift among the modes, and the number of flexible modes below it.
+/// Factor at a shift among the modes, and the number of flexible modes below the shift.
 struct SecondFactor<'a> {
     factor: Indefinite<'a>,
     below: usize,
 }
 
 impl<'a> SecondFactor<'a> {
-    /// Places the shift among these Ritz values, ascending. `None` where there is no gap to put it into, or the factor is of no use.
+    /// Factors at a shift in the widest gap among the Ritz values `eigenvalues` (ascending). Returns `None` if there is
+    /// no gap, if the factor is inaccurate, or if too many or no modes lie below the shift.
     fn new(
         problem: &EigenProblem<'_>,
         analysis: &'a Analysis,
@@ -187,7 +189,8 @@ impl<'a> SecondFactor<'a> {
     }
 }
 
-/// The middle of the widest gap of these eigenvalues near the [`PART`] of the modes wanted.
+/// Returns the middle of the widest gap of `eigenvalues` near the [`PART`] of the wanted modes; `None` if there is no
+/// gap.
 fn among(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
     let part = |part: f64| (part * wanted as f64).round() as usize;
     let (middle, reach) = (part(PART), part(REACH).max(1));
@@ -197,7 +200,7 @@ fn among(eigenvalues: &[f64], wanted: usize) -> Option<f64> {
     (widest[0] > 0.0 && sigma > widest[0] && sigma < widest[1]).then_some(sigma)
 }
 
-/// Returns true when the columns that a second shift saves take longer than its factor.
+/// Returns true when solving the columns that a second shift saves takes longer than its factor.
 fn pays(task: &Task<'_>, wanted: usize) -> bool {
     let Task { problem, analysis, .. } = task;
     let vectors = problem.pencil.n() as f64 * basis_columns(wanted) as f64;
@@ -212,7 +215,7 @@ mod tests {
     #[test]
     fn the_shift_is_in_the_widest_gap_near_its_place() {
         let mut eigenvalues: Vec<f64> = (0..200).map(f64::from).collect();
-        // Wider ones are out of reach.
+        // Wider gaps lie outside the searched range.
         eigenvalues[10..].iter_mut().for_each(|lambda| *lambda += 50.0);
         eigenvalues[118..].iter_mut().for_each(|lambda| *lambda += 2.0);
         assert_eq!(among(&eigenvalues, 180), Some(168.5));

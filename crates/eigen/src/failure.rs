@@ -1,80 +1,80 @@
-//! The answer of the eigen-solver where there are no modes to be trusted.
+//! The failures of the eigen-solver: reasons why there are no trustworthy modes.
 
 use faer::Mat;
 use std::fmt;
 
-/// Why there is no trustworthy result.
+/// Reason why there is no trustworthy result.
 #[derive(Debug, Clone)]
 pub enum EigenFailure {
-    /// `converged` of `wanted` modes converged within the allowed restarts.
+    /// Only `converged` of `wanted` modes converged within the allowed restarts or rounds.
     NotConverged {
-        /// Modes that did converge.
+        /// Number of converged modes.
         converged: usize,
-        /// Modes asked for.
+        /// Number of requested modes.
         wanted: usize,
     },
-    /// Failure of a search with a single-precision factor, where double precision was not allowed or does
-    /// not fit: often it says nothing about the model.
+    /// Failure of a search with a single-precision factor, where double precision was not allowed or does not fit the
+    /// memory or time. The cause is often the precision and not the model.
     SinglePrecision(Box<EigenFailure>),
     /// K + tau M is not positive definite: K or M is indefinite.
     NotPositiveDefinite {
         /// The shift tau.
         shift: f64,
     },
-    /// A negative eigenvalue beyond noise.
+    /// An eigenvalue is negative beyond noise.
     NegativeEigenvalue {
         /// The eigenvalue.
         eigenvalue: f64,
-        /// Its vector (N).
+        /// Eigenvector (N x 1).
         vector: Mat<f64>,
     },
     /// M has a negative direction beyond rounding.
     MassIndefinite,
     /// Flexible modes without strain energy: a mechanism or several bodies.
     ZeroEnergy {
-        /// Number of such modes beside the rigid ones.
+        /// Number of zero-energy modes beside the rigid ones.
         count: usize,
-        /// Their eigenvalues as computed.
+        /// Computed eigenvalues of the zero-energy modes.
         eigenvalues: Vec<f64>,
-        /// Their shapes (N x as many as were resolved).
+        /// Shapes of the resolved zero-energy modes (N x number of them).
         vectors: Mat<f64>,
     },
-    /// The inertia count contradicts the modes found, also after another search.
+    /// The inertia count contradicts the number of modes found, also after a repeated search.
     CountDiffers {
-        /// Modes found below the shift.
+        /// Number of modes found below the shift.
         found: usize,
-        /// Modes that the count says there are.
+        /// Number of modes below the shift by the count.
         counted: usize,
         /// The shift.
         shift: f64,
     },
     /// A factorisation is useless (element growth, overflow).
     Inaccurate {
-        /// Probe residual.
+        /// Relative residual or backward error that was found; NaN if there is none.
         residual: f64,
     },
-    /// The modes are sound, but no bounds of the eigenvalues can be guaranteed.
+    /// The modes are accurate, but no bounds of the eigenvalues can be guaranteed.
     NotCertified {
         /// The reason.
         why: &'static str,
     },
-    /// The search needs more memory than there is.
+    /// The search needs more memory than is available.
     Memory {
         /// Bytes needed.
         bytes: u64,
-        /// Bytes there are.
+        /// Bytes available.
         available: u64,
     },
-    /// The search takes longer than it may.
+    /// The search takes longer than the limit of the context.
     TooLong {
-        /// Modes that are wanted, of those that there are.
+        /// Number of wanted modes, at most the number of flexible modes.
         wanted: usize,
         /// Seconds that the search takes, estimated for one processor.
         seconds: f64,
         /// Bytes needed.
         bytes: u64,
     },
-    /// The pencil is too large for the ordering's 32-bit numbers.
+    /// The pencil is too large for the 32-bit indices of the ordering.
     TooLarge,
 }
 

@@ -9,28 +9,28 @@ use flexbody_linalg::{
     subtract_combination, uniform, weighted_square,
 };
 
-/// A vector whose M-norm squared is this part of what the diagonal of M alone gives is one that M does not
-/// see: the rest is rounding of the product.
+/// Part of a vector's squared norm in the diagonal of M below which its squared M-norm counts as zero: such a vector
+/// lies in the null space of M, and its M-norm is the rounding of the product.
 const UNSEEN: f64 = 1e-13;
 
-/// A vector that keeps less than this part of its M-norm after projection lies in the basis; the rest is
-/// rounding.
+/// Part of a vector's M-norm below which its remainder after projection counts as zero: such a vector lies in the
+/// basis, and the remainder is rounding.
 const VANISHED: f64 = 1e-13;
 
-/// Multiple of these two below which a column is looked at by itself.
+/// Multiple of [`UNSEEN`] and [`VANISHED`] below which columns are orthonormalised one by one.
 const FAR_ABOVE: f64 = 1e4;
 
-/// Part of a column that projection off those before it may leave without a digit lost.
+/// Smallest part of a column that may remain after projection off the columns before it without loss of a digit.
 const LEAST_KEPT: f64 = 0.1;
 
-/// Basis V (N x m), the projected operator T = V' M OP V, and the products with M of the newest block.
+/// Basis V (N x m), the projected operator T = V' M OP V, and M times the newest block.
 pub(super) struct Krylov<'a> {
     problem: &'a EigenProblem<'a>,
     context: Context<'a>,
     v: Tall,
-    /// Has as many rows as the basis may have vectors.
+    /// Projected operator; its number of rows is the capacity of the basis.
     t: Mat<f64>,
-    /// Columns of the newest block, not yet multiplied by the operator.
+    /// Number of columns of the newest block, to which the operator has not been applied.
     fresh: usize,
     /// M times the newest block.
     m_fresh: Mat<f64>,
@@ -46,13 +46,13 @@ pub(super) struct Krylov<'a> {
 struct Block {
     w: Mat<f64>,
     mw: Mat<f64>,
-    /// The coefficients that were subtracted: W_given = V h + W b.
+    /// Coefficients that were subtracted: W_given = V h + W b.
     h: Mat<f64>,
     b: Mat<f64>,
 }
 
 impl<'a> Krylov<'a> {
-    /// An empty basis for at most `capacity` vectors.
+    /// Creates an empty basis for at most `capacity` vectors.
     pub(super) fn new(problem: &'a EigenProblem<'a>, capacity: usize, context: &Context<'a>) -> Self {
         let n = problem.pencil.n();
         Self {
@@ -69,22 +69,22 @@ impl<'a> Krylov<'a> {
         }
     }
 
-    /// Starts the sequence of random blocks elsewhere.
+    /// Sets the seed of the next random block.
     pub(super) fn choose_random(&mut self, seed: u64) {
         self.random = seed;
     }
 
-    /// Vectors that the operator has been applied to: the size of T that is valid.
+    /// Returns the number of vectors to which the operator has been applied: the valid size of T.
     pub(super) fn projected(&self) -> usize {
         self.size() - self.fresh
     }
 
-    /// Vectors of the basis.
+    /// Returns the number of vectors of the basis.
     fn size(&self) -> usize {
         self.v.ncols()
     }
 
-    /// Room left for new vectors.
+    /// Returns the number of vectors that can still be added.
     pub(super) fn room(&self) -> usize {
         self.t.nrows() - self.size()
     }
@@ -94,12 +94,12 @@ impl<'a> Krylov<'a> {
         self.fresh == 0
     }
 
-    /// T (projected x projected).
+    /// Returns T (projected x projected).
     pub(super) fn t(&self) -> MatRef<'_, f64> {
         self.t.as_ref().submatrix(0, 0, self.projected(), self.projected())
     }
 
-    /// Norms |B s_last| of the columns of S (projected x k): the M-norms of the Ritz residuals of the
+    /// Returns the norms |B s_last| of the columns of S (projected x k): the M-norms of the Ritz residuals of the
     /// operator.
     pub(super) fn residual_norms(&self, s: MatRef<'_, f64>) -> Vec<f64> {
         let last = self.coupling.ncols();
@@ -108,10 +108,10 @@ impl<'a> Krylov<'a> {
         (0..s.ncols()).map(|j| r.col(j).norm_l2()).collect()
     }
 
-    /// OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected
-    /// x k) with values theta: one inverse iteration on them that needs no solve, because OP V = V T +
-    /// V_fresh B E' holds already. It damps what is left of higher modes, and removes what a singular M does
-    /// not see of the basis.
+    /// Returns OP V S / theta = V S + V_fresh (B S_last) / theta, column by column, for the Ritz vectors S (projected x
+    /// k) with values theta. This is one inverse iteration on them that needs no solve, because OP V = V T + V_fresh B
+    /// E' holds already. It damps the remainders of higher modes, and removes components in the null space of M from
+    /// the vectors.
     pub(super) fn inverse_iterated(&self, s: MatRef<'_, f64>, theta: &[f64]) -> Mat<f64> {
         let (size, last) = (self.projected(), self.coupling.ncols());
         let residual = combine(self.coupling.as_ref(), s.subrows(size - last, last));
@@ -121,12 +121,12 @@ impl<'a> Krylov<'a> {
         combine(self.v.as_ref(), coefficients.as_ref())
     }
 
-    /// V S for S (projected x k).
+    /// Returns V S for S (projected x k).
     pub(super) fn combination(&self, s: MatRef<'_, f64>) -> Mat<f64> {
         combine(self.v.first(self.projected()), s)
     }
 
-    /// Appends `x` (any block), orthonormalised; columns dependent on the basis are dropped.
+    /// Appends the orthonormalised block `x`. Columns that depend on the basis are dropped.
     pub(super) fn append(&mut self, x: Mat<f64>) {
         let block = self.orthonormalise(x, 0);
         self.reach = 0;
@@ -134,13 +134,14 @@ impl<'a> Krylov<'a> {
         self.push(block);
     }
 
-    /// Appends a deterministic random block of `width` columns, filtered by one application of the operator,
-    /// which removes what a singular M does not see.
+    /// Appends a deterministic random block of `width` columns. One application of the operator removes its components
+    /// in the null space of M.
     pub(super) fn append_random(&mut self, width: usize, factor: &dyn Solve) {
         let n = self.problem.pencil.n();
         let seed = self.random;
         self.random += 1;
-        // Of M-norm about one, by a power of two: what the operator makes of it can be squared in any units.
+        // The columns are scaled to an M-norm of about one, by a power of two, so that the squares of the result are in
+        // range in any units.
         let heaviest = self.mass_diagonal.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
         let unit = (-0.5 * heaviest.log2()).round().exp2();
         let x = Mat::from_fn(n, width, |i, j| unit * uniform(seed, i as u64, j as u64));
@@ -151,7 +152,7 @@ impl<'a> Krylov<'a> {
         self.append(y);
     }
 
-    /// One Lanczos step: applies the operator to the newest block and appends what is new.
+    /// Performs one Lanczos step: applies the operator to the newest block and appends the new directions.
     pub(super) fn step(&mut self, factor: &dyn Solve) {
         let old = self.fresh;
         let at = self.size() - old;
@@ -176,7 +177,7 @@ impl<'a> Krylov<'a> {
         self.push(block);
     }
 
-    /// Thick restart: keeps the Ritz vectors V S (S: projected x k) with values theta, and the newest block.
+    /// Performs a thick restart: keeps the Ritz vectors V S (S: projected x k) with values theta, and the newest block.
     pub(super) fn restart(&mut self, s: MatRef<'_, f64>, theta: &[f64]) {
         let projected = self.projected();
         let fresh = self.v.columns(projected..self.size()).to_owned();
@@ -190,7 +191,7 @@ impl<'a> Krylov<'a> {
         self.reach = 0;
     }
 
-    /// Goes on with the operator of another shift, tau' = tau + `difference`, in the same space (the rational Krylov
+    /// Continues with the operator of another shift, tau' = tau + `difference`, in the same space (the rational Krylov
     /// method: Ruhe, Linear Algebra Appl. 197/198 (1994) 283). With the newest block F, W = [V, F] and H = [T; B E']
     /// satisfy (K + tau M) W H = M V, so that
     ///
@@ -206,14 +207,18 @@ impl<'a> Krylov<'a> {
             (false, false) => 0.0,
         };
         let a = Mat::from_fn(all, size, |i, j| f64::from(u8::from(i == j)) + difference * h(i, j));
+        // A = Q R.
         let (q, r) = full_qr(a);
+        // Q_1' R^-1 over Q_2' R^-1.
         let inverse = solve_upper(&r.transpose().to_owned(), &Mat::identity(size, size));
         let product = combine(q.as_ref().subrows(0, size).transpose(), inverse.as_ref());
         let t = |i: usize, j: usize| (f64::from(u8::from(i == j)) - product[(i, j)]) / difference;
+        // T', made exactly symmetric, and B'.
         for (i, j) in (0..size * size).map(|k| (k % size, k / size)) {
             self.t[(i, j)] = 0.5 * (t(i, j) + t(j, i));
         }
         self.coupling = Mat::from_fn(all - size, size, |i, j| -product[(size + i, j)] / difference);
+        // The rotated basis W Q, with the product of its newest block.
         combine_in_place(self.v.as_mut(), q.as_ref());
         self.context.count(|work| work.mass_columns += (all - size) as u64);
         self.m_fresh = self.problem.pencil.apply_mass(self.v.columns(size..all));
@@ -226,10 +231,10 @@ impl<'a> Krylov<'a> {
         self.m_fresh = block.mw;
     }
 
-    /// Two passes of: block Gram-Schmidt against the rigid modes and the basis, then column by column inside
-    /// the block. The first leaves out the columns before `reach`, where the operator leaves nothing but
-    /// rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the
-    /// first ends orthogonal to rounding; only what is rounding altogether is dropped.
+    /// Orthonormalises a block in two passes: block Gram-Schmidt against the rigid modes and the basis, then column by
+    /// column inside the block. The first pass leaves out the columns before `reach`, where the operator leaves only
+    /// rounding. The second pass works on unit vectors, so that even a direction that lost ten digits in the first pass
+    /// is orthogonal to rounding at the end. Only columns that are entirely rounding are dropped.
     fn orthonormalise(&self, mut w: Mat<f64>, reach: usize) -> Block {
         let pencil = &self.problem.pencil;
         let width = w.ncols();
@@ -241,6 +246,7 @@ impl<'a> Krylov<'a> {
         let mut norms = sizes(&gram(w.as_ref(), mw.as_ref()));
         for from in [reach, 0] {
             let basis = basis.subcols(from, self.size() - from);
+            // Projection off the rigid modes and the basis.
             let rigid = gram(self.problem.rigid, mw.as_ref());
             let part = gram(basis, mw.as_ref());
             subtract_combination(w.as_mut(), self.problem.rigid, rigid.as_ref());
@@ -249,9 +255,11 @@ impl<'a> Krylov<'a> {
             h += combine(part.as_ref(), b.as_ref());
             self.context.count(|work| work.mass_columns += w.ncols() as u64);
             pencil.mass_times(w.as_ref(), mw.as_mut());
+            // Orthonormalisation inside the block, with M W carried along.
             let unseen = |w: ColRef<'_, f64>| UNSEEN * weighted_square(w, &self.mass_diagonal);
             let t = orthonormalise_at_once(&mut w, &mut mw, &norms, &unseen)
                 .unwrap_or_else(|| gram_schmidt(&mut w, &mut mw, &norms, &unseen));
+            // The carried products have lost a digit: they are computed again.
             if loses_digits(&t) {
                 self.context.count(|work| work.mass_columns += w.ncols() as u64);
                 pencil.mass_times(w.as_ref(), mw.as_mut());
@@ -259,6 +267,7 @@ impl<'a> Krylov<'a> {
             norms = vec![1.0; w.ncols()];
             b = combine(t.as_ref(), b.as_ref());
         }
+        // Columns beyond the capacity of the basis are left out.
         let room = self.room();
         if w.ncols() > room {
             w = w.as_ref().subcols(0, room).to_owned();
@@ -269,8 +278,8 @@ impl<'a> Krylov<'a> {
     }
 }
 
-/// Returns true when Gram-Schmidt with these coefficients has left less than a tenth of a column: the products with M that
-/// went along have then lost a digit.
+/// Returns true when Gram-Schmidt with the coefficients `t` has left less than a tenth of a column: the products with M
+/// that were carried along have then lost a digit.
 fn loses_digits(t: &Mat<f64>) -> bool {
     (0..t.ncols()).any(|j| {
         let before = t.col(j).norm_l2();
@@ -279,15 +288,17 @@ fn loses_digits(t: &Mat<f64>) -> bool {
     })
 }
 
-/// The square roots of a diagonal, of zero where it is negative.
+/// Returns the square roots of the diagonal, with zero for negative entries.
 fn sizes(gram: &Mat<f64>) -> Vec<f64> {
     (0..gram.ncols()).map(|j| gram[(j, j)].max(0.0).sqrt()).collect()
 }
 
-/// M-orthonormalises the columns of W in place by the Cholesky factor of their Gram matrix, M W along with them:
-/// a few passes over the block, where Gram-Schmidt takes a few for each column. Returns T with W_old = W_new T;
-/// `None`, and nothing changed, unless every column is far from what Gram-Schmidt drops and keeps a tenth of its
-/// norm beside those before it: the columns are then orthonormal to a few digits less than all.
+/// M-orthonormalises the columns of W in place by the Cholesky factor of their Gram matrix, and carries M W along. This
+/// takes a few passes over the block, where Gram-Schmidt takes a few for each column. Returns T with W_old = W_new T.
+///
+/// Returns `None` and changes nothing unless every column is well above the limits of Gram-Schmidt for dropping it, and
+/// keeps a tenth of its norm beside the columns before it. The columns are then orthonormal to a few digits less than
+/// all.
 fn orthonormalise_at_once(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,
@@ -310,14 +321,14 @@ fn orthonormalise_at_once(
     })
 }
 
-/// w_i' (M w)_j.
+/// Returns w_i' (M w)_j.
 fn dot(w: &Mat<f64>, mw: &Mat<f64>, i: usize, j: usize) -> f64 {
     gram(w.as_ref().subcols(i, 1), mw.as_ref().subcols(j, 1))[(0, 0)]
 }
 
-/// M-orthonormalises the columns of W in place, M W along with them; columns that keep less than [`VANISHED`]
-/// of their norm before are dropped, and those whose square does not exceed `unseen`. Returns T (new x old)
-/// with W_old = W_new T.
+/// M-orthonormalises the columns of W in place, and carries M W along. A column is dropped if it keeps less than
+/// [`VANISHED`] of its earlier norm, or if its square does not exceed `unseen`. Returns T (new x old) with W_old =
+/// W_new T.
 fn gram_schmidt(
     w: &mut Mat<f64>,
     mw: &mut Mat<f64>,
@@ -328,7 +339,7 @@ fn gram_schmidt(
     let mut t = Mat::zeros(width, width);
     let mut kept = 0;
     for j in 0..width {
-        // Twice, as in any Gram-Schmidt that may lose digits.
+        // Two passes, because one pass may lose digits.
         for _ in 0..2 {
             let along = gram(w.as_ref().subcols(0, kept), mw.as_ref().subcols(j, 1));
             for block in [&mut *w, &mut *mw] {
@@ -367,7 +378,7 @@ mod tests {
     use super::*;
     use flexbody_linalg::{Analysis, Cholesky, CscMatrix, Indefinite, Pencil, SymmetricMatrix};
 
-    /// Columns of which the last is nearly the sum of the others, up to `apart`.
+    /// Returns four columns, the last of which is nearly the sum of the others, up to `apart`.
     fn block(apart: f64) -> Mat<f64> {
         let wave = |i: usize, j: usize| ((i * (2 * j + 3)) as f64).sin();
         Mat::from_fn(90, 4, |i, j| match j {
@@ -376,7 +387,7 @@ mod tests {
         })
     }
 
-    /// M times a block, for masses from one to two.
+    /// Returns M times a block, for masses from one to two.
     fn weighted(x: &Mat<f64>) -> Mat<f64> {
         Mat::from_fn(x.nrows(), x.ncols(), |i, j| (1.0 + (i % 5) as f64 / 5.0) * x[(i, j)])
     }
@@ -399,7 +410,7 @@ mod tests {
         assert!((&slow - &w).norm_max() < 1e-13 && (&t_slow - &t).norm_max() < 1e-13);
     }
 
-    /// Springs of changing stiffness along a chain, and its ends to the ground.
+    /// Returns stiffness and mass of a chain of springs of varying stiffness, whose ends are fixed.
     fn chain(n: usize) -> [SymmetricMatrix; 2] {
         let spring = |i: usize| 1.0 + (i % 5) as f64;
         let entries = (0..n).flat_map(|i| {
@@ -412,8 +423,8 @@ mod tests {
         [stiffness, mass].map(|t| SymmetricMatrix::symmetrised(CscMatrix::from_triplets(n, n, &t)))
     }
 
-    /// The relation that all else follows from, (K - sigma M)^-1 M V = V T + F B, holds after a change of the shift, and
-    /// the basis is as orthonormal as before.
+    /// The relation behind all results, (K - sigma M)^-1 M V = V T + F B, holds after a change of the shift, and the
+    /// basis is as orthonormal as before.
     #[test]
     fn a_basis_goes_over_to_another_shift() {
         let [k, m] = chain(300);
@@ -463,7 +474,7 @@ mod tests {
             assert!(orthonormalise_at_once(&mut w, &mut mw, &norms, &all_seen).is_none(), "{apart:e}");
             assert_eq!(w, given, "{apart:e}: changed");
         }
-        // What has vanished beside what it was, and what M does not see.
+        // A column that vanished relative to its earlier norm, and a column in the null space of M.
         let given = block(1.0);
         let (mut w, mut mw) = (given.clone(), weighted(&given));
         assert!(orthonormalise_at_once(&mut w, &mut mw, &[1e12; 4], &all_seen).is_none());

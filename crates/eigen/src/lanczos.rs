@@ -1,8 +1,8 @@
 //! Shift-invert block Lanczos with thick restart: the lowest flexible modes of a large pencil.
 //!
-//! The operator (K + tau M)^-1 M has the eigenvalues theta = 1 / (lambda + tau) and is self-adjoint in the M
-//! inner product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) keeps
-//! repeated eigenvalues complete up to what the later inertia count proves.
+//! The operator (K + tau M)^-1 M has the eigenvalues theta = 1 / (lambda + tau) and is self-adjoint in the M inner
+//! product. M may be singular: it is only ever multiplied. Full reorthogonalisation (twice) finds the copies of
+//! repeated eigenvalues; the later inertia count proves that none is missing.
 
 use super::attempt::Goal;
 use super::canonical::{CLUSTER_GAP, cluster_end};
@@ -17,50 +17,55 @@ use flexbody_linalg::context::Context;
 use flexbody_linalg::{Solve, SymmetricEigen, symmetric_eigen};
 use std::ops::RangeInclusive;
 
-/// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138
-/// with 6, 88 to 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8.
-/// 4 is also one more than the copies of an eigenvalue that an isotropic cube has.
+/// Columns per step. 20 modes of solids need 64 to 116 solved columns with 4, 60 to 102 with 3, 78 to 138 with 6, 88 to
+/// 160 with 8; a hexahedral bar of 100 000 rows takes 6.6 CPU s with 4, 7.0 with 5, 7.1 with 8. The value 4 is also one
+/// more than the multiplicity of an eigenvalue of an isotropic cube.
 const BLOCK: usize = 4;
 
-/// Modes from which on twice as many columns per step take less time: most steps then meet a large basis, which
-/// each of them reads from memory, as it does the factor. (Measured on a bar of 100,000 rows: with 30 modes as
-/// much, with 50 a tenth less, with 200 a fifth.)
+/// Number of modes from which on twice as many columns per step take less time: most steps then work on a large basis,
+/// which each step reads from memory, as it does the factor. (Measured on a bar of 100,000 rows: no difference with 30
+/// modes, a tenth less time with 50, a fifth less with 200.)
 const MANY: usize = 40;
 
-/// Columns per step for so many modes.
+/// Returns the number of columns per step for `wanted` modes.
 pub(super) fn columns_per_step(wanted: usize) -> usize {
     if wanted < MANY { BLOCK } else { 2 * BLOCK }
 }
 
-/// Restarts without which every model met so far converged, times ten.
+/// Largest number of restarts: ten times the number that any model needed so far.
 const MAX_RESTARTS: u64 = 100;
 
-/// Basis vectors beyond two for each wanted mode: restarts are then rare.
+/// Number of basis vectors beyond two for each wanted mode. With this value restarts are rare.
 const SPARE: usize = 128;
 
-/// Part of the tolerance that estimates have to keep where rounding hides the true residuals: the modes are
-/// then good to what the estimates say.
+/// Part of the tolerance that the estimates must keep where rounding hides the true residuals: the modes are then as
+/// accurate as the estimates say.
 const BELOW_NOISE: f64 = 1e-2;
 
-/// Residuals below this are asked of no estimate: the solves have no more digits.
+/// Smallest residual that is asked of an estimate: the solves have no more digits.
 const LEAST_ASKED: f64 = 1e-12;
 
-/// A first flexible eigenvalue below this part of the shift asks for a smaller shift: iterations grow.
+/// Part of the shift below which the first flexible eigenvalue asks for a smaller shift: with a lower one the number of
+/// iterations grows.
 const SMALLEST_PART: f64 = 0.02;
 
-/// The shift stays above this part of the last eigenvalue wanted, however soft the first modes are: the last
-/// ones would lose as many digits. The refinement separates a few much softer modes.
+/// Smallest shift relative to the last wanted eigenvalue, however low the first eigenvalues are: with a smaller shift
+/// the last modes would lose as many digits. The refinement separates a few much softer modes.
 const DIGITS_PART: f64 = 1e-3;
 
-/// Relative gap of two eigenvalues across which modes that have converged do not mix.
+/// Relative gap of two eigenvalues across which converged modes do not mix.
 const WIDE: f64 = 1e-3;
 
-/// Block steps after which the shift is judged: the lowest Ritz value is near the first eigenvalue after six;
-/// where it is far below the shift it only falls, and a step less is a step saved.
+/// Numbers of block steps after which the shift is judged. The lowest Ritz value is near the first eigenvalue after
+/// six. A Ritz value far below the shift can only fall further, so an early judgement saves steps.
 const STEPS_TO_JUDGE: RangeInclusive<usize> = 3..=6;
 
-/// Judges the shift by the Ritz values so far, upper bounds of the eigenvalues: the shift to use instead when
-/// it is far too large for them; an error when there is no strain energy at all.
+/// Judges the shift by the current Ritz values, which are upper bounds of the eigenvalues. Returns the shift to use
+/// instead if this one is far too large for them.
+///
+/// # Errors
+/// The failure [`EigenFailure::ZeroEnergy`] if the lowest mode has no strain energy,
+/// [`EigenFailure::NegativeEigenvalue`] if its eigenvalue is clearly negative.
 fn better_shift(
     problem: &EigenProblem<'_>,
     krylov: &Krylov<'_>,
@@ -78,7 +83,7 @@ fn better_shift(
     let noise = NOISE_FACTOR
         * energy_noise(problem.pencil.stiffness(), vectors.as_ref().subcols(0, 1), problem.input_error)[0];
     if lowest.abs() <= noise {
-        // Far below the shift and within noise: no shift can resolve it, there is no strain energy.
+        // The value is far below the shift and within noise. No shift can resolve it: the mode has no strain energy.
         return Err(zero_energy(problem, factor, tau, context)?);
     }
     if lowest < 0.0 {
@@ -90,16 +95,16 @@ fn better_shift(
     Ok(suited_shift(lowest, *lambda.last().expect("it has a first"), tau))
 }
 
-/// The shift for modes from `first` to `last`, when that is much smaller than `tau`.
+/// Returns the shift for modes from `first` to `last` if it is much smaller than `tau`.
 fn suited_shift(first: f64, last: f64, tau: f64) -> Option<f64> {
     let suited = (0.5 * first).max(DIGITS_PART * last);
     (first < SMALLEST_PART * tau && suited < 0.1 * tau).then_some(suited)
 }
 
-/// Basis in which zero-energy modes are counted: half of its vectors at most.
+/// Size of the basis in which zero-energy modes are counted; at most half of its vectors can be such modes.
 const ZERO_ENERGY_BASIS: usize = 96;
 
-/// Counts and resolves the modes without strain energy.
+/// Counts and resolves the modes without strain energy. Returns them as a failure.
 fn zero_energy(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
@@ -122,11 +127,11 @@ fn zero_energy(
     })
 }
 
-/// The end of a search with one shift, or of a part of it.
+/// Outcome of a search, or of a part of it, with one shift.
 pub(super) enum Outcome<T> {
-    /// The search reached its aim.
+    /// The goal of the search or of its part was reached.
     Reached(T),
-    /// With this shift the search would be shorter and more accurate.
+    /// The shift that would make the search shorter and more accurate.
     ShiftTooLarge(f64),
 }
 
@@ -139,42 +144,43 @@ pub(super) struct Iteration<'a> {
     block: usize,
     /// The shift, as tau.
     tau: f64,
-    /// The modes below a second shift, after the change to it.
+    /// State kept from the first shift after the change to a second one.
     first: Option<First>,
     krylov: Krylov<'a>,
-    /// Vectors that the basis has room for.
+    /// Largest number of basis vectors.
     capacity: usize,
-    /// Block steps so far.
+    /// Number of block steps so far.
     steps: usize,
-    /// Thick restarts so far.
+    /// Number of thick restarts so far.
     restarts: u64,
-    /// True when the basis spans all there is.
+    /// True if the basis spans the whole space.
     complete: bool,
-    /// Size of the projected eigenproblem from which on it is worth being tested again.
+    /// Size of the projected eigenproblem from which on it is solved again.
     next_test: usize,
-    /// K-residual that an estimate has to keep before the true residuals are looked at.
+    /// K-residual that the estimates must keep before the true residuals are computed.
     asked: f64,
     /// Least excess of the true residuals so far.
     least_excess: f64,
 }
 
-/// The Ritz pairs of a search that is about to change its shift.
+/// Ritz pairs of a search that is about to change its shift.
 pub(super) struct Midway {
     /// Ritz values, ascending.
     pub eigenvalues: Vec<f64>,
-    /// The lowest modes, which have converged.
+    /// Lowest modes, which have converged.
     modes: Mat<f64>,
 }
 
-/// The result of a first shift, kept when the search goes over to a second one.
+/// State kept from the first shift after the change to a second one.
 struct First {
-    /// The lowest modes, which had converged: far from the second shift, its operator leaves rounding in them.
+    /// Lowest modes, converged with the first shift. The operator of the second shift would leave rounding in them,
+    /// because their eigenvalues are far from it.
     modes: Mat<f64>,
-    /// Flexible modes below the second shift.
+    /// Number of flexible modes below the second shift.
     below: usize,
 }
 
-/// Ritz pairs of a basis, lambda ascending, and which of them are modes.
+/// Ritz pairs of a basis, lambda ascending, and the number of them that are modes.
 pub(super) struct Ritz {
     /// 1 / (lambda + tau).
     theta: Vec<f64>,
@@ -183,16 +189,16 @@ pub(super) struct Ritz {
     /// M-norms of the residuals of the operator.
     norms: Vec<f64>,
     tau: f64,
-    /// Number of the modes to find: those wanted and what completes the cluster of the last one.
+    /// Number of modes to find: the wanted ones and the rest of the cluster of the last one.
     last: usize,
-    /// Number of modes that are good enough by their estimates.
+    /// Number of modes whose estimates keep the tolerance.
     converged: usize,
-    /// True when the next one shows that the cluster has ended.
+    /// True if the pair after the modes shows that the cluster has ended.
     beyond: bool,
 }
 
 impl Ritz {
-    /// Number of the modes to find.
+    /// Returns the number of modes to find, to the end of the cluster of the last wanted one.
     pub(super) fn last(&self) -> usize {
         self.last
     }
@@ -210,14 +216,14 @@ impl Ritz {
         self.norms[i] <= tolerance * self.theta[i].abs()
     }
 
-    /// K x - lambda M x = -M r / theta^2 for x = OP V s / theta and r = V_fresh B s: the K-residual, with
-    /// M-norms for the Euclidean ones.
+    /// Returns an estimate of the K-residual of pair i. With x = OP V s / theta and r = V_fresh B s, K x - lambda M x =
+    /// -M r / theta^2; M-norms replace the Euclidean norms.
     fn estimate(&self, i: usize) -> f64 {
         let theta = self.theta[i];
         0.5 * self.norms[i] / (theta * (1.0 - self.tau * theta)).abs().max(SMALLEST_PART * theta.abs())
     }
 
-    /// Returns true when the first pair beyond the modes is as good as the gap below it needs.
+    /// Returns true when the first pair beyond the modes is accurate enough to establish the gap below it.
     fn shows_gap(&self) -> bool {
         let last = self.last;
         last < self.size() && {
@@ -226,14 +232,14 @@ impl Ritz {
         }
     }
 
-    /// Returns true when all modes are there by their estimates.
+    /// Returns true when all modes have converged by their estimates and their cluster has ended.
     fn all_there(&self) -> bool {
         self.converged == self.last && self.beyond
     }
 }
 
 impl<'a> Iteration<'a> {
-    /// Begins with random vectors.
+    /// Begins with a block of random vectors.
     pub(super) fn begin(
         problem: &'a EigenProblem<'a>,
         factor: &dyn Solve,
@@ -263,12 +269,12 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Returns true when the basis spans all there is.
+    /// Returns true when the basis spans the whole space.
     pub(super) fn is_complete(&self) -> bool {
         self.complete
     }
 
-    /// Expands the basis until it has `size` vectors or spans all there is.
+    /// Expands the basis until it has `size` vectors or spans the whole space.
     pub(super) fn expand_to(&mut self, size: usize, factor: &dyn Solve) -> Result<Outcome<()>, EigenFailure> {
         loop {
             self.expand(factor);
@@ -281,8 +287,8 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Expands the basis until all modes are good enough by their estimates; a full basis is restarted from the best
-    /// Ritz pairs.
+    /// Expands the basis until all modes keep the requested residual by their estimates. A full basis is restarted from
+    /// the lowest Ritz pairs.
     pub(super) fn estimate(&mut self, factor: &dyn Solve) -> Result<Outcome<Ritz>, EigenFailure> {
         loop {
             self.expand(factor);
@@ -302,7 +308,7 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Expands the basis until the true residuals of the modes keep the tolerance, or further steps gain nothing.
+    /// Expands the basis until the true residuals of the modes keep the tolerance, or further steps gain too little.
     pub(super) fn find(&mut self, factor: &dyn Solve) -> Result<Outcome<FoundModes>, EigenFailure> {
         match self.estimate(factor)? {
             Outcome::Reached(ritz) => self.find_from(ritz, factor),
@@ -310,7 +316,7 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Does the work of [`Self::find`] from the moment on when the modes are good enough by their estimates.
+    /// Continues [`Self::find`] from Ritz pairs `ritz` whose estimates keep the requested residual.
     pub(super) fn find_from(
         &mut self,
         mut ritz: Ritz,
@@ -330,17 +336,17 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Returns the span of the modes and of half as many Ritz vectors again: the corrections would otherwise have to
-    /// find what is already there of the next modes.
+    /// Returns the span of the modes and of half as many further Ritz vectors. Without these the corrections would have
+    /// to find again what the basis already contains of the next modes.
     pub(super) fn rough_modes(&self, ritz: &Ritz) -> Mat<f64> {
         self.vectors(ritz, (ritz.last + ritz.last / 2 + 2 * self.block).min(ritz.size()))
     }
 
-    /// Expands the basis by a block, unless it spans all there is.
+    /// Expands the basis by a block, unless it spans the whole space.
     fn expand(&mut self, factor: &dyn Solve) {
         let Self { krylov, block, .. } = self;
         if krylov.exhausted() {
-            // An invariant subspace: go on with new directions, or everything is found.
+            // The basis is an invariant subspace: it continues with new directions, if there are any.
             krylov.append_random((*block).min(krylov.room()), factor);
         }
         self.complete = krylov.exhausted();
@@ -350,7 +356,7 @@ impl<'a> Iteration<'a> {
         }
     }
 
-    /// Midway: the Ritz values, ascending, and what is to be kept when the shift changes.
+    /// Returns the Ritz values, ascending, and the converged modes that are kept when the shift changes.
     pub(super) fn look_midway(&mut self) -> Result<Midway, EigenFailure> {
         let mut ritz = self.test()?;
         if self.asks_below_noise(&ritz) {
@@ -361,7 +367,7 @@ impl<'a> Iteration<'a> {
         Ok(Midway { eigenvalues, modes })
     }
 
-    /// Goes over to the shift of `second`, which `below` flexible modes lie below.
+    /// Changes to the shift of `second`, which has `below` flexible modes below it.
     pub(super) fn change_shift(&mut self, midway: Midway, second: &dyn Solve, below: usize) {
         let tau = second.shift();
         self.krylov.change_shift(tau - self.tau);
@@ -369,7 +375,7 @@ impl<'a> Iteration<'a> {
         (self.tau, self.next_test) = (tau, 0);
     }
 
-    /// The shift to use instead of this one, once the lowest Ritz value tells.
+    /// Returns the shift to use instead of the current one, once the lowest Ritz value shows that it is too large.
     fn better_shift(&self, factor: &dyn Solve) -> Result<Option<f64>, EigenFailure> {
         if self.first.is_some() || !STEPS_TO_JUDGE.contains(&self.steps) {
             return Ok(None);
@@ -382,15 +388,15 @@ impl<'a> Iteration<'a> {
         self.krylov.room() < self.block
     }
 
-    /// Returns true when the Ritz pairs are worth their price. The projected eigenproblem costs size^3: beyond 100
-    /// vectors or so not after every step, and not while many modes are missing, of which a step finds a few.
+    /// Returns true when solving the projected eigenproblem pays. It costs size^3: beyond some 100 vectors it is not
+    /// solved after every step, nor while many modes are missing, of which a step finds a few.
     fn is_test_due(&self) -> bool {
         let size = self.krylov.projected();
         let small = size < self.goal.wanted + 1 || size < self.next_test;
         self.complete || self.is_full() || !small
     }
 
-    /// Solves the projected eigenproblem, and sees which Ritz pairs are modes.
+    /// Solves the projected eigenproblem, and finds the Ritz pairs that are modes.
     fn test(&mut self) -> Result<Ritz, EigenFailure> {
         let (krylov, wanted) = (&self.krylov, self.goal.wanted);
         let tau = self.tau;
@@ -401,7 +407,7 @@ impl<'a> Iteration<'a> {
         if below == 0 && found.values.first().is_some_and(is_negative) {
             return Err(EigenFailure::MassIndefinite);
         }
-        // lambda ascends where theta descends, below the shift and above it.
+        // For eigenvalues below the shift and for those above it, lambda ascends where theta descends.
         let below = below.min(size);
         let order: Vec<usize> = (0..below).rev().chain((below..size).rev()).collect();
         let theta: Vec<f64> = order.iter().map(|&i| found.values[i]).collect();
@@ -410,16 +416,18 @@ impl<'a> Iteration<'a> {
         let norms = krylov.residual_norms(s.as_ref());
         let last = cluster_end(wanted, size, CLUSTER_GAP, |i| 1.0 / theta[i] - tau);
         let mut ritz = Ritz { theta, s, norms, tau, last, converged: 0, beyond: false };
+        // A pair counts as a mode by its estimate; pairs that converged with the first shift count without one.
         let is_mode = |i: &usize| self.complete || *i < settled || ritz.estimate(*i) <= self.asked;
         let converged = if all_below_are_there { (0..last).take_while(is_mode).count() } else { settled };
         ritz.converged = converged;
         ritz.beyond = self.complete || ritz.shows_gap();
+        // Size of the basis at the next test: 4 % more, or a quarter of the missing modes more.
         self.next_test = size + (size / 25).max((last - converged) / 4);
         self.context.fraction(converged as f64 / wanted.max(1) as f64);
         Ok(ritz)
     }
 
-    /// Returns the modes where they keep the tolerance; else asks more of the estimates.
+    /// Returns the modes if they keep the tolerance; otherwise lowers the residual asked of the estimates.
     fn hand_over(&mut self, ritz: &Ritz) -> Result<Option<FoundModes>, EigenFailure> {
         if self.asks_below_noise(ritz) {
             return Ok(None);
@@ -427,7 +435,7 @@ impl<'a> Iteration<'a> {
         let (size, last) = (ritz.size(), ritz.last);
         let refined = Refined::new(self.problem, self.vectors(ritz, last), &self.context)?;
         let excess = refined.excess(self.goal.tolerance);
-        // Another step costs a block, the refinement a column for each mode that needs it.
+        // Another step costs a block, the refinement one column for each mode that needs it.
         let gains_nothing = excess.is_nan() || excess > 0.5 * self.least_excess;
         if excess <= 1.0 || self.complete || gains_nothing {
             let is_known = |i: &usize| self.complete || ritz.is_good(*i, 1e-2);
@@ -439,7 +447,7 @@ impl<'a> Iteration<'a> {
         Ok(None)
     }
 
-    /// The vectors of the first Ritz pairs, after an inverse iteration.
+    /// Returns the vectors of the first `count` Ritz pairs, after an inverse iteration.
     fn vectors(&self, ritz: &Ritz, count: usize) -> Mat<f64> {
         let mut vectors =
             self.krylov.inverse_iterated(ritz.s.as_ref().subcols(0, count), &ritz.theta[..count]);
@@ -450,8 +458,8 @@ impl<'a> Iteration<'a> {
         vectors
     }
 
-    /// Asks more of the estimates where rounding hides the true residual of the first mode, whose strain energy is least.
-    /// Returns true when it does.
+    /// Lowers the residual asked of the estimates if rounding hides the true residual of the first mode, whose strain
+    /// energy is least. Returns true when it lowered it.
     fn asks_below_noise(&mut self, ritz: &Ritz) -> bool {
         let below_noise = (BELOW_NOISE * self.goal.tolerance).max(LEAST_ASKED);
         let may_ask = !self.complete && self.asked > below_noise;
@@ -467,11 +475,11 @@ impl<'a> Iteration<'a> {
         asks
     }
 
-    /// Restarts a full basis from the lowest Ritz pairs; or tells the shift with which the search had better
-    /// start anew.
+    /// Restarts a full basis from the lowest Ritz pairs. Returns a shift if the search should begin again with that
+    /// one.
     ///
     /// # Errors
-    /// [`EigenFailure::NotConverged`] when there is nothing left to search in, or after too many restarts.
+    /// [`EigenFailure::NotConverged`] if the basis spans the whole space, or after too many restarts.
     fn restart(&mut self, ritz: &Ritz) -> Result<Option<f64>, EigenFailure> {
         let Ritz { last, converged, .. } = *ritz;
         if self.complete || self.restarts >= MAX_RESTARTS {
@@ -492,8 +500,8 @@ impl<'a> Iteration<'a> {
     }
 }
 
-/// Modes that stay what they are when the search goes on with another shift: of those that have `converged`, all up to
-/// a gap. Within a cluster they may turn.
+/// Returns the number of modes that do not change when the search continues with another shift: the `converged` ones up
+/// to the last wide gap. Within a cluster modes may rotate.
 fn settled(eigenvalues: &[f64], converged: usize) -> usize {
     let is_end = |end: &usize| {
         let (last, next) = (eigenvalues[end - 1], eigenvalues.get(*end).copied());
@@ -502,11 +510,12 @@ fn settled(eigenvalues: &[f64], converged: usize) -> usize {
     (1..=converged).rev().find(is_end).unwrap_or(0)
 }
 
+/// Returns the eigenpairs of the projected operator, theta ascending.
 fn descending(krylov: &Krylov<'_>) -> Result<SymmetricEigen, EigenFailure> {
     symmetric_eigen(krylov.t()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })
 }
 
-/// The `count` Ritz pairs with the largest theta, as lambda ascending and vectors.
+/// Returns the `count` Ritz pairs with the largest theta, as eigenvalues lambda, ascending, and vectors.
 fn best(krylov: &Krylov<'_>, ritz: &SymmetricEigen, count: usize, tau: f64) -> (Vec<f64>, Mat<f64>) {
     let size = ritz.values.len();
     let count = count.min(size);

@@ -1,4 +1,4 @@
-//! Memory and time that attempts take, known before the work: the symbolic analysis knows what a factor needs.
+//! Memory and time of attempts, estimated before the work: the symbolic analysis gives the size of a factor.
 
 use super::completeness::Counting;
 use super::failure::EigenFailure;
@@ -10,27 +10,27 @@ use flexbody_linalg::{Analysis, Peaks};
 /// Memory and time of an attempt.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Needs {
-    /// Bytes that the process grows by at the most.
+    /// Largest number of bytes by which the process grows.
     pub bytes: u64,
-    /// Bytes of the factor that the search solves with; 0 without one.
+    /// Bytes of the factor used by the search; 0 without a factor.
     pub factor_bytes: u64,
-    /// About how long the search takes on one processor, in seconds, without the factorisation.
+    /// Estimated time of the search on one processor, in seconds, without the factorisation.
     pub seconds: f64,
 }
 
-/// A reason why an attempt is not made.
+/// Reason why an attempt is not made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Unusable {
-    /// Another one is better, or was asked for.
+    /// Another attempt is better, or was requested.
     Unsuited,
-    /// The attempt takes more memory than there is.
+    /// The attempt takes more memory than is available.
     Memory(Needs),
-    /// The attempt takes longer than it may.
+    /// The attempt takes longer than the limit of the context.
     Time(Needs),
 }
 
 impl Unusable {
-    /// Returns the failure of a search that has no other attempt; `None` where another one was preferred.
+    /// Returns the failure of a search that has no other attempt; `None` if another attempt was preferred.
     pub(super) fn failure(self, task: &Task<'_>, wanted: usize) -> Option<EigenFailure> {
         match self {
             Self::Unsuited => None,
@@ -45,7 +45,10 @@ impl Unusable {
 }
 
 impl Needs {
-    /// Holds these needs to the limits of the context.
+    /// Returns these needs if they are within the limits of the context.
+    ///
+    /// # Errors
+    /// The limit that they exceed: [`Unusable::Memory`] or [`Unusable::Time`].
     pub(super) fn within_limits(self, task: &Task<'_>) -> Result<Self, Unusable> {
         if self.bytes > task.context.available() {
             return Err(Unusable::Memory(self));
@@ -57,8 +60,7 @@ impl Needs {
     }
 }
 
-/// Operations per second that estimates of time assume: what one processor does of the mixed work of a
-/// search.
+/// Operations per second that time estimates assume, for one processor and the mixed work of a search.
 const PACE: f64 = 4e9;
 
 /// Returns the needs of a search with a factor of this precision.
@@ -75,7 +77,7 @@ pub(super) fn factor_needs(task: &Task<'_>, wanted: usize, precision: Precision)
     needs.within_limits(task)
 }
 
-/// Adds to the bytes of a search what the bounds of [`Accuracy::Certified`] take: they factor a matrix of their own,
+/// Returns `bytes` increased by the memory for the bounds of [`Accuracy::Certified`], which factor another matrix
 /// beside the modes.
 pub(super) fn with_bounds(task: &Task<'_>, wanted: usize, bytes: u64) -> u64 {
     if task.settings.accuracy != Accuracy::Certified {
@@ -85,38 +87,39 @@ pub(super) fn with_bounds(task: &Task<'_>, wanted: usize, bytes: u64) -> u64 {
     bytes.max(count_bytes(task.problem, &peaks(task.analysis), wanted)) + 12 * entries
 }
 
-/// Returns the most numbers that factorisations hold with the threads there are.
+/// Returns the largest numbers of entries that factorisations hold with the current number of threads.
 pub(super) fn peaks(analysis: &Analysis) -> Peaks {
     analysis.peaks(rayon::current_num_threads())
 }
 
-/// Columns of the Krylov basis. Measured: five for each wanted mode.
+/// Returns the number of columns of the Krylov basis. Measured: five for each wanted mode.
 pub(super) fn basis_columns(wanted: usize) -> usize {
     (5 * wanted + 16).min(2 * wanted + 128)
 }
 
-/// Bytes of a search beside the factor: Krylov basis, blocks in work, modes and products of some of them, and
-/// corrections.
+/// Returns the bytes of a search beside the factor: Krylov basis, blocks in use, modes with products of some of them,
+/// and corrections.
 pub(super) fn vector_bytes(problem: &EigenProblem<'_>, wanted: usize, precision: Precision) -> u64 {
     let basis = basis_columns(wanted);
     let found = wanted + 3 * wanted.min(TOGETHER) + 24;
     let columns = match precision {
         Precision::Double => basis + found,
-        // A span of three times its first size, 1.5 for each wanted mode and 16, with both products; forces and
-        // vectors in work beside it.
+        // A span of three times its first size (1.5 for each wanted mode and 16) with its products with K and M, and
+        // forces and vectors in use.
         Precision::Single => (basis + found + 2 * wanted).max(17 * wanted + 180),
     };
     8 * (problem.pencil.n() * columns) as u64
 }
 
-/// Bytes of what a caller makes of `wanted` modes: a copy of them, and tables with numbers for each pair of modes.
+/// Returns the bytes that a caller needs beside `wanted` modes: a copy of them, and tables with numbers for each pair
+/// of modes.
 pub(super) fn made_of_modes(n: usize, wanted: usize) -> u64 {
     let (n, wanted) = (n as u64, wanted as u64);
     8 * (80 * wanted * wanted + 3 * n * wanted)
 }
 
-/// Estimates the seconds of an iterative search: solutions with a factor of so many numbers, orthogonalisation against the
-/// basis, restarts, and the products of all pairs of modes.
+/// Estimates the seconds of an iterative search: solutions with a factor of `factor` numbers, orthogonalisation against
+/// the basis, restarts, and the products of all pairs of modes.
 pub(super) fn search_seconds(n: usize, wanted: usize, factor: u64) -> f64 {
     let (rows, modes) = (n as f64, wanted as f64);
     let (basis, columns) = (basis_columns(wanted) as f64, 3.0 * modes + 100.0);
@@ -130,49 +133,50 @@ pub(super) fn dense_seconds(n: usize, wanted: usize) -> f64 {
     (30.0 * rows.powi(3) + 20.0 * rows * modes * modes) / PACE
 }
 
-/// Returns what a process grows by that needs so many bytes. Beyond what is in use the allocator holds blocks given
-/// back and not yet taken again (measured: 8 to 16 %), and begun pages of every size; each thread has its
-/// own, and buffers of the dense products (measured on models of 18 000 degrees of freedom: 14 to 20 MB on one
-/// thread, 34 to 48 MB on two).
+/// Returns the bytes by which a process grows that uses `bytes`. In addition to memory in use the allocator holds
+/// released blocks (measured: 8 to 16 %), and partly used pages of every size. Each thread has its own allocator pages,
+/// and buffers of the dense products (measured on models of 18 000 degrees of freedom: 14 to 20 MB on one thread, 34 to
+/// 48 MB on two).
 pub(super) fn resident(bytes: u64) -> u64 {
     bytes + bytes / 8 + 8_000_000 + 20_000_000 * rayon::current_num_threads() as u64
 }
 
-/// Bytes of an inertia count in double precision, with the modes and their products.
+/// Returns the bytes of an inertia count in double precision, with the modes and their products.
 fn count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
     8 * (peaks.inertia + (3 * modes * problem.pencil.n()) as u64)
 }
 
-/// Bytes that the process grows by for an inertia count in double precision beside `found` modes.
+/// Returns the bytes by which the process grows for an inertia count in double precision beside `found` modes.
 pub(super) fn resident_for_count(problem: &EigenProblem<'_>, analysis: &Analysis, found: usize) -> u64 {
     resident(count_bytes(problem, &peaks(analysis), found))
 }
 
-/// Bytes of a count in single precision, with the vectors that tell of its rounding.
+/// Returns the bytes of a count in single precision, with the vectors that measure its rounding.
 fn single_count_bytes(problem: &EigenProblem<'_>, peaks: &Peaks, modes: usize) -> u64 {
     4 * peaks.kept_inertia + 8 * ((3 * modes + PROBE_VECTORS) * problem.pencil.n()) as u64
 }
 
-/// Vectors that are held while the rounding of a count in single precision is measured.
+/// Number of vectors in use while the rounding of a count in single precision is measured.
 const PROBE_VECTORS: usize = 40;
 
 /// Part of [`EigenSettings::single_pays`](super::EigenSettings::single_pays) above which a count in single precision is
-/// faster, with the solutions that tell of its rounding.
+/// faster, including the solutions that measure its rounding.
 const COUNT_PART: f64 = 0.15;
 
-/// The count that proves completeness.
+/// Plan of the count that proves completeness.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CountPlan {
-    /// `None` where there is none.
+    /// Kind of the count; `None` if there is no count.
     pub counting: Option<Counting>,
-    /// Bytes that it needs.
+    /// Bytes needed by the count.
     pub bytes: u64,
-    /// The reason why there is none: bytes of the count, bytes there are.
+    /// Reason why the count does not fit: bytes needed and bytes available.
     pub too_large: Option<(u64, u64)>,
 }
 
 impl CountPlan {
-    /// Plans the count beside so many modes; accuracy `fast` has none. The factor of the search is given back before.
+    /// Plans the count beside `modes` modes. Accuracy `fast` has no count. The factor of the search is released before
+    /// the count.
     pub(super) fn of(task: &Task<'_>, modes: usize) -> Self {
         if task.settings.accuracy == Accuracy::Fast {
             return Self { counting: None, bytes: 0, too_large: None };
@@ -180,7 +184,7 @@ impl CountPlan {
         Self::new(task, modes)
     }
 
-    /// Plans a count beside so many modes whatever the accuracy.
+    /// Plans a count beside `modes` modes for any accuracy.
     pub(super) fn new(task: &Task<'_>, modes: usize) -> Self {
         let Task { problem, settings, analysis, context } = task;
         let (peaks, available) = (peaks(analysis), context.available());
@@ -205,7 +209,7 @@ impl CountPlan {
     }
 }
 
-/// Bytes in GB, or MB where that is less.
+/// Returns bytes as a text in GB, or in MB below one GB.
 pub(super) fn gigabytes(bytes: u64) -> String {
     if bytes < 1_000_000_000 {
         format!("{:.0} MB", bytes as f64 * 1e-6)

@@ -1,7 +1,8 @@
-//! The ways to find modes in the order in which they are tried, and the list of those that can be used for a problem,
+//! The ways to find modes in the order in which they are tried, and the plan: a list of the ways that suit a problem,
 //! made before the work.
 //!
-//! The first attempt of the list searches; where it fails for a reason of its own, the next one does.
+//! The first attempt of the list searches for the modes. If it fails for a reason that does not concern the model, the
+//! next one does.
 
 use super::attempt::Attempt;
 use super::cycles::Cycles;
@@ -22,7 +23,7 @@ pub enum Way {
     Cycles,
     /// Lanczos with a factor in single precision, and corrections.
     SinglePrecision,
-    /// Lanczos with two factors in double precision one after the other, the second at a shift among the modes.
+    /// Lanczos with two factors in double precision, one after the other; the second is at a shift among the modes.
     SecondShift,
     /// Lanczos with a factor in double precision.
     DoublePrecision,
@@ -33,7 +34,7 @@ impl Way {
     pub const ALL: [Self; 5] =
         [Self::Dense, Self::Cycles, Self::SinglePrecision, Self::SecondShift, Self::DoublePrecision];
 
-    /// Returns the name in reports.
+    /// Returns the name of the way in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Dense => "dense",
@@ -44,7 +45,7 @@ impl Way {
         }
     }
 
-    /// Returns the algorithm.
+    /// Returns the algorithm of the way.
     pub(super) fn attempt(self) -> &'static dyn Attempt {
         match self {
             Self::Dense => &Dense,
@@ -56,16 +57,16 @@ impl Way {
     }
 }
 
-/// The attempts that can be made for a problem, in their order, and what they take.
+/// The attempts that can be made for a problem, in their order, with their needs of memory and time.
 ///
-/// After the search it also says which of them failed.
+/// After the search the plan also records which of them failed.
 #[derive(Debug, Clone)]
 pub struct Plan {
-    /// The attempts, in the order in which they are tried; the last one made is the one that found the modes.
+    /// Attempts, in the order in which they are tried. The first one without a failure found the modes.
     pub attempts: Vec<PlannedAttempt>,
-    /// Multiplications and additions of one factorisation.
+    /// Number of multiplications and additions of one factorisation.
     pub flops: f64,
-    /// The reason why a further attempt is not made: memory or time.
+    /// Reason why a further attempt is not made: memory or time.
     pub(super) refused: Option<EigenFailure>,
     /// Plan of the count that proves completeness.
     pub(super) count: CountPlan,
@@ -74,11 +75,11 @@ pub struct Plan {
 /// One attempt of a [`Plan`].
 #[derive(Debug, Clone)]
 pub struct PlannedAttempt {
-    /// Its algorithm.
+    /// Algorithm of the attempt.
     pub way: Way,
-    /// Memory and time, with the count after the search.
+    /// Memory and time, including the count after the search.
     pub needs: Needs,
-    /// The reason why it found no modes, once it was tried in vain.
+    /// Reason why the attempt failed; `None` if it succeeded or was not made.
     pub failure: Option<String>,
 }
 
@@ -86,7 +87,8 @@ impl Plan {
     /// Lists the attempts that can be made for `wanted` modes.
     ///
     /// # Errors
-    /// [`EigenFailure::Memory`] when none fits the memory; [`EigenFailure::TooLong`] when all take longer than they may.
+    /// [`EigenFailure::Memory`] if no attempt fits the memory; [`EigenFailure::TooLong`] if an attempt is refused for
+    /// its time and none is left.
     pub(super) fn new(task: &Task<'_>, wanted: usize) -> Result<Self, EigenFailure> {
         let count = CountPlan::of(task, wanted);
         let dense = dense::is_chosen(task, wanted);
@@ -98,7 +100,7 @@ impl Plan {
                     let needs = Needs { bytes: needs.bytes.max(resident(count.bytes)), ..needs };
                     attempts.push(PlannedAttempt { way, needs, failure: None });
                 }
-                // The first refusal is that of the fewest bytes.
+                // The first refusal is the one of the fewest bytes.
                 Err(unusable) => refused = refused.or(unusable.failure(task, wanted)),
             }
         }
@@ -108,16 +110,16 @@ impl Plan {
         }
     }
 
-    /// Returns the attempt to make next, or the one that found the modes.
+    /// Returns the attempt to make next; after the search, the attempt that found the modes.
     ///
     /// # Panics
-    /// Never for a plan that [`solve`](super::solve) returned: one attempt has not failed.
+    /// Never for a plan that [`solve`](super::solve) returned: at least one of its attempts has not failed.
     pub fn current(&self) -> &PlannedAttempt {
         let next = self.attempts.iter().find(|attempt| attempt.failure.is_none());
         next.or(self.attempts.last()).expect("a plan has an attempt")
     }
 
-    /// Returns the precision of the factor, or of what is in its place.
+    /// Returns the precision of the factor. Cycles, which have no factor, count as single precision.
     pub fn precision(&self) -> Precision {
         match self.current().way {
             Way::Cycles | Way::SinglePrecision => Precision::Single,
@@ -125,17 +127,17 @@ impl Plan {
         }
     }
 
-    /// Returns the bytes that the process grows by at the most.
+    /// Returns the largest number of bytes by which the process grows.
     pub fn bytes(&self) -> u64 {
         self.current().needs.bytes
     }
 
-    /// Returns true when an attempt was made in vain.
+    /// Returns true when an attempt of this way was made and failed.
     pub fn has_failed(&self, way: Way) -> bool {
         self.attempts.iter().any(|attempt| attempt.way == way && attempt.failure.is_some())
     }
 
-    /// Changes the bytes of all attempts, where a caller holds memory of its own beside the search.
+    /// Replaces the bytes of all attempts by `change` of them, for a caller that holds memory beside the search.
     pub fn with_bytes(mut self, change: impl Fn(u64) -> u64) -> Self {
         self.attempts.iter_mut().for_each(|attempt| attempt.needs.bytes = change(attempt.needs.bytes));
         self

@@ -1,4 +1,4 @@
-//! The eigenproblem that is to be solved.
+//! The eigenproblem to solve.
 
 use super::failure::EigenFailure;
 use super::settings::EigenSettings;
@@ -9,11 +9,11 @@ use flexbody_linalg::{
 };
 use std::sync::Arc;
 
-/// Part of tr K / tr M by which a pencil of which nothing is known is shifted: far above the rounding of a factor in double
-/// precision, and far below the first eigenvalue of most pencils.
+/// Part of tr K / tr M by which a pencil without further information is shifted: far above the rounding of a factor in
+/// double precision, and far below the first eigenvalue of most pencils.
 const UNKNOWN_SHIFT: f64 = 1e-8;
 
-/// Seed of the fixed numbers that the first eigenvalue is estimated from.
+/// Seed of the fixed numbers from which the first eigenvalue is estimated.
 const SEED: u64 = 7;
 
 /// K psi = lambda M psi on the M-orthogonal complement of the known rigid modes.
@@ -21,30 +21,30 @@ const SEED: u64 = 7;
 pub struct EigenProblem<'a> {
     /// K and M.
     pub pencil: Pencil<'a>,
-    /// Rigid modes (N x r), M-orthonormal: exact null vectors of K, projected out at every step.
+    /// Rigid modes (N x r), M-orthonormal: exact null vectors of K, which are projected out at every step.
     pub rigid: MatRef<'a, f64>,
-    /// A Rayleigh quotient of some flexible field: an upper bound of the first flexible eigenvalue.
+    /// Upper bound of the first flexible eigenvalue: the Rayleigh quotient of some flexible field.
     pub first_estimate: f64,
-    /// Relative error of the entries of K: half a unit of the last digit that the input carries.
+    /// Relative error of the entries of K: half a unit of the last digit in the input.
     pub input_error: f64,
-    /// The elimination order that all problems of this pencil share; `None`: each solver computes its own.
+    /// Elimination order shared by all problems of this pencil; `None` if each solver computes its own.
     pub order: Option<&'a EliminationOrder>,
 }
 
 impl<'a> EigenProblem<'a> {
-    /// A pencil of which only the null space of K is known: the columns of `rigid` (N x r) span it and are M-orthonormal; there
-    /// are none where K is definite.
+    /// Creates the problem of a pencil of which only the null space of K is known. The columns of `rigid` (N x r) span
+    /// the null space and are M-orthonormal; there are none if K is definite.
     ///
-    /// The first eigenvalue is estimated by one factor of K + tau M with tau = 1e-8 tr K / tr M: fixed numbers, multiplied twice
-    /// by (K + tau M)^-1 M and freed of `rigid`, have a Rayleigh quotient that is no lower than it. K and M are taken as exact.
-    /// The search finds its elimination order in `order`, which this factor fills.
+    /// The first eigenvalue is estimated with one factor of K + tau M, tau = 1e-8 tr K / tr M: fixed numbers are
+    /// multiplied twice by (K + tau M)^-1 M and freed of `rigid`; their Rayleigh quotient is an upper bound of it. K
+    /// and M count as exact. This factor also fills `order`, where the search finds its elimination order.
     ///
     /// # Errors
-    /// [`TooLarge`](EigenFailure::TooLarge), or [`NotPositiveDefinite`](EigenFailure::NotPositiveDefinite) when K + tau M has no
-    /// Cholesky factor.
+    /// [`TooLarge`](EigenFailure::TooLarge) if the pencil has no ordering;
+    /// [`NotPositiveDefinite`](EigenFailure::NotPositiveDefinite) if K + tau M has no Cholesky factor.
     ///
     /// # Panics
-    /// When `rigid` has another number of rows than the pencil.
+    /// If the number of rows of `rigid` differs from that of the pencil.
     pub fn new(
         pencil: Pencil<'a>,
         rigid: MatRef<'a, f64>,
@@ -56,7 +56,7 @@ impl<'a> EigenProblem<'a> {
     }
 }
 
-/// An upper bound of the first eigenvalue beside those of `rigid`, by inverse iteration from fixed numbers.
+/// Returns an upper bound of the first eigenvalue beside those of `rigid`, by inverse iteration from fixed numbers.
 fn rayleigh_estimate(
     pencil: &Pencil<'_>,
     rigid: MatRef<'_, f64>,
@@ -71,7 +71,7 @@ fn rayleigh_estimate(
     for _ in 0..2 {
         let mut solved = pencil.apply_mass(field.as_ref());
         factor.solve_in_place(solved.as_mut());
-        // Without the null space, which the factor amplifies most.
+        // The factor amplifies the null space most: it is projected out after each step.
         let in_null_space = gram(rigid, pencil.apply_mass(solved.as_ref()).as_ref());
         subtract_combination(solved.as_mut(), rigid, in_null_space.as_ref());
         field = solved;
@@ -82,7 +82,7 @@ fn rayleigh_estimate(
 }
 
 impl EigenProblem<'_> {
-    /// The order of elimination and the structure of the factor; `None` when memory runs out.
+    /// Returns the elimination order and the structure of the factor; `None` if memory runs out.
     pub(super) fn analysis(&self) -> Option<Arc<Analysis>> {
         match self.order {
             Some(order) => order.of(&self.pencil),
@@ -91,7 +91,7 @@ impl EigenProblem<'_> {
     }
 }
 
-/// An eigenproblem, the order in which its factors are eliminated, the settings, and the context of the work.
+/// An eigenproblem, the structure of its factors, the settings, and the context of the work.
 #[derive(Clone, Copy)]
 pub(super) struct Task<'a> {
     pub problem: &'a EigenProblem<'a>,
@@ -101,7 +101,7 @@ pub(super) struct Task<'a> {
 }
 
 impl Task<'_> {
-    /// Returns the largest number of modes beside rigid motion that there may be.
+    /// Returns an upper bound of the number of flexible modes: the number of rows without the rigid modes.
     pub(super) fn flexible_rows(&self) -> usize {
         self.problem.pencil.n() - self.problem.rigid.ncols()
     }

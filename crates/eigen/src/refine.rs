@@ -1,5 +1,4 @@
-//! Refinement common to all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes,
-//! residuals.
+//! Refinement shared by all methods: inverse iteration, Rayleigh-Ritz, orthogonality to the rigid modes, residuals.
 
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
@@ -12,7 +11,7 @@ use flexbody_linalg::{
 };
 use std::ops::Range;
 
-/// Refined modes with their products.
+/// Refined modes with their residuals and the rounding floors of these.
 pub(super) struct Refined {
     pub eigenvalues: Vec<f64>,
     pub vectors: Mat<f64>,
@@ -20,20 +19,20 @@ pub(super) struct Refined {
     pub floors: Vec<f64>,
 }
 
-/// Modes that a search has found.
+/// Modes found by a search.
 pub(super) struct FoundModes {
     pub refined: Refined,
-    /// Eigenvalues beyond the modes.
+    /// Eigenvalues beyond the modes, ascending.
     pub next: Vec<f64>,
-    /// The shift of the search.
+    /// Shift tau of the search.
     pub tau: f64,
-    /// Number of flexible modes with a finite eigenvalue, where all were computed.
+    /// Number of flexible modes with a finite eigenvalue, if all were computed.
     pub finite: Option<usize>,
 }
 
-/// One inverse iteration: X <- (K + tau M)^-1 M X. It purges what M does not see and the rounding of the
-/// basis. With `correct`, one step of iterative refinement follows, which brings the residual of the solve to
-/// its rounding floor.
+/// Performs one inverse iteration: X <- (K + tau M)^-1 M X. It removes components in the null space of M and the
+/// rounding of the basis. With `correct`, one step of iterative refinement follows, which brings the residual of the
+/// solve to its rounding floor.
 fn inverse_iteration(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
@@ -61,24 +60,24 @@ fn inverse_iteration(
     y
 }
 
-/// Squared M-norm, relative to that of the columns, below which a direction of their span is only rounding.
+/// Squared M-norm, relative to that of the columns, below which a direction of their span counts as rounding.
 const DEPENDENT: f64 = 1e-8;
 
-/// Modes of a span whose projections are taken in twice the precision: the time of small eigenproblems in that
-/// grows with the third power, and is a second with 200.
+/// Largest number of modes whose projections are computed in double-double arithmetic. The time of such small
+/// eigenproblems grows with the third power, and is a second with 200.
 const SHARPENED_AT_MOST: usize = 200;
 
-/// Columns whose products with K and M are held at a time: those of 200 modes would take twice the memory of
-/// the modes, and memory that is taken anew is cleared first, which takes longer than the products.
+/// Number of columns whose products with K and M are held at a time. The products of 200 modes would take twice the
+/// memory of the modes, and newly allocated memory is cleared first, which takes longer than the products.
 pub(super) const TOGETHER: usize = 32;
 
-/// `count` columns, [`TOGETHER`] at a time.
+/// Returns ranges of `count` columns, [`TOGETHER`] at a time.
 fn columns_together(count: usize) -> impl Iterator<Item = Range<usize>> {
     (0..count).step_by(TOGETHER).map(move |first| first..count.min(first + TOGETHER))
 }
 
-/// Rayleigh-Ritz on the span of X after projecting out the rigid modes: X is replaced by M-orthonormal Ritz
-/// vectors in ascending order of lambda. Directions in which X is dependent are left out.
+/// Performs Rayleigh-Ritz on the span of X after projecting out the rigid modes. Returns the Ritz values, ascending,
+/// and M-orthonormal Ritz vectors. Directions in which X is dependent are left out.
 pub(super) fn rayleigh_ritz(
     problem: &EigenProblem<'_>,
     mut x: Mat<f64>,
@@ -105,8 +104,8 @@ pub(super) fn rayleigh_ritz(
     Ok((values, x))
 }
 
-/// Columns of a symmetric matrix from number `first` on, down to the square on its diagonal, and their mirror
-/// image.
+/// Writes columns of a symmetric matrix, from number `first` on and down to the square on the diagonal, and their
+/// mirror image.
 fn mirror(matrix: &mut Mat<f64>, first: usize, columns: &Mat<f64>) {
     for j in 0..columns.ncols() {
         for i in 0..columns.nrows() {
@@ -118,7 +117,7 @@ fn mirror(matrix: &mut Mat<f64>, first: usize, columns: &Mat<f64>) {
     }
 }
 
-/// Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
+/// Returns the Ritz values of a basis, ascending, and the coefficients of its M-orthonormal Ritz vectors, from its Gram
 /// matrices with M and with K. Directions in which the basis is dependent are left out.
 pub(super) fn small_ritz(gm: &Mat<f64>, gk: &Mat<f64>) -> Result<(Vec<f64>, Mat<f64>), EigenFailure> {
     let scale = scales(gm)?;
@@ -130,14 +129,14 @@ pub(super) fn small_ritz(gm: &Mat<f64>, gk: &Mat<f64>) -> Result<(Vec<f64>, Mat<
     Ok((ritz.values, scaled_rows(&coefficients, &scale)))
 }
 
-/// Coefficients of M-orthonormal vectors that span what a basis with this Gram matrix spans, less the
-/// directions in which it is dependent.
+/// Returns the coefficients of M-orthonormal vectors that span the space of a basis with this Gram matrix, without the
+/// directions in which the basis is dependent.
 pub(super) fn independent(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
     let scale = scales(gm)?;
     Ok(scaled_rows(&independent_directions(&scaled(gm, &scale))?, &scale))
 }
 
-/// One over the M-norm of each vector of a basis; zero where nothing is left of it, which spans nothing.
+/// Returns one over the M-norm of each vector of a basis; zero for a zero vector.
 fn scales(gm: &Mat<f64>) -> Result<Vec<f64>, EigenFailure> {
     let scale: Vec<f64> =
         (0..gm.ncols()).map(|j| if gm[(j, j)] == 0.0 { 0.0 } else { gm[(j, j)].sqrt().recip() }).collect();
@@ -145,7 +144,7 @@ fn scales(gm: &Mat<f64>) -> Result<Vec<f64>, EigenFailure> {
     if all_finite { Ok(scale) } else { Err(EigenFailure::MassIndefinite) }
 }
 
-/// The Gram matrix of scaled vectors, made symmetric.
+/// Returns the Gram matrix of scaled vectors, made symmetric.
 fn scaled(g: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
     Mat::from_fn(g.nrows(), g.ncols(), |i, j| 0.5 * (g[(i, j)] + g[(j, i)]) * scale[i] * scale[j])
 }
@@ -154,7 +153,7 @@ fn scaled_rows(a: &Mat<f64>, scale: &[f64]) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| scale[i] * a[(i, j)])
 }
 
-/// V / sqrt(Lambda) of a Gram matrix with a diagonal of one, for the eigenvalues that are no rounding.
+/// Returns V / sqrt(Lambda) of a Gram matrix with a diagonal of one, for the eigenvalues above rounding.
 fn independent_directions(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
     let eigen = symmetric_eigen(gm.as_ref()).ok_or(EigenFailure::Inaccurate { residual: f64::NAN })?;
     let first = eigen.values.partition_point(|&v| v < DEPENDENT);
@@ -163,9 +162,9 @@ fn independent_directions(gm: &Mat<f64>) -> Result<Mat<f64>, EigenFailure> {
     }))
 }
 
-/// K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|), and the part of them that cannot be
-/// helped: rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as well as the
-/// node positions are known.
+/// Returns the K-residuals |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|) and their floors: the parts that no
+/// refinement removes. These are rounding, and M R (R'K psi) of the rigid modes R, which are null vectors of K only as
+/// accurately as the node positions are known.
 pub(super) fn residuals(
     problem: &EigenProblem<'_>,
     eigenvalues: &[f64],
@@ -183,7 +182,7 @@ pub(super) fn residuals(
         .unzip()
 }
 
-/// Residual and floor of each of a few pairs.
+/// Returns residual and floor of each of a few pairs.
 fn residuals_together(
     problem: &EigenProblem<'_>,
     m_rigid: MatRef<'_, f64>,
@@ -201,8 +200,8 @@ fn residuals_together(
     residuals.into_iter().zip(floors).collect()
 }
 
-/// Turns K X into what the pairs leave unbalanced, K x - lambda M x. The sizes |K x| + |lambda M x|, and the
-/// norm of what is left beside them.
+/// Replaces K X by the residual forces K x - lambda M x of the pairs. Returns the sizes |K x| + |lambda M x|, and the
+/// norms of the residual forces relative to these sizes.
 pub(super) fn leave_unbalanced(
     kx: &mut Tall,
     mx: MatRef<'_, f64>,
@@ -216,24 +215,27 @@ pub(super) fn leave_unbalanced(
     (sizes, residuals)
 }
 
-/// A part of a size; none of zero.
+/// Returns `part` / `size`; zero for a size of zero.
 fn beside(part: f64, size: f64) -> f64 {
     if size == 0.0 { 0.0 } else { part / size }
 }
 
-/// |K psi| + |lambda| |M psi|.
+/// Returns |K psi| + |lambda| |M psi|, to which K-residuals are relative.
 pub fn residual_scale(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
     k_psi.norm_l2() + lambda.abs() * m_psi.norm_l2()
 }
 
-/// The K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|); zero for a mode of zeros, NaN for
-/// one that is no number.
+/// Returns the K-residual |K psi - lambda M psi| / (|K psi| + |lambda| |M psi|): zero for a mode of zeros, NaN for a
+/// mode with NaN.
 pub fn relative_residual(k_psi: ColRef<'_, f64>, m_psi: ColRef<'_, f64>, lambda: f64) -> f64 {
     beside((k_psi - m_psi * faer::Scale(lambda)).norm_l2(), residual_scale(k_psi, m_psi, lambda))
 }
 
 impl Refined {
-    /// Rayleigh-Ritz on the span of `x`, and the true K-residuals of the outcome.
+    /// Performs Rayleigh-Ritz on the span of `x`, and computes the true K-residuals of the result.
+    ///
+    /// # Errors
+    /// [`EigenFailure::Inaccurate`] if the columns of `x` are dependent.
     pub(super) fn new(
         problem: &EigenProblem<'_>,
         x: Mat<f64>,
@@ -248,9 +250,9 @@ impl Refined {
         Ok(Self { eigenvalues, vectors, residuals, floors })
     }
 
-    /// Repeats Rayleigh-Ritz on the span in twice the precision, where it [is noisy](is_noisy) and has
-    /// [few modes enough](SHARPENED_AT_MOST): the Ritz vectors are then those of the span to the rounding of
-    /// vectors themselves. Their residuals stay what they are in double precision.
+    /// Repeats Rayleigh-Ritz on the span in double-double arithmetic if it [is noisy](is_noisy) and has [few enough
+    /// modes](SHARPENED_AT_MOST). The Ritz vectors are then those of the span up to the rounding of the vectors
+    /// themselves. Their residuals remain those of double precision.
     pub(super) fn sharpened(self, problem: &EigenProblem<'_>, tolerance: f64, context: &Context<'_>) -> Self {
         if !is_noisy(&self.floors, tolerance) || self.eigenvalues.len() > SHARPENED_AT_MOST {
             return self;
@@ -259,11 +261,11 @@ impl Refined {
         context.count(|work| work.mass_columns += x.ncols() as u64);
         context.count(|work| work.stiffness_columns += x.ncols() as u64);
         let stiffness = projection_compensated(pencil.stiffness(), x);
-        // Nothing cancels in products with M.
+        // Products with M have no cancellation.
         let mass = gram(x, pencil.apply_mass(x).as_ref());
         let entry = |i: usize, j: usize| DoubleDouble::from(0.5 * (mass[(i, j)] + mass[(j, i)]));
         let mass = (0..x.ncols()).map(|i| (0..x.ncols()).map(|j| entry(i, j)).collect()).collect();
-        // Modes without strain energy, which are refused later, have no such projection.
+        // Modes without strain energy have no such projection; they are refused later.
         let Some(ritz) = small_pencil(stiffness, &mass) else { return self };
         let eigenvalues: Vec<f64> = ritz.values.iter().map(|lambda| lambda.hi).collect();
         let vectors = combine(x, ritz.vectors.as_ref());
@@ -271,7 +273,7 @@ impl Refined {
         Self { eigenvalues, vectors, residuals, floors }
     }
 
-    /// Residuals and floors anew of some modes, whose vectors or eigenvalues have changed.
+    /// Recomputes the residuals and floors of the modes `changed`, whose vectors or eigenvalues have changed.
     pub(super) fn renew(&mut self, problem: &EigenProblem<'_>, changed: &[usize], context: &Context<'_>) {
         if changed.is_empty() {
             return;
@@ -284,21 +286,21 @@ impl Refined {
         }
     }
 
-    /// K-residual of mode i in units of what is asked for: the tolerance, or the rounding floor where that is
-    /// higher.
+    /// Returns the K-residual of mode i divided by the residual asked for: the tolerance, or the rounding floor if that
+    /// is higher.
     fn excess_of(&self, i: usize, tolerance: f64) -> f64 {
         self.residuals[i] / tolerance.max(self.floors[i])
     }
 
-    /// The largest of them: at most 1 when all modes keep the tolerance or stand at their floors; NaN when
-    /// one is no number.
+    /// Returns the largest excess: at most 1 if all modes keep the tolerance or have reached their floors; NaN if an
+    /// excess is NaN.
     pub(super) fn excess(&self, tolerance: f64) -> f64 {
         largest((0..self.residuals.len()).map(|i| self.excess_of(i, tolerance)))
     }
 }
 
-/// Refines approximate modes until the K-residuals keep `tolerance` or stand at the rounding floor, by at
-/// most three inverse iterations of those that do not.
+/// Refines approximate modes until the K-residuals keep `tolerance` or have reached the rounding floor, by at most
+/// three inverse iterations of the modes that have not.
 pub(super) fn refine(
     problem: &EigenProblem<'_>,
     factor: &dyn Solve,
@@ -308,10 +310,11 @@ pub(super) fn refine(
 ) -> Result<Refined, EigenFailure> {
     for round in 0..3 {
         let least = best.excess(tolerance);
-        // No inverse iteration makes a number of what is none.
+        // No inverse iteration repairs a NaN.
         if least.is_nan() || least <= 1.0 {
             break;
         }
+        // Only the modes above the tolerance are iterated; Rayleigh-Ritz then acts on all modes.
         let poor: Vec<usize> =
             (0..best.residuals.len()).filter(|&i| best.excess_of(i, tolerance) > 1.0).collect();
         let mut x = best.vectors.clone();
@@ -325,6 +328,7 @@ pub(super) fn refine(
         if excess < least {
             best = refined;
         }
+        // A round that does not halve the excess is the last one.
         if excess.is_nan() || excess > 0.5 * least {
             break;
         }

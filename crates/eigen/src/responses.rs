@@ -1,5 +1,5 @@
-//! Responses to loads on the M-orthogonal complement of known motions: static ones, by conjugate gradients that the
-//! factor of K + tau M preconditions, and ones that oscillate, with the factor of K - w^2 M.
+//! Responses to loads on the M-orthogonal complement of known motions: static responses by conjugate gradients,
+//! preconditioned by the factor of K + tau M, and harmonic responses with the factor of K - w^2 M.
 
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
@@ -13,69 +13,70 @@ use flexbody_linalg::{
     subtract_combination,
 };
 
-/// The M-orthogonal complement of M-orthonormal columns P, and the loads that do no work on P.
+/// M-orthogonal complement of M-orthonormal columns P, and the loads that do no work on P.
 pub(super) struct Complement {
-    /// P and M P.
+    /// Columns P, and M P.
     known: Mat<f64>,
     products: Mat<f64>,
 }
 
 impl Complement {
-    /// Returns the complement of rigid motions and modes.
+    /// Returns the complement of the columns of `parts` (rigid motions and modes).
     pub(crate) fn of(pencil: &Pencil<'_>, parts: &[MatRef<'_, f64>]) -> Self {
         let known = side_by_side(parts);
         Self { products: pencil.apply_mass(known.as_ref()), known }
     }
 
-    /// Returns true when nothing is known: all is in the complement.
+    /// Returns true when there are no known motions: the complement is the whole space.
     pub(crate) fn is_everything(&self) -> bool {
         self.known.ncols() == 0
     }
 
-    /// X <- (I - P P'M) X.
+    /// Projects X onto the complement: X <- (I - P P'M) X.
     pub(crate) fn deflate(&self, x: &mut Mat<f64>) {
         let along = gram(self.products.as_ref(), x.as_ref());
         subtract_combination(x.as_mut(), self.known.as_ref(), along.as_ref());
     }
 
-    /// F <- (I - M P P') F.
+    /// Projects loads onto the self-equilibrated ones: F <- (I - M P P') F.
     pub(crate) fn equilibrate(&self, f: &mut Mat<f64>) {
         let along = gram(self.known.as_ref(), f.as_ref());
         subtract_combination(f.as_mut(), self.products.as_ref(), along.as_ref());
     }
 }
 
-/// Iterations of one cycle at the most: with lambda >= tau on the complement the error falls by a factor of
-/// six in each.
+/// Largest number of iterations of one cycle. With lambda >= tau on the complement each reduces the error by a factor
+/// of six.
 const ITERATIONS: usize = 40;
 
-/// Accuracy asked of responses.
+/// Accuracy of responses.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResponseAccuracy {
-    /// Cycles: each begins with the true residual, which the recurrence loses sight of.
+    /// Number of cycles. Each begins with the true residual, from which that of the recurrence drifts.
     cycles: usize,
-    /// Energy norm of the error, relative to that of the start, at which a cycle ends.
+    /// Energy norm of the error, relative to the start, at which a cycle ends.
     reached: f64,
-    /// Residual |f - K x| / |f| above which a response is no result, unless rounding explains it.
+    /// Residual |f - K x| / |f| above which a response is refused, unless rounding explains it.
     accepted: f64,
 }
 
 impl ResponseAccuracy {
-    /// To the floor of f64.
+    /// Accuracy to the rounding floor of f64.
     pub const FULL: Self = Self { cycles: 3, reached: 1e-14, accepted: 1e-9 };
-    /// Some digits, for estimates.
+    /// Accuracy of a few digits, for estimates.
     pub const ROUGH: Self = Self { cycles: 1, reached: 1e-5, accepted: 1e-2 };
 }
 
-/// For each load (column of `loads`, N x m) the part of K^+ f that `modes` do not have: with P = \[R, Psi\]
-/// of rigid modes and eigenvectors (`modes` M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are
-/// thereby self-equilibrated (inertia relief).
+/// Returns for each load (column of `loads`, N x m) the part of K^+ f outside `modes`. With P = \[R, Psi\] of rigid
+/// modes and eigenvectors (`modes`, M-orthonormal), K x = (I - M P P') f and P'M x = 0. The loads are thereby
+/// self-equilibrated (inertia relief).
 ///
-/// `first` is the first flexible eigenvalue, the scale of the shift. Without rigid modes and `modes` (a body
-/// that is held) x = K^-1 f.
+/// `first` is the first flexible eigenvalue, which scales the shift. Without rigid modes and `modes` (a body that is
+/// held) x = K^-1 f.
 ///
 /// # Errors
-/// Failures of the factorisation; [`EigenFailure::Inaccurate`] with the residual of a response.
+/// Failures of the factorisation; [`EigenFailure::Inaccurate`] with the residual of a response that is not accurate
+/// enough.
 pub fn static_responses(
     problem: &EigenProblem<'_>,
     modes: MatRef<'_, f64>,
@@ -89,11 +90,11 @@ pub fn static_responses(
     with_static_responses(problem, modes, first, precision, accuracy, context, respond)
 }
 
-/// The responses K^+ f of [`static_responses`] without known modes, and with the same factor those to further
-/// loads that these responses tell.
+/// Returns the responses K^+ f of [`static_responses`] without known modes, and with one factor also the responses to
+/// further loads. `further` receives the first responses and returns these loads.
 ///
 /// # Errors
-/// Those of [`static_responses`].
+/// The errors of [`static_responses`].
 pub fn static_responses_twice(
     problem: &EigenProblem<'_>,
     loads: Mat<f64>,
@@ -109,7 +110,7 @@ pub fn static_responses_twice(
     with_static_responses(problem, none.as_ref(), first, precision, accuracy, context, respond)
 }
 
-/// The responses `of` loads, and those of further loads that these tell.
+/// Returns the responses `of` the loads, and the responses to the loads that `further` makes of them.
 pub(super) fn twice(
     mut of: impl FnMut(Mat<f64>) -> Result<Mat<f64>, EigenFailure>,
     loads: Mat<f64>,
@@ -120,6 +121,7 @@ pub(super) fn twice(
     Ok([first, of(loads)?])
 }
 
+/// Factors K + tau M in the given precision and calls `respond` with it.
 fn with_static_responses<T>(
     problem: &EigenProblem<'_>,
     modes: MatRef<'_, f64>,
@@ -131,7 +133,7 @@ fn with_static_responses<T>(
 ) -> Result<T, EigenFailure> {
     let analysis = problem.analysis().ok_or(EigenFailure::TooLarge)?;
     let complement = Complement::of(&problem.pencil, &[problem.rigid, modes]);
-    // Without known modes K itself is definite, and its factor the solution but for rounding.
+    // Without known motions K itself is definite, and its factor gives the solution up to rounding.
     let tau = if complement.is_everything() { 0.0 } else { 0.5 * first };
     match precision {
         Precision::Double => {
@@ -145,6 +147,7 @@ fn with_static_responses<T>(
     }
 }
 
+/// Static responses with one factor.
 struct StaticResponses<'a> {
     pencil: &'a Pencil<'a>,
     complement: Complement,
@@ -154,7 +157,7 @@ struct StaticResponses<'a> {
 
 impl StaticResponses<'_> {
     fn of(&self, mut loads: Mat<f64>, context: &Context<'_>) -> Result<Mat<f64>, EigenFailure> {
-        // Twice: a load may be rigid but for its last digits.
+        // Two passes: a load may be rigid but for its last digits.
         self.complement.equilibrate(&mut loads);
         self.complement.equilibrate(&mut loads);
         let mut x = Mat::zeros(loads.nrows(), loads.ncols());
@@ -176,7 +179,7 @@ impl StaticResponses<'_> {
         Ok(x)
     }
 
-    /// Conjugate gradients of all columns side by side from zero.
+    /// Performs conjugate gradients from zero on all columns side by side. Returns the approximate solutions.
     fn cycle(&self, mut residual: Mat<f64>, context: &Context<'_>) -> Mat<f64> {
         let columns = residual.ncols();
         let precondition = |r: &Mat<f64>| {
@@ -186,6 +189,7 @@ impl StaticResponses<'_> {
             self.complement.deflate(&mut z);
             z
         };
+        // Preconditioned start: z = (K + tau M)^-1 r on the complement.
         let mut x = Mat::zeros(residual.nrows(), columns);
         let mut direction = precondition(&residual);
         let start = column_products(residual.as_ref(), direction.as_ref());
@@ -197,7 +201,7 @@ impl StaticResponses<'_> {
             context.count(|work| work.stiffness_columns += columns as u64);
             let product = self.pencil.apply_stiffness(direction.as_ref());
             let curvature = column_products(direction.as_ref(), product.as_ref());
-            // A column that has converged to nothing stands still.
+            // A column whose residual is zero does not move.
             let step = ratios(&energy, &curvature);
             for j in 0..columns {
                 for i in 0..x.nrows() {
@@ -205,6 +209,7 @@ impl StaticResponses<'_> {
                     residual[(i, j)] -= step[j] * product[(i, j)];
                 }
             }
+            // Conjugate direction from the new preconditioned residual.
             let z = precondition(&residual);
             let next = column_products(residual.as_ref(), z.as_ref());
             let turn = ratios(&next, &energy);
@@ -215,30 +220,30 @@ impl StaticResponses<'_> {
     }
 }
 
-/// a / b, zero where b is not positive.
+/// Returns a / b, zero where b is not positive.
 fn ratios(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| if *b > 0.0 { a / b } else { 0.0 }).collect()
 }
 
-/// Refinements with the true residual at the most.
+/// Largest number of refinements with the true residual.
 const REFINEMENTS: usize = 5;
 
-/// A factor with a larger backward error is no preconditioner.
+/// Backward error above which a factor is refused as a preconditioner.
 const GROWTH_LIMIT: f64 = 1e-4;
 
-/// Residual |f - (K - w^2 M) x| / |f| at which refinement ends, and above which a response is no result.
+/// Residual |f - (K - w^2 M) x| / |f| at which refinement ends, and the residual above which a response is refused.
 const REACHED: f64 = 1e-13;
 const ACCEPTED: f64 = 1e-9;
 
-/// For each load (column of `loads`, N x m) the part of (K - w^2 M)^-1 f that `modes` do not have: with P =
-/// \[R, Psi\] of rigid modes and eigenvectors (`modes` M-orthonormal), (K - w^2 M) x = (I - M P P') f and P'M x
-/// = 0. What the modes have of the response is Psi (Lambda - w^2)^-1 Psi'f.
+/// Returns for each load (column of `loads`, N x m) the part of (K - w^2 M)^-1 f outside `modes`. With P = \[R, Psi\]
+/// of rigid modes and eigenvectors (`modes`, M-orthonormal), (K - w^2 M) x = (I - M P P') f and P'M x = 0. The part of
+/// the response in the modes is Psi (Lambda - w^2)^-1 Psi'f.
 ///
 /// * `square`: w^2 > 0, which may lie among the eigenvalues of the modes.
 ///
 /// # Errors
-/// [`EigenFailure::Inaccurate`] with the residual of a response: where w^2 is an eigenvalue that the modes do
-/// not have, or too near to one of theirs; [`EigenFailure::TooLarge`].
+/// [`EigenFailure::Inaccurate`] with the residual of a response, if w^2 is an eigenvalue outside the modes, or too near
+/// to an eigenvalue of the modes; [`EigenFailure::TooLarge`].
 pub fn dynamic_responses(
     problem: &EigenProblem<'_>,
     modes: MatRef<'_, f64>,
@@ -250,11 +255,11 @@ pub fn dynamic_responses(
     with_dynamic_responses(problem, modes, square, context, respond)
 }
 
-/// The responses of [`dynamic_responses`] without known modes, and with the same factor those to further loads that
-/// these responses tell.
+/// Returns the responses of [`dynamic_responses`] without known modes, and with one factor also the responses to
+/// further loads. `further` receives the first responses and returns these loads.
 ///
 /// # Errors
-/// Those of [`dynamic_responses`].
+/// The errors of [`dynamic_responses`].
 pub fn dynamic_responses_twice(
     problem: &EigenProblem<'_>,
     loads: Mat<f64>,
@@ -268,6 +273,7 @@ pub fn dynamic_responses_twice(
     with_dynamic_responses(problem, none.as_ref(), square, context, respond)
 }
 
+/// Factors K - w^2 M and calls `respond` with the factor.
 fn with_dynamic_responses<T>(
     problem: &EigenProblem<'_>,
     modes: MatRef<'_, f64>,
@@ -287,6 +293,7 @@ fn with_dynamic_responses<T>(
     respond(&DynamicResponses { pencil, complement, factor, square })
 }
 
+/// Harmonic responses with one factor.
 struct DynamicResponses<'a> {
     pencil: &'a Pencil<'a>,
     complement: Complement,
@@ -296,11 +303,12 @@ struct DynamicResponses<'a> {
 
 impl DynamicResponses<'_> {
     fn of(&self, mut loads: Mat<f64>, context: &Context<'_>) -> Result<Mat<f64>, EigenFailure> {
-        // Twice: a load may be that of a mode but for its last digits.
+        // Two passes: a load may be the inertia force of a mode but for its last digits.
         self.complement.equilibrate(&mut loads);
         self.complement.equilibrate(&mut loads);
         let mut x = Mat::zeros(loads.nrows(), loads.ncols());
         let mut residual = loads.clone();
+        // Iterative refinement with the true residual.
         for _ in 0..=REFINEMENTS {
             context.count(|work| work.solved_columns += loads.ncols() as u64);
             self.factor.solve_in_place(residual.as_mut());
@@ -320,7 +328,7 @@ impl DynamicResponses<'_> {
     }
 }
 
-/// The largest |residual| / |load| of all columns; not a number where one is none.
+/// Returns the largest |residual| / |load| of all columns; NaN if one of them is NaN.
 fn largest_part(residual: &Mat<f64>, loads: &Mat<f64>) -> f64 {
     let part = |j: usize| match (residual.col(j).norm_l2(), loads.col(j).norm_l2()) {
         (0.0, _) => 0.0,

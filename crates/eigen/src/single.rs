@@ -1,10 +1,9 @@
-//! The attempt with a single-precision factor: Lanczos on the operator that it makes, then corrections against the
+//! The attempt with a single-precision factor: Lanczos on the operator of this factor, then corrections against the
 //! true K and M in double precision until the true residuals keep the tolerance.
 //!
-//! The factor T of K + tau M is good to about 1e-7 times its condition, so that Lanczos finds the modes to
-//! 1e-2 or 1e-4. A correction T r of the residual r = K x - lambda M x, with Rayleigh-Ritz on all that is
-//! there, gains as many digits again for one solved column, where refining every solve of Lanczos would cost
-//! several.
+//! The factor T of K + tau M is accurate to about 1e-7 times its condition number, so that Lanczos finds the modes to
+//! 1e-2 or 1e-4. A correction T r of the residual r = K x - lambda M x, with Rayleigh-Ritz on all vectors, gains that
+//! number of digits again for one solved column. Refining every solve of Lanczos would cost several columns.
 
 use super::attempt::{Attempt, Goal};
 use super::correction::{Correction, Corrector};
@@ -18,11 +17,12 @@ use super::settings::{Accuracy, FactorChoice, Precision};
 use super::shift::with_suited_shift;
 use flexbody_linalg::{Cholesky, Solve};
 
-/// Columns per step of Lanczos: as many as the solves take together, since with single precision four cost
-/// the same.
+/// Columns per step of Lanczos: the number that the solves handle together. In single precision four columns cost as
+/// much as eight.
 const BLOCK: usize = 8;
 
-/// Ritz residual at which Lanczos hands over: more steps find no modes that the factor's error does not hide.
+/// Ritz residual at which the corrections take over: further steps find no modes that the error of the factor does not
+/// hide.
 const HANDED_OVER: f64 = 1e-4;
 
 /// Lanczos with a factor in single precision, and corrections.
@@ -61,7 +61,7 @@ impl Attempt for SinglePrecision {
         })
     }
 
-    /// A search that fails with this factor often says nothing about the model.
+    /// Returns false: a failure with this factor often comes from its precision, and does not concern the model.
     fn is_conclusive(&self, _: &EigenFailure) -> bool {
         false
     }

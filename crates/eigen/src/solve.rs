@@ -1,4 +1,4 @@
-//! The entry: plans, searches, counts, and puts the modes into canonical form.
+//! The entry point of the eigen-solver: plans, searches, counts, and puts the modes into canonical form.
 
 use super::attempt::Goal;
 use super::bounds::enclose;
@@ -18,21 +18,21 @@ use flexbody_linalg::{Analysis, is_positive_semidefinite};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Part of the promised residual that the search aims at: the canonical basis of an eigenvalue with m copies
-/// mixes their residuals, up to the root of m times the largest.
+/// Part of the guaranteed residual that the search aims at. The canonical basis of an eigenvalue with m copies mixes
+/// their residuals, up to the root of m times the largest.
 const SEARCHED: f64 = 0.4;
 
-/// Distance of eigenvalues that a count in single precision needs, over [`NEAR`]: its shift is in the middle of the gap;
-/// a fifth more, since the gap is not known yet.
+/// Gap of eigenvalues that a count in single precision needs, over [`NEAR`]. The shift is in the middle of the gap,
+/// which gives a factor of 2; a fifth more, since the gap is not known yet.
 const SEPARATION: f64 = 2.4;
 
-/// Searches for the same modes: where the count says that modes were missed, one more.
+/// Largest number of searches for the same modes: a second one follows if the count finds missing modes.
 const ROUNDS: usize = 2;
 
 /// Computes the wanted flexible modes.
 ///
 /// # Errors
-/// [`EigenFailure`] says why no trustworthy modes exist.
+/// [`EigenFailure`] with the reason why no trustworthy modes exist.
 pub fn solve(
     problem: &EigenProblem<'_>,
     settings: &EigenSettings,
@@ -48,11 +48,11 @@ pub fn solve(
     finish(&task, found, (completeness, bounds), (wanted, plan))
 }
 
-/// Returns the plan of [`solve`] without its search; all flexible modes below an eigenvalue count as
-/// [`EigenSettings::DEFAULT_COUNT`].
+/// Returns the plan of [`solve`] without a search. A request for all flexible modes below an eigenvalue counts as
+/// [`EigenSettings::DEFAULT_COUNT`] modes.
 ///
 /// # Errors
-/// [`EigenFailure`] of the analysis, or that nothing fits the limits of the context.
+/// [`EigenFailure`] of the analysis, or the failure that no attempt fits the limits of the context.
 pub fn plan(
     problem: &EigenProblem<'_>,
     settings: &EigenSettings,
@@ -67,7 +67,7 @@ pub fn plan(
     Plan::new(&task, wanted)
 }
 
-/// Finds the order of elimination, and refuses an M that is no mass.
+/// Computes the elimination order, and checks that M is positive semidefinite.
 fn analyse(problem: &EigenProblem<'_>, context: &Context<'_>) -> Result<Arc<Analysis>, EigenFailure> {
     context.phase("ordering");
     let analysis = problem.analysis().ok_or(EigenFailure::TooLarge)?;
@@ -81,7 +81,7 @@ fn analyse(problem: &EigenProblem<'_>, context: &Context<'_>) -> Result<Arc<Anal
     Ok(analysis)
 }
 
-/// Returns the number of wanted modes, of those that there may be.
+/// Returns the number of wanted modes, at most the number of flexible modes.
 fn count_wanted(task: &Task<'_>) -> Result<usize, EigenFailure> {
     match task.settings.wanted {
         Wanted::Lowest(count) => Ok(count.min(task.flexible_rows())),
@@ -94,8 +94,8 @@ fn count_wanted(task: &Task<'_>) -> Result<usize, EigenFailure> {
     }
 }
 
-/// Searches and counts until no mode is missing: a search that missed some is repeated for as many as there are, from
-/// other directions.
+/// Searches and counts until no mode is missing. If modes are missing, the search is repeated from other random
+/// vectors, for as many more modes as the count found missing.
 fn find_all(
     task: &Task<'_>,
     plan: &mut Plan,
@@ -114,11 +114,12 @@ fn find_all(
         if there > counted || round == ROUNDS {
             return Err(EigenFailure::CountDiffers { found: there, counted, shift: completeness.shift });
         }
+        // The next search asks for the missing modes as well.
         asked = wanted + counted - there;
     }
 }
 
-/// Makes the attempts of the plan in their order until one finds the modes.
+/// Makes the attempts of the plan in their order until one of them finds the modes.
 fn search(
     task: &Task<'_>,
     plan: &mut Plan,
@@ -156,14 +157,14 @@ fn search(
     }
     Err(match (failed, plan.refused.clone()) {
         (Some((Way::SinglePrecision, failure)), _) => EigenFailure::SinglePrecision(Box::new(failure)),
-        // What would have come next does not fit the limits of the context.
+        // The next attempt would not fit the limits of the context.
         (_, Some(refused)) => refused,
         (Some((_, failure)), None) => failure,
         (None, None) => EigenFailure::NotConverged { converged: 0, wanted },
     })
 }
 
-/// Guaranteed bounds of the eigenvalues that were counted, where they are asked for.
+/// Returns guaranteed bounds of the counted eigenvalues at [`Accuracy::Certified`]; `None` at other accuracies.
 fn bounds(
     task: &Task<'_>,
     refined: &Refined,
@@ -178,7 +179,7 @@ fn bounds(
     enclose(task, modes, &refined.eigenvalues[..found], completeness.shift, CLUSTER_GAP).map(Some)
 }
 
-/// Counts the modes below a shift in the gap above the last one.
+/// Counts the modes below a shift in the gap above the last one, unless there is no count.
 fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completeness, EigenFailure> {
     let Task { problem, settings, context, .. } = task;
     let found = search.refined.eigenvalues.len();
@@ -187,7 +188,7 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
         (Wanted::Below(lambda), _) => lambda,
         (_, Some(&next)) if found == 0 => 0.5 * next,
         (_, Some(&next)) => 0.5 * (last + next),
-        // Nothing above: every finite mode was computed.
+        // No eigenvalue above: every finite mode was computed.
         (_, None) => 1.1 * last,
     };
     let remark = match plan.count.too_large {
@@ -222,13 +223,13 @@ fn prove(task: &Task<'_>, plan: &Plan, search: &FoundModes) -> Result<Completene
 }
 
 /// Returns true when the shift is so near to the last mode below it, for the size of the matrix along this mode, that
-/// the rounding of a factor in single precision is likely to move one across the other.
+/// the rounding of a factor in single precision may move one across the other.
 fn is_near(problem: &EigenProblem<'_>, found: &Refined, shift: f64) -> bool {
     let Some(last) = found.eigenvalues.iter().rposition(|&lambda| lambda < shift) else { return false };
     shift - found.eigenvalues[last] < NEAR * size_along(problem, shift, found.vectors.col(last))
 }
 
-/// Puts the modes into canonical form, and returns as many as are wanted with the residuals that they have then.
+/// Puts the modes into canonical form, and returns the wanted ones with their final residuals.
 fn finish(
     task: &Task<'_>,
     search: FoundModes,
@@ -236,6 +237,7 @@ fn finish(
     (wanted, plan): (usize, Plan),
 ) -> Result<EigenSolution, EigenFailure> {
     let mut modes = search.refined;
+    // Rotated or moved modes get new residuals.
     let groups = clusters(&modes.eigenvalues, CLUSTER_GAP);
     canonical_basis(modes.vectors.as_mut(), &groups);
     if let Some(bounds) = &bounds {

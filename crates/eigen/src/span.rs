@@ -1,5 +1,5 @@
-//! Modes of a given subspace: Rayleigh-Ritz, canonical form, residuals as they are, and the count for those
-//! that turn out to be eigenvectors. Nothing is factored unless that count is made.
+//! Modes of a given subspace: Rayleigh-Ritz, canonical form, true residuals, and an inertia count of the modes that are
+//! eigenvectors. A factorisation is made for this count only.
 
 use super::bounds::enclose;
 use super::canonical::{CLUSTER_GAP, canonical_basis, clusters};
@@ -16,20 +16,19 @@ use faer::Mat;
 use flexbody_linalg::context::Context;
 use flexbody_linalg::{Analysis, is_positive_semidefinite};
 
-/// Distance of the count's shift from the last eigenvector, relative to its eigenvalue: the second is tried
-/// where the first counts too many, which may lie beyond the modes that were given.
+/// Distances of the count's shift from the last eigenvector, relative to its eigenvalue. The second is used if the
+/// count with the first is too large, since the additional modes may lie beyond the given ones.
 const ABOVE: [f64; 2] = [1e-3, 1e-5];
 
-/// The modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors,
+/// Returns the modes of the body in the span of `basis` (N x k, nearly M-orthonormal): mass-normalised Ritz vectors,
 /// M-orthogonal to the rigid modes, ascending.
 ///
-/// They are eigenvectors only as far as their residuals say. Where the lowest of them keep the K-residual of
-/// the accuracy, an inertia count says whether modes are missing below the last such; accuracy `fast` leaves
-/// it out.
+/// The modes are eigenvectors only as far as their residuals say. If the lowest of them keep the K-residual of the
+/// accuracy, an inertia count shows whether modes are missing below the last of these. Accuracy `fast` makes no count.
 ///
 /// # Errors
-/// [`EigenFailure`]: dependent columns, an indefinite matrix, a mechanism; at [`Accuracy::Certified`] also
-/// where a mode is no eigenvector or one is missing.
+/// [`EigenFailure`] for dependent columns, an indefinite matrix or a mechanism; at [`Accuracy::Certified`] also if a
+/// mode is no eigenvector or one is missing.
 pub fn modes_of_span(
     problem: &EigenProblem<'_>,
     basis: Mat<f64>,
@@ -37,7 +36,7 @@ pub fn modes_of_span(
     context: &Context<'_>,
 ) -> Result<EigenSolution, EigenFailure> {
     let refined = Refined::new(problem, basis, context)?;
-    // Whatever is asked of the modes: nothing is searched, and they are no better than this makes them.
+    // At any accuracy: there is no search, so the modes are only as accurate as this step makes them.
     let refined = refined.sharpened(problem, Accuracy::Standard.residual(), context);
     check_zero_energy(problem, &refined)?;
     let (mut modes, next_eigenvalue) = canonical_modes(problem, refined, settings, context);
@@ -80,7 +79,7 @@ pub fn modes_of_span(
     })
 }
 
-/// The modes that are wanted, in canonical form, with their residuals, and the eigenvalue after them.
+/// Returns the wanted modes in canonical form, with their residuals, and the eigenvalue after them.
 fn canonical_modes(
     problem: &EigenProblem<'_>,
     refined: Refined,
@@ -113,7 +112,7 @@ impl Refined {
     }
 }
 
-/// Returns the knowledge about missed modes without a count.
+/// Returns the state of the proof without a count.
 fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness {
     let given = modes.eigenvalues.len();
     let remark = if exact < given {
@@ -127,7 +126,7 @@ fn uncounted(modes: &Refined, exact: usize, accuracy: Accuracy) -> Completeness 
     Completeness { proof: Proof::NotProved, shift, negative_pivots: None, modes_below: given, remark }
 }
 
-/// The analysis that bounds are computed with, or the reason why there are none.
+/// Returns the analysis for the bounds, or the reason why there can be no bounds.
 fn certifiable<'a>(
     modes: &Refined,
     exact: usize,
@@ -168,6 +167,7 @@ fn count(
     if !is_positive_semidefinite(&problem.pencil, analysis) {
         return Err(EigenFailure::MassIndefinite);
     }
+    // The smaller distance is used if the larger one counts too many.
     let mut counted = (last, 0);
     for above in ABOVE {
         let shift = (1.0 + above) * last;

@@ -1,4 +1,4 @@
-//! Rounding floors, and motions that cannot be told from motions without energy with the digits that are there.
+//! Rounding floors, and motions whose energy cannot be distinguished from zero with the digits of K.
 
 use super::failure::EigenFailure;
 use super::problem::EigenProblem;
@@ -12,9 +12,9 @@ use flexbody_linalg::{
 /// Unit roundoff of f64.
 const ROUNDOFF: f64 = f64::EPSILON / 2.0;
 
-/// For each column x of X: the standard deviation of x'Kx when every entry of K carries an independent
-/// relative error of `relative`: relative * sqrt(sum_ij (K_ij x_i x_j)^2), times sqrt(2) for the equal errors
-/// of symmetric pairs.
+/// Returns for each column x of X the standard deviation of x'Kx when every entry of K has an independent relative
+/// error of `relative`: relative * sqrt(sum_ij (K_ij x_i x_j)^2), times sqrt(2) for the equal errors of symmetric
+/// pairs.
 pub fn energy_noise(k: &SymmetricMatrix, x: MatRef<'_, f64>, relative: f64) -> Vec<f64> {
     let relative = relative.max(ROUNDOFF);
     let terms = row_sums(k, x, |term| term * term);
@@ -25,28 +25,29 @@ pub fn energy_noise(k: &SymmetricMatrix, x: MatRef<'_, f64>, relative: f64) -> V
     columns.map(|pair| relative * (2.0 * sum(pair)).sqrt()).collect()
 }
 
-/// For each column x of X: eps | |K| |x| |_2, the norm of K x that rounding alone can leave.
+/// Returns for each column x of X the norm of K x that rounding alone can leave: eps | |K| |x| |_2.
 pub fn rounding_residual(k: &SymmetricMatrix, x: MatRef<'_, f64>) -> Vec<f64> {
     column_norms(row_sums(k, x, f64::abs).as_ref()).into_iter().map(|norm| f64::EPSILON * norm).collect()
 }
 
-/// Returns true when rounding keeps a K-residual above `tolerance`, as in thin or fine shells: a part eps |K| |x| of K x,
-/// divided by distances of eigenvalues, is then what plain projections turn modes into each other by.
+/// Returns true when rounding keeps a K-residual above `tolerance`, as in thin or fine shells. Plain projections then
+/// rotate modes into each other by eps |K| |x|, the rounding of K x, divided by distances of eigenvalues.
 pub(super) fn is_noisy(floors: &[f64], tolerance: f64) -> bool {
     floors.iter().any(|floor| *floor > tolerance)
 }
 
-/// sum_j f(K_ij x_j) for each row i and each column x.
+/// Returns sum_j f(K_ij x_j) for each row i and each column x.
 fn row_sums(k: &SymmetricMatrix, x: MatRef<'_, f64>, f: impl Fn(f64) -> f64 + Copy + Sync) -> Tall {
     let mut sums = Tall::zeros(x.nrows(), x.ncols());
     sum_terms(k, 1, x, sums.as_mut(), f);
     sums
 }
 
-/// Energy this many standard deviations above the noise of the entries of K is real.
+/// Number of standard deviations of the noise of K above which energy counts as real.
 pub(super) const NOISE_FACTOR: f64 = 30.0;
 
-/// Eigenvalues that cannot be told from zero are mechanisms; clearly negative ones an indefinite K.
+/// Refuses modes whose eigenvalues cannot be distinguished from zero (mechanisms), and clearly negative eigenvalues (an
+/// indefinite K).
 pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -> Result<(), EigenFailure> {
     let lowest = refined.vectors.as_ref().subcols(0, refined.vectors.ncols().min(32));
     let noise = energy_noise(problem.pencil.stiffness(), lowest, problem.input_error);
@@ -70,22 +71,22 @@ pub(super) fn check_zero_energy(problem: &EigenProblem<'_>, refined: &Refined) -
 /// Motions with neither strain energy nor mass.
 #[derive(Debug, Clone)]
 pub struct Unresisted {
-    /// Number of such motions; rigid motions are not among them, since they have mass.
+    /// Number of such motions. Rigid motions do not count, since they have mass.
     pub count: usize,
-    /// Some of them (N x at most `SHOWN`), of largest entry one.
+    /// Some of the motions (N x at most 8), each with a largest entry of one.
     pub vectors: Mat<f64>,
 }
 
-/// Vectors that are computed at the most.
+/// Largest number of vectors that are computed.
 const SHOWN: usize = 8;
 
-/// Steps of inverse iteration: the first lifts the motions by as many digits as K has above all others.
+/// Number of steps of inverse iteration. The first amplifies the motions relative to all others by the digits of K.
 const STEPS: usize = 2;
 
-/// The motions that K + tau M leaves without energy up to the digits of K (`input_error` is the relative
-/// error of its entries); `None` where there is none, or where K + tau M is truly indefinite.
+/// Returns the motions to which K + tau M gives no energy up to the digits of K (`input_error` is the relative error of
+/// its entries). Returns `None` if there is none, or if K + tau M is clearly indefinite.
 ///
-/// Counted are the eigenvalues mu of (K + tau M) x = mu diag(K) x within noise of zero, by the inertia of K +
+/// The count is that of the eigenvalues mu of (K + tau M) x = mu diag(K) x within noise of zero, by the inertia of K +
 /// tau M -+ delta diag(K).
 pub fn unresisted_motions(pencil: &Pencil<'_>, tau: f64, input_error: f64) -> Option<Unresisted> {
     let delta = NOISE_FACTOR * input_error.max(f64::EPSILON);
@@ -94,11 +95,13 @@ pub fn unresisted_motions(pencil: &Pencil<'_>, tau: f64, input_error: f64) -> Op
     let with = |stiffness: &SymmetricMatrix| {
         Inertia::new(&analysis, &Pencil::new(stiffness, pencil.mass(), pencil.block()), -tau)
     };
+    // Eigenvalues mu between -delta and delta become negative in one pencil and positive in the other.
     let (lowered, raised) = (moved(-delta)?, moved(delta)?);
     let count = with(&lowered).negative;
     if count == 0 || with(&raised).negative > 0 {
         return None;
     }
+    // Inverse iteration on the positive definite pencil resolves some of the motions.
     let raised = Pencil::new(&raised, pencil.mass(), pencil.block());
     let factor = Cholesky::<f64>::new(&analysis, &raised, tau)?;
     let start = |i: usize, j: usize| ((i + 1) as f64 * (j as f64 + 1.37) * 0.754_877_666).fract() - 0.5;

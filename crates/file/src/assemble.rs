@@ -1,4 +1,4 @@
-//! Puts the values of a file together to the parts of a body, row by row of the table.
+//! Assembles the parts of a body from the values of a file, row by row of the table.
 
 use super::draft::Draft;
 use super::item::{Extent, Item, Membership, Origin, Per, SchemaGroup, Together};
@@ -9,10 +9,10 @@ use super::value::ReadValue;
 use flexbody_base::units::UnitSystem;
 use flexbody_body::flex_body::Parts;
 
-/// The parts; `None` when texts or counts mean nothing, or entries are missing that belong together, which is then
-/// among the problems of `scan`.
+/// Assembles the parts of a body. Returns `None` if texts or counts are invalid, or if entries are missing that belong
+/// together; the reason is then among the problems of `scan`.
 ///
-/// `scan` had no problems before, so every required entry is there, of its kind and with its shape.
+/// `scan` must have no problems before: every required entry then exists, of its kind and with its shape.
 pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     check_together(scan);
     let groups = scan.held()?;
@@ -32,7 +32,7 @@ pub(super) fn assemble(scan: &mut Scan, units: UnitSystem) -> Option<Parts> {
     scan.problems.is_empty().then_some(parts)
 }
 
-/// Names and paths of the instances of a group.
+/// Returns names and paths of the instances of a group.
 fn instances(scan: &Scan, group: &SchemaGroup) -> Vec<(String, String)> {
     match group.per {
         Per::Body => vec![(String::new(), group.path.to_owned())],
@@ -43,11 +43,12 @@ fn instances(scan: &Scan, group: &SchemaGroup) -> Vec<(String, String)> {
     }
 }
 
+/// Moves the value of an entry from the scan into the draft.
 fn put(scan: &mut Scan, draft: &mut Draft, path: &str, item: &Item) {
     let Some(put) = item.put else { return };
     let name = key(path, item);
     let value = match item.origin {
-        // Compared with what the body gives afterwards.
+        // The value is kept: it is compared with that of the finished body.
         Origin::Derived(..) => scan.values.get(&name).cloned(),
         _ => scan.values.remove(&name),
     };
@@ -58,16 +59,16 @@ fn put(scan: &mut Scan, draft: &mut Draft, path: &str, item: &Item) {
     }
 }
 
-/// Entries of a file that belong together.
+/// Entries of a file that must occur together.
 struct FoundSet {
     set: &'static Together,
-    /// Their keys, and whether they are there.
+    /// Keys of the entries; true for each that the file holds.
     entries: Vec<(String, bool)>,
-    /// True if the set misses an entry that it needs.
+    /// True if an entry is missing that the set requires.
     is_incomplete: bool,
 }
 
-/// Adds a problem for every set of entries of which the file has some.
+/// Adds a problem for every set of entries of which the file holds some but not all required ones.
 fn check_together(scan: &mut Scan) {
     let mut sets: Vec<FoundSet> = Vec::new();
     for group in TABLE {

@@ -1,5 +1,4 @@
-//! What a flex-body file holds of a body, as plain data: for formats that carry the same entries in another
-//! container.
+//! The content of a flex-body file as plain data, for formats that carry the same entries in another container.
 
 use super::names;
 use super::names::place;
@@ -7,7 +6,7 @@ use super::schema::TABLE;
 use super::value::Value;
 use flexbody_body::flex_body::FlexBody;
 
-/// Numbers of an array, row-major.
+/// Elements of an array, row-major.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Numbers {
     /// 64-bit floats.
@@ -21,15 +20,15 @@ pub enum Numbers {
 pub struct NamedArray {
     /// Path without a leading slash: `invariants/W1`.
     pub path: String,
-    /// Symbol of the theory; empty where it has none.
+    /// Symbol in the theory document; empty if there is none.
     pub symbol: &'static str,
-    /// With the unit names of the body: `kg^(1/2) m`.
+    /// Unit of the elements with the unit names of the body, for instance `kg^(1/2) m`.
     pub units: String,
     /// Description of the array.
     pub description: &'static str,
-    /// Extents.
+    /// Extents of the array.
     pub shape: Vec<usize>,
-    /// As many as the product of the extents.
+    /// Elements; their number is the product of the extents.
     pub values: Numbers,
 }
 
@@ -42,10 +41,10 @@ pub struct NamedAttributes {
     pub values: Vec<(String, serde_json::Value)>,
 }
 
-/// Every array and every attribute of the flex-body file of `body` (`docs/format.md`), in the order of the
+/// Returns every array and every attribute of the flex-body file of `body` (`docs/format.md`), in the order of the
 /// file.
 ///
-/// Of a body with 32-bit floats these are rounded as in the file; what follows from them is not rounded
+/// For a body with 32-bit floats the large arrays are rounded as in the file. Entries derived from them are not rounded
 /// again.
 pub fn contents(body: &FlexBody) -> (Vec<NamedAttributes>, Vec<NamedArray>) {
     let (mut attributes, mut arrays) = (Vec::new(), Vec::new());

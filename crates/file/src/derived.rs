@@ -1,4 +1,4 @@
-//! Entries that follow from others: what the file says against what the body gives.
+//! Comparison of derived entries of a file with the values that follow from the body.
 
 use super::extents::index;
 use super::item::{DERIVED_TOLERANCE, Origin, Per, SHORT_TOLERANCE, SchemaGroup};
@@ -9,8 +9,8 @@ use super::value::{Value, View};
 use flexbody_base::diagnostic::Code;
 use flexbody_body::flex_body::Parts;
 
-/// Adds a problem for every derived entry of the scanned file that contradicts `body`, made of its primary
-/// entries.
+/// Adds a problem for every derived entry of the scanned file that contradicts `body`, which was assembled from the
+/// primary entries.
 pub(super) fn check_derived(scan: &mut Scan, body: &Parts) {
     for group in TABLE {
         let links: Vec<Option<String>> = match group.per {

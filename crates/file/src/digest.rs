@@ -1,5 +1,5 @@
-//! The digest of all content of a flex-body file, as `docs/format.md` describes it: a SHA-256 of every group
-//! and dataset, listed by path, and one of this list.
+//! The digests of the content of a flex-body file, as `docs/format.md` describes them: a SHA-256 of every group and
+//! dataset, listed by path, and a SHA-256 of this list.
 
 use super::schema::{LIST, WHOLE};
 use flexbody_base::hdf5_file::{Record, Stored, attribute_names, attribute_record, dataset_record};
@@ -9,25 +9,26 @@ use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 
-/// Deeper groups are not part of any format version.
+/// Depth of groups above which a file is refused: no format version has deeper ones.
 const DEEPEST: usize = 8;
-/// Groups may contain themselves, so that even a small file can unfold without end.
+/// Number of entries above which a file is refused. Groups may contain themselves, so that even a small file can have
+/// endlessly many paths.
 const MOST_ENTRIES: usize = 100_000;
-/// Names of entries in a message.
+/// Largest number of entries named in a message.
 const MOST_NAMED: usize = 6;
-/// Numbers that are turned into bytes at a time.
+/// Number of elements that are converted to bytes at a time.
 const BLOCK: usize = 1 << 13;
 
-/// SHA-256 by path.
+/// SHA-256 in hexadecimal by path.
 pub(super) type Digests = BTreeMap<String, String>;
-/// Datasets whose numbers have gone into a fingerprint already, by path.
+/// Fingerprints of datasets whose elements have been hashed already, by path.
 pub(super) type Numbers = HashMap<String, Fingerprint>;
 
-/// Numbers that a dataset holds.
+/// Element type of a dataset.
 pub(super) trait Number: Copy + Sync {
-    /// Name of the type in a digest.
+    /// Name of the type in the hashed header.
     const KIND: &'static str;
-    /// Appends its bytes, little-endian.
+    /// Appends the bytes of the number, little-endian.
     fn put(self, bytes: &mut Vec<u8>);
 }
 
@@ -46,7 +47,7 @@ number!(f32, "float32");
 number!(i64, "int64");
 number!(i32, "int32");
 
-/// The digest of a dataset as far as its numbers go: `values` row-major in the extents `shape`.
+/// Returns the fingerprint of a dataset without its attributes: `values` row-major in the extents `shape`.
 pub(super) fn of_numbers<T: Number>(shape: &[usize], values: &[T]) -> Fingerprint {
     let mut fingerprint = Fingerprint::default();
     fingerprint.update(header("", T::KIND, shape, size_of_val(values)).as_bytes());
@@ -59,19 +60,20 @@ pub(super) fn of_numbers<T: Number>(shape: &[usize], values: &[T]) -> Fingerprin
     fingerprint
 }
 
-/// What stands before the bytes of a dataset (without a name) or of an attribute. The lengths make it
-/// unambiguous.
+/// Returns the header that is hashed before the bytes of a dataset (without a name) or of an attribute. The lengths in
+/// it make the hashed text unambiguous.
 fn header(name: &str, kind: &str, shape: &[usize], bytes: usize) -> String {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     format!("{} {name} {kind} {} {bytes}\n", name.len(), shape.join("x"))
 }
 
+/// Adds header and bytes of a dataset or an attribute to the fingerprint.
 fn add(fingerprint: &mut Fingerprint, name: &str, record: &Record) {
     fingerprint.update(header(name, record.kind, &record.shape, record.bytes.len()).as_bytes());
     fingerprint.update(&record.bytes);
 }
 
-/// The text of the list, and its SHA-256.
+/// Returns the text of the list, and its SHA-256.
 pub(super) fn sealed(digests: &Digests) -> (String, String) {
     let mut list = String::new();
     for (path, digest) in digests {
@@ -81,10 +83,11 @@ pub(super) fn sealed(digests: &Digests) -> (String, String) {
     (list, whole)
 }
 
-/// Digests of everything in `file`; of the datasets in `numbers` only the attributes are read.
+/// Returns the digests of all groups and datasets of `file`. Datasets in `numbers` are not read; only their attributes
+/// are.
 ///
 /// # Errors
-/// The path of an entry that no flex-body file has, and what is wrong with it.
+/// The path of an entry that no flex-body file has, with the problem.
 pub(super) fn digests_of(
     file: &hdf5::File,
     numbers: &mut Numbers,
@@ -96,6 +99,7 @@ pub(super) fn digests_of(
     Ok(walk.found)
 }
 
+/// A walk through all groups of a file that collects digests.
 struct DigestWalk<'a> {
     numbers: &'a mut Numbers,
     stored: &'a mut Stored,
@@ -138,7 +142,7 @@ impl DigestWalk<'_> {
         }
     }
 
-    /// Adds the attributes of a group or dataset, by name, and lists it.
+    /// Adds the attributes of a group or dataset to its fingerprint, in the order of their names, and lists the digest.
     fn object(
         &mut self,
         place: &hdf5::Location,
@@ -160,7 +164,7 @@ impl DigestWalk<'_> {
     }
 }
 
-/// How the content that was found differs from the list that was stored with it; `None`: not at all.
+/// Returns the difference between the content and the list stored with it; `None` if there is none.
 pub(super) fn difference(found: &Digests, list: &str, whole: &str) -> Option<String> {
     if sealed(found) == (list.to_owned(), whole.to_owned()) {
         return None;

@@ -46,7 +46,7 @@ characters or a leading dot, and keep their order by HDF5 creation order. Nothin
 number of threads or on its path: equal bodies are equal bytes.
 ";
 
-/// What the digests are made of, with the lines of Python that state them anew.
+/// Description of the digests, with the lines of Python that recompute them.
 const DIGESTS: &str = "\
 ## Digests
 
@@ -100,7 +100,7 @@ with h5py.File(\"body.flex.h5\", \"r+\") as f:
 A digest tells damage and careless edits from what was written; it is no signature. What the laws of mechanics say of the numbers themselves is checked besides: section 10 of the [theory](theory.md).
 ";
 
-/// `docs/format.md`.
+/// Returns the text of `docs/format.md`.
 pub fn format_markdown() -> String {
     let mut out = INTRODUCTION.to_owned();
     let mut add =
@@ -183,8 +183,8 @@ fn shape(item: &Item) -> String {
     item.shape().unwrap_or(&[]).iter().map(|e| symbol(*e)).collect::<Vec<_>>().join(" x ")
 }
 
-/// `schemas/flexbody-file.schema.json`: a JSON Schema of what [`structure`](super::structure) says about a
-/// file.
+/// Returns the text of `schemas/flexbody-file.schema.json`: a JSON Schema of the output of
+/// [`structure`](super::structure) for a file.
 pub fn format_schema() -> String {
     let mut root = json!({});
     for group in TABLE {
@@ -207,7 +207,8 @@ pub fn format_schema() -> String {
     text
 }
 
-/// The datasets of a group of the kinetic energy are there where it is kept, and only there.
+/// Returns the schema that requires the datasets of a group of the kinetic energy if `/terms` keeps the group, and
+/// forbids them otherwise.
 fn of_group(held: TermGroup) -> Value {
     let within = |path: &str, part: &str, inner: Value| {
         path.split('/').filter(|name| !name.is_empty()).rev().fold(
@@ -237,8 +238,8 @@ fn of_group(held: TermGroup) -> Value {
     })
 }
 
-/// Schema of the member group `key`, made when it is not there yet; files of older minor versions lack those
-/// that are not required.
+/// Returns the schema of the member group `key`, creating it if necessary. `required` is false for groups that files of
+/// older minor versions do not have.
 fn descend<'a>(group: &'a mut Value, key: &str, required: bool) -> &'a mut Value {
     let schema = group.as_object_mut().expect("schemas of groups are objects");
     schema.insert("type".to_owned(), json!("object"));

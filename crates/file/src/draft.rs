@@ -1,6 +1,6 @@
-//! A body that is read entry by entry: the rows of the table put their values here.
+//! A body that is read entry by entry: the rows of the table put their values into it.
 
-#![cfg_attr(not(feature = "hdf5"), allow(dead_code))] // made where files are read
+#![cfg_attr(not(feature = "hdf5"), allow(dead_code))] // used by the reader only
 
 use super::item::Per;
 use super::value::ReadValue;
@@ -18,19 +18,19 @@ use flexbody_model::{BodyNumber, Nodes};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::HashMap;
 
-/// A body with the entries that were read so far; all others are empty.
+/// A body with the entries read so far; all others are empty.
 pub(super) struct Draft {
-    /// The body but for its invariants and its surface.
+    /// Body without its invariants and its surface.
     pub body: Parts,
-    /// Size nc of the interface coordinates; `None`: the file has no matrix of them.
+    /// Number nc of interface coordinates; `None` if the file has no matrix of them.
     pub n_coordinates: Option<usize>,
     pub triangles: Option<Vec<u32>>,
     pub edges: Option<Vec<u32>>,
-    /// Indices of the nodes by their numbers.
+    /// Indices of the nodes by node number.
     pub index: HashMap<i64, usize>,
     invariants: InvariantEntries,
     of_lumped: Vec<InvariantEntries>,
-    /// The group whose entries are put, and the index of its instance.
+    /// Group whose entries are put, and the index of its instance.
     per: Per,
     at: usize,
 }
@@ -51,10 +51,10 @@ impl Draft {
         }
     }
 
-    /// Goes to an instance of a group; entries of all later calls are those of this one.
+    /// Begins an instance of a group: entries of all later calls belong to it.
     ///
     /// # Errors
-    /// What was expected of a name that means nothing.
+    /// The expected names, if `name` is none of them.
     pub(super) fn begin(&mut self, per: Per, at: usize, name: &str) -> Result<(), String> {
         (self.per, self.at) = (per, at);
         let load = || GeometricStiffness {
@@ -135,7 +135,7 @@ impl Draft {
         })
     }
 
-    /// The decision about a group of the kinetic energy.
+    /// Returns the decision about a group of the kinetic energy, creating it if necessary.
     pub(super) fn decision(&mut self, group: TermGroup) -> &mut TermDecision {
         let terms = &mut self.body.terms;
         let at = terms.iter().position(|term| term.group == group).unwrap_or_else(|| {
@@ -147,17 +147,17 @@ impl Draft {
         &mut terms[at]
     }
 
-    /// The interface of the group.
+    /// Returns the interface of the current instance.
     pub(super) fn interface(&mut self) -> &mut Interface {
         &mut self.body.interfaces[self.at]
     }
 
-    /// The lumped body of the group.
+    /// Returns the lumped body of the current instance.
     pub(super) fn lumped(&mut self) -> &mut LumpedBody {
         &mut self.body.lumped[self.at]
     }
 
-    /// Geometric stiffness or stiffness of inertia of the group.
+    /// Returns the geometric stiffness, or the stiffness of inertia, of the current instance.
     pub(super) fn load(&mut self) -> &mut GeometricStiffness<Mat<f64>> {
         let at = self.at;
         match self.per {
@@ -166,7 +166,7 @@ impl Draft {
         }
     }
 
-    /// The invariants of the group: exact, or those of its lumping scheme.
+    /// Returns the invariants of the current group: the exact ones, or those of its lumping scheme.
     pub(super) fn invariants(&mut self) -> &mut InvariantEntries {
         match self.per {
             Per::LumpingScheme => &mut self.of_lumped[self.at],
@@ -174,7 +174,7 @@ impl Draft {
         }
     }
 
-    /// Completes the body when all entries are put; adds to `problems` what contradicts itself.
+    /// Completes the body after all entries are put. Adds contradictions to `problems`.
     pub(super) fn finish(mut self, problems: &mut Vec<String>) -> Parts {
         let (nf, plane, groups) = (self.nf(), self.body.dimension == 2, self.body.invariants.groups());
         self.body.invariants = self.invariants.finish(nf, plane, groups);
@@ -198,7 +198,7 @@ impl Draft {
     }
 }
 
-/// Puts indices of nodes into their place; negative ones become indices that no body has, and are an error.
+/// Stores indices of nodes in `place`. A negative index is an error; it is stored as an index that no body has.
 pub(super) fn node_indices(read: ReadValue, place: &mut Option<Vec<u32>>) -> Result<(), String> {
     let values = read.indices();
     let negative = values.iter().copied().find(|index| *index < 0);
@@ -206,8 +206,8 @@ pub(super) fn node_indices(read: ReadValue, place: &mut Option<Vec<u32>>) -> Res
     negative.map_or(Ok(()), |index| Err(format!("expected indices of nodes, found {index}")))
 }
 
-/// Entries of the invariants of a mass. Which of them are information of their own depends on the mass and on the groups
-/// of the kinetic energy.
+/// Entries of the invariants of a mass. The mass and the groups of the kinetic energy determine which of them are
+/// primary.
 pub(super) struct InvariantEntries {
     pub mass: f64,
     pub first_moment: Vector3<f64>,
@@ -257,7 +257,7 @@ impl InvariantEntries {
             (false, Some(_)) => s_of_modal_mass(nf, None, None),
             (false, None) => s_of_modal_mass(nf, Some(&self.modal_mass), w3.as_ref()),
         };
-        // Elsewhere W3 and m_ff follow from S.
+        // Without W0 the entries W3 and m_ff follow from S.
         let general = self.w0.map(|w0| GeneralTerms {
             w0,
             w3: w3.unwrap_or_else(|| Mat::zeros(3 * nf, nf)),

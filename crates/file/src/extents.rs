@@ -1,10 +1,10 @@
-//! Shapes of datasets against the table.
+//! Checks of the shapes of datasets against the table.
 
 use super::item::Extent;
 use flexbody_base::hdf5_file::{self as hdf5_file, Array, Element, Stored, elements};
 use hdf5_metno as hdf5;
 
-/// Extents known so far; the first dataset that has one decides.
+/// Extents known so far; the first dataset with an extent determines its size.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Sizes {
     nodes: Option<usize>,
@@ -16,7 +16,7 @@ pub(super) struct Sizes {
     edges: Option<usize>,
 }
 
-/// Reads a dataset of the stated shape, with its extents.
+/// Reads a dataset of the stated shape, with its extents. Returns `None` if there is no such dataset.
 pub(super) fn dataset<T: Element>(
     place: &hdf5::Group,
     name: &str,
@@ -28,7 +28,7 @@ pub(super) fn dataset<T: Element>(
 }
 
 impl Sizes {
-    /// Checks `dims` against the table and what is known; learns what is not. Returns the number of elements.
+    /// Checks `dims` against the table and the known extents, and records new extents. Returns the number of elements.
     fn fit(&mut self, shape: &[Extent], dims: &[usize]) -> Result<usize, String> {
         let mut learnt = *self;
         let fits = shape.len() == dims.len()
@@ -56,7 +56,7 @@ impl Sizes {
         }
     }
 
-    /// A known size; 0 of what no dataset has had.
+    /// Returns the size of an extent; 0 if no dataset with this extent was read.
     pub(super) fn of(&self, extent: Extent) -> usize {
         let known = match extent {
             Extent::Fixed(size) => Some(size),
@@ -91,7 +91,7 @@ impl Sizes {
     }
 }
 
-/// `[2, 0, 5]` of a row-major position.
+/// Returns the index of a row-major position as text, for instance `[2, 0, 5]`.
 pub(super) fn index(mut position: usize, dims: &[usize]) -> String {
     let mut index: Vec<usize> = dims
         .iter()

@@ -1,4 +1,4 @@
-//! What the table of the flex-body file is made of: entries, their shapes, and where their values come from.
+//! The building blocks of the table of the flex-body file: entries, their shapes, and the sources of their values.
 
 use super::draft::Draft;
 use super::value::{ReadValue, Units, Value, View, text};
@@ -10,26 +10,26 @@ use flexbody_body::flex_body::{Interface, LumpedBody, Parts, TermGroup};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Extent {
     Fixed(usize),
-    /// n, the nodes of the body.
+    /// Number n of nodes of the body.
     Nodes,
-    /// nf, the modes.
+    /// Number nf of modes.
     Modes,
-    /// 3 nf.
+    /// Three times the number of modes, 3 nf.
     ThreeModes,
-    /// Nodes of the group's interface.
+    /// Number of nodes of the group's interface.
     InterfaceNodes,
-    /// Rows of the modes without a place.
+    /// Number of rows of the modes without a position.
     InternalRows,
-    /// nc, the interface coordinates.
+    /// Number nc of interface coordinates.
     Coordinates,
-    /// nt, the triangles of the surface.
+    /// Number nt of triangles of the surface.
     Triangles,
-    /// ne, the edges of the surface.
+    /// Number ne of edges of the surface.
     Edges,
 }
 use Extent::{Coordinates, Edges, Fixed, InterfaceNodes, InternalRows, Modes, Nodes, ThreeModes, Triangles};
 
-/// How an entry is stored.
+/// Storage of an entry in the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum ItemKind {
     /// Dataset of 64-bit floats.
@@ -49,30 +49,31 @@ pub(super) enum ItemKind {
 }
 use ItemKind::{Float, Floats, Indices, Int, Ints, Named, Text};
 
-/// Takes the value of an entry from a body; `None` only for entries that are not required.
+/// Function that takes the value of an entry from a body; returns `None` only for entries that are not required.
 pub(super) type Get = fn(&View<'_>) -> Option<Value>;
 
-/// Puts the value that a file has for an entry into the body that is read. The error says what was expected and what
-/// was found.
+/// Function that puts the value of an entry of a file into the draft of a body. The error names the expected value and
+/// the value found.
 pub(super) type Put = fn(&mut Draft, ReadValue) -> Result<(), String>;
 
-/// Both directions of an entry: from a body into a file, and back where the reader takes the entry from the file.
+/// Both directions of an entry: from a body into a file, and back if the reader takes the entry from the file.
 pub(super) struct Access {
     pub get: Get,
     pub put: Option<Put>,
 }
 
-/// An entry that is written and read.
+/// Returns the access of an entry that is written and read.
 pub(super) const fn both(get: Get, put: Put) -> Access {
     Access { get, put: Some(put) }
 }
 
-/// An entry that is written: the reader checks or ignores it, or reads it before all others.
+/// Returns the access of an entry that is only written. The reader checks it, ignores it, or reads it before all
+/// others.
 pub(super) const fn written(get: Get) -> Access {
     Access { get, put: None }
 }
 
-/// The reading direction of an entry, as an assignment.
+/// Makes the reading direction of an entry from an assignment.
 macro_rules! put {
     (|$draft:ident, $read:ident| $assignment:expr) => {
         |$draft, $read| {
@@ -83,8 +84,8 @@ macro_rules! put {
 }
 pub(super) use put;
 
-/// Both directions of a field: `field!(certificate.shift)` of the body, `field!(guarantee: shift_below)` of a part that
-/// a view and a draft have under this name.
+/// Makes both directions of a field: `field!(certificate.shift)` for a field of the body, `field!(guarantee:
+/// shift_below)` for a field of a part that the methods of this name of [`View`] and [`Draft`] return.
 macro_rules! field {
     ($part:ident: $($field:tt)+) => {
         $crate::item::both(
@@ -107,47 +108,47 @@ macro_rules! field {
 }
 pub(super) use field;
 
-/// Entries that a file has all or none of. The message about a file with some of them is made of their keys in the order
-/// of the table, each with whether it is there.
+/// A set of entries that a file holds completely or not at all. `problem` makes the message for a file with some of
+/// them from their keys, in the order of the table, each with true if the file holds the entry.
 pub(super) struct Together {
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // said where files are read
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called by the reader only
     pub problem: fn(&[(String, bool)]) -> String,
 }
 
 /// Membership of an entry in a set of entries that belong together.
 #[derive(Clone, Copy)]
-#[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked where files are read
+#[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked by the reader only
 pub(super) struct Membership {
     pub set: &'static Together,
-    /// True if the set needs the entry; false if the entry needs the set alone.
+    /// True if the set requires the entry. False if the entry requires the set, but not the reverse.
     pub required: bool,
 }
 
-/// Where the value of an entry comes from.
+/// Source of the value of an entry.
 #[derive(Clone, Copy)]
 pub(super) enum Origin {
-    /// The same text in every file; a reader refuses others.
+    /// Constant text of every file; a reader refuses others.
     ConstantText(&'static str),
-    /// The same integer in every file; a reader refuses others.
+    /// Constant integer of every file; a reader refuses others.
     ConstantInt(i64),
-    /// Information of its own.
+    /// Primary entry, which does not follow from other entries.
     Primary(Get),
-    /// Follows from the primary entries; the reader recomputes it. Floats agree to [`DERIVED_TOLERANCE`] of
-    /// the largest magnitude in the named dataset of the same group, everything else exactly.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // compared where files are read
+    /// Derived entry, which follows from the primary entries; the reader recomputes it. Floats agree to
+    /// [`DERIVED_TOLERANCE`] of the largest magnitude in the named dataset of the same group, everything else exactly.
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // compared by the reader only
     Derived(Get, &'static str),
 }
 use Origin::{ConstantInt, ConstantText, Derived, Primary};
 
-/// This program's files agree to the last bit; other writers may evaluate W1, W2, W3 by themselves, and 1e-12
-/// is what independent evaluations of the invariants reach.
+/// Relative tolerance of derived entries. Files of this program agree to the last bit. Other writers may evaluate W1,
+/// W2, W3 themselves, and independent evaluations of the invariants agree to 1e-12.
 pub(super) const DERIVED_TOLERANCE: f64 = 1e-12;
 
-/// The same of an array of 32-bit floats, which is rounded by itself.
+/// Relative tolerance of derived entries in arrays of 32-bit floats, which are rounded separately.
 #[cfg(feature = "hdf5")]
 pub(super) const SHORT_TOLERANCE: f64 = f32::EPSILON as f64;
 
-/// How often a group occurs.
+/// Number of instances of a group in a file: one for the body, or one for each object of this kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Per {
     Body,
@@ -157,7 +158,7 @@ pub(super) enum Per {
     InertiaLoad,
 }
 
-/// A dataset or attribute.
+/// A row of the table: a dataset or attribute.
 pub(super) struct Item {
     pub name: &'static str,
     pub kind: ItemKind,
@@ -165,23 +166,23 @@ pub(super) struct Item {
     pub symbol: &'static str,
     pub description: &'static str,
     pub required: bool,
-    /// Minor version of the format that brought it.
+    /// Minor version of the format that introduced the entry.
     pub since: i64,
     pub origin: Origin,
-    /// `None` for entries that the reader does not take from the file, or takes before all others.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called where files are read
+    /// Reading direction; `None` for entries that the reader does not take from the file, or reads before all others.
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // called by the reader only
     pub put: Option<Put>,
-    /// The entries without which this one means nothing.
-    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked where files are read
+    /// Set of entries that the entry belongs to.
+    #[cfg_attr(not(feature = "hdf5"), allow(dead_code))] // checked by the reader only
     pub together: Option<Membership>,
-    /// The group of the kinetic energy that the entry belongs to: there where the body holds it, required or
-    /// not there at all.
+    /// Group of the kinetic energy that the entry belongs to. The entry is required if the body holds the group, and
+    /// must be absent otherwise.
     pub of: Option<TermGroup>,
-    /// A large array, of 32-bit floats where the body is stored so.
+    /// True for a large array, which has 32-bit floats if the body is stored with them.
     pub large: bool,
 }
 
-/// A group with its entries. `<scheme>` and `<name>` stand for names that are data.
+/// A group with its entries. `<scheme>` and `<name>` are placeholders for names that are data.
 pub(super) struct SchemaGroup {
     pub path: &'static str,
     pub per: Per,
@@ -190,6 +191,7 @@ pub(super) struct SchemaGroup {
 }
 
 impl Item {
+    /// Marks the entry as derived, compared relative to the dataset `from`.
     pub(crate) const fn derived(mut self, from: &'static str) -> Self {
         if let Primary(get) = self.origin {
             self.origin = Derived(get, from);
@@ -197,54 +199,55 @@ impl Item {
         self
     }
 
-    /// One of several entries that a file has all or none of.
+    /// Makes the entry a required member of a set of entries that belong together.
     pub(crate) const fn with(mut self, set: &'static Together) -> Self {
         self.together = Some(Membership { set, required: true });
         self
     }
 
-    /// An optional entry beside several that a file has all or none of.
+    /// Makes the entry an optional companion of a set of entries that belong together.
     pub(crate) const fn beside(mut self, set: &'static Together) -> Self {
         self.together = Some(Membership { set, required: false });
         self
     }
 
-    /// Of a group of the kinetic energy.
+    /// Assigns the entry to a group of the kinetic energy.
     pub(crate) const fn of(mut self, group: TermGroup) -> Self {
         self.of = Some(group);
         self
     }
 
-    /// A large array, that may be stored in 32-bit floats.
+    /// Marks a large array, which may be stored in 32-bit floats.
     pub(crate) const fn large(mut self) -> Self {
         self.large = true;
         self
     }
 
-    /// Whether a body keeps this array in 32-bit floats.
+    /// Returns true when a body with this storage has this array in 32-bit floats.
     #[cfg(feature = "hdf5")]
     pub(crate) fn is_short(&self, storage: Storage) -> bool {
         self.large && storage == Storage::F32
     }
 
+    /// Marks the entry as optional.
     pub(crate) const fn optional(mut self) -> Self {
         self.required = false;
         self
     }
 
-    /// Optional, and an addition of a minor version.
+    /// Marks the entry as optional, and introduced by a minor version.
     pub(crate) const fn added(mut self, minor: i64) -> Self {
         self.since = minor;
         self.optional()
     }
 
-    /// Required in a group that a minor version brought.
+    /// Marks the entry as required in a group that a minor version introduced.
     pub(crate) const fn within(mut self, minor: i64) -> Self {
         self.since = minor;
         self
     }
 
-    /// The entry's value for a body.
+    /// Returns the value of the entry for a body.
     pub(crate) fn value(&self, view: &View<'_>) -> Option<Value> {
         match self.origin {
             ConstantText(value) => text(value),
@@ -253,7 +256,7 @@ impl Item {
         }
     }
 
-    /// Shape of a dataset; `None` for attributes.
+    /// Returns the shape of a dataset; `None` for attributes.
     pub(crate) fn shape(&self) -> Option<&'static [Extent]> {
         match self.kind {
             Floats(shape) | Ints(shape) | Indices(shape) => Some(shape),
@@ -261,7 +264,7 @@ impl Item {
         }
     }
 
-    /// Extents of a dataset for a body.
+    /// Returns the extents of a dataset for a body.
     pub(crate) fn dims(&self, view: &View<'_>) -> Vec<usize> {
         let nf = view.body.modes.eigenvalue.len();
         let size = |extent: &Extent| match *extent {
@@ -280,22 +283,22 @@ impl Item {
 }
 
 impl SchemaGroup {
-    /// All entries, in the order of the table.
+    /// Returns all entries, in the order of the table.
     pub(crate) fn entries(&self) -> impl Iterator<Item = &'static Item> + use<> {
         self.items.iter().flat_map(|part| part.iter())
     }
 
-    /// The minor version that brought the group with all its entries.
+    /// Returns the minor version that introduced the group with all its entries.
     pub(crate) fn since(&self) -> i64 {
         self.entries().map(|item| item.since).min().unwrap_or(0)
     }
 
-    /// Path without the last name.
+    /// Returns the path without the last name.
     pub(crate) fn parent(&self) -> &'static str {
         self.path.rfind('/').map_or(self.path, |i| &self.path[..i])
     }
 
-    /// The groups of a body that this one stands for, with their names where these are data.
+    /// Returns the instances of this group in a body, with their names if these are data.
     pub(crate) fn instances<'a>(&self, body: &'a Parts) -> Vec<(Option<String>, View<'a>)> {
         let view = View { body, lumped: None, interface: None, geometric_stiffness: None };
         match self.per {

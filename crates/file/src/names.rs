@@ -1,8 +1,8 @@
-//! Names that are data, as HDF5 link names: `/` separates groups there, `.` is a group itself.
+//! Names that are data, as HDF5 link names. In a link name `/` separates groups, and `.` denotes the group itself.
 
 use super::item::SchemaGroup;
 
-/// Path of a group instance: the template's placeholder replaced by a link name.
+/// Returns the path of an instance of a group, with the placeholder replaced by a link name.
 pub(super) fn place(group: &SchemaGroup, link: Option<&str>) -> String {
     match link {
         Some(link) => format!("{}/{link}", group.parent()),
@@ -10,7 +10,7 @@ pub(super) fn place(group: &SchemaGroup, link: Option<&str>) -> String {
     }
 }
 
-/// Percent-encodes what a link name cannot hold: `/`, `%`, control characters, and a leading dot.
+/// Percent-encodes the characters that a link name cannot hold: `/`, `%`, control characters, and a leading dot.
 pub(super) fn encode(name: &str) -> String {
     let mut out = String::with_capacity(name.len());
     for (i, c) in name.char_indices() {
@@ -23,7 +23,7 @@ pub(super) fn encode(name: &str) -> String {
     out
 }
 
-/// Undoes [`encode`]; a `%` without two hexadecimal digits stands for itself.
+/// Undoes [`encode`]. A `%` without two hexadecimal digits is kept.
 #[cfg(any(feature = "hdf5", test))]
 pub(super) fn decode(link: &str) -> String {
     let bytes = link.as_bytes();
@@ -38,7 +38,7 @@ pub(super) fn decode(link: &str) -> String {
         out.push(code.unwrap_or(bytes[i]));
         i += if code.is_some() { 3 } else { 1 };
     }
-    // Only ASCII was replaced by ASCII, so the bytes are still UTF-8.
+    // Only ASCII was replaced by ASCII, so that the bytes are valid UTF-8.
     String::from_utf8_lossy(&out).into_owned()
 }
 

@@ -1,4 +1,4 @@
-//! Reads a body file: format, entries, assembly, and the entries that follow from others.
+//! Reads a body file: format, entries, assembly, and checks of derived entries and digests.
 
 use super::assemble::assemble;
 use super::derived::check_derived;
@@ -12,22 +12,23 @@ use flexbody_body::flex_body::FlexBody;
 use hdf5_metno as hdf5;
 use std::path::Path;
 
-/// Reads a body; every number is bit for bit the one that was written.
+/// Reads a body. Every number is bit for bit the written one.
 ///
 /// # Errors
-/// [`FileUnreadable`](Code::FileUnreadable); [`BodyUnreadable`](Code::BodyUnreadable): not HDF5, or not of
-/// this program; [`BodyVersion`](Code::BodyVersion): a newer format; [`BodySchema`](Code::BodySchema):
-/// missing, mis-shaped or not finite, one diagnostic per entry; [`BodyIdentity`](Code::BodyIdentity): entries
-/// that contradict each other.
+/// [`FileUnreadable`](Code::FileUnreadable) if the file cannot be read; [`BodyUnreadable`](Code::BodyUnreadable) if it
+/// is not HDF5, or not of this program; [`BodyVersion`](Code::BodyVersion) for a newer format;
+/// [`BodySchema`](Code::BodySchema) for entries that are missing, of the wrong shape or not finite, one diagnostic per
+/// entry; [`BodyIdentity`](Code::BodyIdentity) for entries that contradict each other;
+/// [`BodyChanged`](Code::BodyChanged) if the content has other digests.
 pub fn read(path: impl AsRef<Path>) -> Result<FlexBody> {
     read_with_notes(path).map(|(body, _)| body)
 }
 
-/// The same, with what there is to say of a file that is sound:
-/// [`BodyWithoutDigest`](Code::BodyWithoutDigest) of an older format.
+/// Reads a body, and returns the notes about a valid file: [`BodyWithoutDigest`](Code::BodyWithoutDigest) for a file of
+/// an older format.
 ///
 /// # Errors
-/// As [`read`].
+/// The errors of [`read`].
 pub fn read_with_notes(path: impl AsRef<Path>) -> Result<(FlexBody, Vec<Diagnostic>)> {
     let examined = examine(path.as_ref())?;
     match examined.body {
@@ -36,14 +37,14 @@ pub fn read_with_notes(path: impl AsRef<Path>) -> Result<(FlexBody, Vec<Diagnost
     }
 }
 
-/// What is in a file, and what is wrong with it.
+/// Content of a file, and the problems found in it.
 struct Examined {
     body: Option<FlexBody>,
     problems: Vec<Diagnostic>,
     notes: Vec<Diagnostic>,
 }
 
-/// Everything that is wrong with the file at `path` by its schema; empty when [`read`] would succeed.
+/// Returns every violation of the schema by the file at `path`; empty if [`read`] would succeed.
 pub fn validate(path: impl AsRef<Path>) -> Vec<Diagnostic> {
     examine(path.as_ref()).map_or_else(Error::into_diagnostics, |examined| examined.problems)
 }
@@ -58,7 +59,8 @@ fn examine(path: &Path) -> Result<Examined> {
     match FlexBody::new(parts) {
         Ok(body) => {
             check_derived(&mut scan, body.parts());
-            // What contradicts itself or the format is told by these, which say more.
+            // Contradictions of the format or of the entries are reported instead: they are more specific than a
+            // changed digest.
             if scan.problems.is_empty() {
                 scan.check_digests(&file);
             }
@@ -81,7 +83,7 @@ fn without_digest(scan: &Scan) -> Diagnostic {
     Diagnostic::new(Code::BodyWithoutDigest, message)
 }
 
-/// Opens a file of this program and of a format that this version knows; also gives its size in bytes.
+/// Opens a file of this program with a format that this version can read. Returns also its size in bytes.
 pub(super) fn open_checked(path: &Path) -> Result<(hdf5::File, u64)> {
     let (file, bytes) = open_sound(path, "flexible body", Code::BodyUnreadable)?;
     check_format(&file, path)?;
@@ -117,7 +119,7 @@ fn check_format(file: &hdf5::File, path: &Path) -> Result<()> {
                 format!("format version {major}, written by {writer}; this version reads up to {MAJOR}");
             Err(Diagnostic::new(Code::BodyVersion, message).in_file(path).with_help(help).into())
         }
-        // Anything else that is wrong with it is found with the other entries.
+        // Other values of the version are reported with the other entries.
         _ => Ok(()),
     }
 }

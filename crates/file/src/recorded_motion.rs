@@ -1,23 +1,23 @@
-//! The motion of a simulation as far as pictures need it: how the frame and the modes move.
+//! The motion of a simulation as needed for pictures: the motion of the frame and of the modes.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
 use flexbody_body::flex_body::{Carrier, FlexBody};
 use flexbody_motion::scene::Recording;
 
-/// The motion of a body as its file has it: T instants, in the frame of the scene, whose axes are those of
-/// the model.
+/// Motion of a body as the file of the simulation holds it: T instants, in the frame of the scene, whose axes are those
+/// of the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordedMotion {
     /// Name of the scene.
     pub scene: String,
     /// Name of the body's model.
     pub body: String,
-    /// What carries the body.
+    /// Carrier of the body; `None` in mean axes.
     pub carrier: Option<Carrier>,
     /// Origin of the frame in model coordinates.
     pub origin_in_model: [f64; 3],
-    /// Instants (T).
+    /// Instants (T), in the unit of time.
     pub time: Vec<f64>,
     /// Number of modes nf.
     pub modes: usize,
@@ -25,15 +25,15 @@ pub struct RecordedMotion {
     pub q: Vec<f64>,
     /// Origin of the frame in the world (T x 3).
     pub origins: Vec<f64>,
-    /// Euler parameters from the axes of the frame to those of the world (T x 4).
+    /// Euler parameters of the rotation from the axes of the frame to those of the world (T x 4).
     pub attitudes: Vec<f64>,
-    /// Largest deflection of a node from the undeformed body, also between the instants, relative to the
-    /// largest extent of the body along an axis of the model.
+    /// Largest deflection of a node from the undeformed body, also between the instants, relative to the largest extent
+    /// of the body along an axis of the model.
     pub largest_deflection: f64,
 }
 
 impl RecordedMotion {
-    /// The motion that a simulation has just computed.
+    /// Returns the motion of a recording.
     pub fn of(recording: &Recording) -> Self {
         let states = &recording.states;
         Self {
@@ -50,10 +50,10 @@ impl RecordedMotion {
         }
     }
 
-    /// The body as the motion has it: carried by what carried it.
+    /// Returns the body in the frame of the motion: carried by the carrier of the motion, or in mean axes.
     ///
     /// # Errors
-    /// FB735 for the motion of another body; those of [`FlexBody::carried`].
+    /// FB735 for the motion of another body; the errors of [`FlexBody::carried`].
     pub fn staged(&self, body: &FlexBody) -> Result<FlexBody> {
         let foreign = |what: String| Err(Diagnostic::new(Code::MotionForeign, what).into());
         if self.body != body.source().name {
@@ -72,7 +72,7 @@ impl RecordedMotion {
         Ok(staged)
     }
 
-    /// Indices of at most so many instants at equal steps, with the first and the last.
+    /// Returns the indices of at most `most` instants (two at least) at equal steps, including the first and the last.
     pub fn some_instants(&self, most: usize) -> Vec<usize> {
         let written = self.time.len();
         match written.min(most.max(2)) {

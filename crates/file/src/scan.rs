@@ -1,5 +1,5 @@
-//! Reads the entries of the table out of a file and collects everything that does not fit, believing nothing
-//! that the file declares before it is checked against the rest.
+//! Reads the entries of the table from a file and collects every violation. Nothing that the file declares is trusted
+//! before it is checked against the rest.
 
 use super::digest::{self, Numbers, digests_of, of_numbers};
 use super::extents::{Sizes, dataset, index};
@@ -18,31 +18,32 @@ use hdf5_metno as hdf5;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 
-/// A damaged file can break every entry of every scheme: enough to see the pattern.
+/// Largest number of reported problems. A damaged file can break every entry of every scheme; this number shows the
+/// pattern.
 const MOST_PROBLEMS: usize = 200;
 
-/// The contents of a file that fit the table, and the problems of the rest.
+/// Content of a file that fits the table, and the problems of the rest.
 pub(super) struct Scan {
     file: std::path::PathBuf,
     /// Values by path, e.g. `/modes/residual` or `/source@model` for attributes.
     pub values: HashMap<String, Value>,
-    /// By the parent group that decides: see [`Scan::instances`].
+    /// Names and links of instances by parent group, see [`Scan::instances`].
     instances: BTreeMap<&'static str, Vec<(String, String)>>,
-    /// Everything that does not fit.
+    /// Violations found so far.
     pub problems: Vec<Diagnostic>,
-    /// Extents of the datasets; those of an interface are not kept.
+    /// Extents of the datasets, without those of single interfaces.
     pub sizes: Sizes,
     stored: Stored,
-    /// Fingerprints of the numbers that were read, where the file has digests.
+    /// Fingerprints of the numbers that were read, if the file has digests.
     numbers: Numbers,
     units: Option<UnitSystem>,
-    /// Precision of the large arrays, which the root says.
+    /// Precision of the large arrays, from the root attribute `storage`.
     pub storage: Storage,
-    /// Entries of groups of the kinetic energy, and whether they are there.
+    /// Entries of groups of the kinetic energy; true for each that the file holds.
     of_groups: Vec<(String, &'static Item, bool)>,
 }
 
-/// Key of an entry in [`Scan::values`].
+/// Returns the key of an entry in [`Scan::values`].
 pub(super) fn key(place: &str, item: &Item) -> String {
     let separator = if item.shape().is_none() {
         "@"
@@ -55,7 +56,7 @@ pub(super) fn key(place: &str, item: &Item) -> String {
 }
 
 impl Scan {
-    /// Reads all entries of `file`, which lies at `path` and is `bytes` long.
+    /// Reads all entries of `file`, which lies at `path` and has `bytes` bytes.
     pub(crate) fn new(file: &hdf5::File, path: &Path, bytes: u64) -> Self {
         let mut scan = Self {
             file: path.to_path_buf(),
@@ -75,7 +76,7 @@ impl Scan {
                 Per::LumpingScheme | Per::Interface | Per::UnitLoad | Per::InertiaLoad => {
                     scan.list(file, group);
                     for (_, link) in scan.instances(group.parent()) {
-                        // Links cost nothing: a file may hold millions of them.
+                        // Links take almost no space: a file may hold millions of them.
                         if scan.problems.len() > MOST_PROBLEMS {
                             break;
                         }
@@ -88,12 +89,12 @@ impl Scan {
         scan
     }
 
-    /// Adds a violation of the schema.
+    /// Adds a violation of the schema, up to the largest number of problems.
     pub(crate) fn add(&mut self, message: String) {
         self.add_as(Code::BodySchema, message);
     }
 
-    /// Adds a problem with a code of its own.
+    /// Adds a problem with the given code.
     pub(crate) fn add_as(&mut self, code: Code, message: String) {
         match self.problems.len() {
             len if len < MOST_PROBLEMS => {
@@ -106,21 +107,20 @@ impl Scan {
         }
     }
 
-    /// Names that are data below `parent`, in file order, each with its link name.
+    /// Returns the names that are data below `parent`, in file order, each with its link name.
     pub(crate) fn instances(&self, parent: &str) -> Vec<(String, String)> {
-        // `/comparison` has the members of `/lumped`.
+        // Groups of one kind share their names: `/comparison` has the members of `/lumped`.
         let per = TABLE.iter().find(|g| g.parent() == parent).map(|g| g.per);
         let first = TABLE.iter().find(|g| Some(g.per) == per).map_or("", |g| g.parent());
         self.instances.get(first).cloned().unwrap_or_default()
     }
 
-    /// Looks up the instances of a group that occurs several times; groups of the same kind have the same
-    /// ones.
+    /// Reads the instances of a group that occurs several times. Groups of one kind must have the same instances.
     fn list(&mut self, file: &hdf5::File, group: &SchemaGroup) {
         let parent = group.parent();
         let links = match hdf5_file::open_group(file, parent).and_then(|g| hdf5_file::members(&g)) {
             Ok(links) => links,
-            // A file of an older minor version.
+            // The file has an older minor version.
             Err(found) if group.since() > 0 && found == hdf5_file::NOTHING => Vec::new(),
             Err(found) => return self.add(format!("{parent}: expected a group, found {found}")),
         };
@@ -142,7 +142,7 @@ impl Scan {
         let path = place(group, link);
         let opened = match hdf5_file::open_group(file, &path) {
             Ok(opened) => opened,
-            // Of a body that has none of it, or in a file of an older minor version.
+            // The body has no such group, or the file has an older minor version.
             Err(found) if group.since() > 0 && link.is_none() && found == hdf5_file::NOTHING => return,
             Err(found) => return self.add(format!("{path}: expected a group, found {found}")),
         };
@@ -174,6 +174,7 @@ impl Scan {
         }
     }
 
+    /// Reads the value of an entry and checks it. Returns `None` if the file does not hold it.
     fn entry(
         &mut self,
         place: &hdf5::Group,
@@ -229,14 +230,14 @@ impl Scan {
         }
     }
 
-    /// Keeps the fingerprint of numbers that were read, so that they are not read again.
+    /// Stores the fingerprint of numbers that were read, so that they need not be read again.
     fn hash<T: digest::Number>(&mut self, name: &str, (values, dims): &Array<T>) {
         if self.stated_digests().is_some() {
             self.numbers.insert(name.to_owned(), of_numbers(dims, values));
         }
     }
 
-    /// The list of digests that the file states, and the SHA-256 of the list.
+    /// Returns the list of digests in the file, and the SHA-256 of the list; `None` without them.
     pub(crate) fn stated_digests(&self) -> Option<(&str, &str)> {
         match [LIST, WHOLE].map(|name| self.values.get(&format!("/@{name}"))) {
             [Some(Value::Text(list)), Some(Value::Text(whole))] => Some((list, whole)),
@@ -244,7 +245,7 @@ impl Scan {
         }
     }
 
-    /// Holds all content of the file, unknown entries included, to the digests that it states.
+    /// Checks all content of the file, unknown entries included, against the digests that it states.
     pub(crate) fn check_digests(&mut self, file: &hdf5::File) {
         let Some((list, whole)) = self.stated_digests() else {
             let minor = self.values.get("/@format_minor");
@@ -267,8 +268,7 @@ impl Scan {
         }
     }
 
-    /// What belongs to a group of the kinetic energy is there where `/terms` says that the group is kept, and
-    /// only there.
+    /// Checks that an entry of a group of the kinetic energy exists if `/terms` keeps the group, and only then.
     fn groups(&mut self) {
         let Some(held) = self.held() else { return };
         for (name, item, there) in std::mem::take(&mut self.of_groups) {
@@ -284,8 +284,8 @@ impl Scan {
         }
     }
 
-    /// The groups of the kinetic energy that the file says the body holds; `None` when it says something
-    /// else.
+    /// Returns the groups of the kinetic energy that the body holds by `/terms`; `None` if an entry there has an
+    /// invalid value.
     pub(crate) fn held(&mut self) -> Option<TermGroups> {
         let mut says = |group: TermGroup| match self.values.get(&format!("/terms@{}", group.name())) {
             Some(Value::Text(text)) if text == KEPT => Some(true),
@@ -296,7 +296,7 @@ impl Scan {
                 self.add(message);
                 None
             }
-            // What is missing is among the problems.
+            // A missing entry is reported elsewhere.
             _ => Some(true),
         };
         let [w1, w2, w3] = TermGroup::ALL.map(&mut says);
@@ -315,7 +315,7 @@ impl Scan {
         }
     }
 
-    /// The descriptive attributes of a dataset; units must be those of the body.
+    /// Checks the descriptive attributes of a dataset. The unit must be that of the body.
     fn texts(&mut self, place: &hdf5::Group, name: &str, item: &Item) {
         if item.shape().is_none() {
             return;
@@ -364,7 +364,7 @@ impl Scan {
         }
     }
 
-    /// Units of the body; `None` when the file does not state them, which is then among the problems.
+    /// Returns the units of the body; `None` if the file does not state them, which is then among the problems.
     pub(crate) fn units(&self) -> Option<&UnitSystem> {
         self.units.as_ref()
     }

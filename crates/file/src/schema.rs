@@ -1,5 +1,4 @@
-//! THE table of the flex-body file. Writer, reader, validator, `docs/format.md` and the JSON schema follow
-//! it.
+//! The table of the flex-body file, from which writer, reader, validator, `docs/format.md` and the JSON schema follow.
 
 use super::draft::node_indices;
 use super::item::Extent::{Edges, Fixed, InternalRows, Modes, Nodes, Triangles};
@@ -23,23 +22,22 @@ mod interfaces;
 mod invariants;
 pub(super) mod terms;
 
-/// Root attribute with the list: a line `SHA-256  path` for each group and dataset, by path.
+/// Name of the root attribute with the list of digests: a line `SHA-256  path` for each group and dataset, by path.
 pub(super) const LIST: &str = "digests";
-/// Root attribute with the SHA-256 of the list.
+/// Name of the root attribute with the SHA-256 of the list.
 pub(super) const WHOLE: &str = "sha256";
 
-/// Version of the format: readers refuse a newer major; a newer minor only adds entries.
+/// Major version of the format. Readers refuse a newer major version; a newer minor version only adds entries.
 pub(super) const MAJOR: i64 = 1;
-/// The minor version that has all entries; see [`MAJOR`]. A file states the least version that has those that
-/// it holds.
+/// Minor version with all entries, see [`MAJOR`]. A file states the lowest version that has all entries which it holds.
 pub(super) const MINOR: i64 = 7;
-/// The minor version of files of bodies in mean axes.
+/// Minor version of files of bodies in mean axes.
 const MEAN_AXES_ONLY: i64 = 6;
-/// The minor version of files of bodies in mean axes without stiffness of inertia.
+/// Minor version of files of bodies in mean axes without stiffness of inertia.
 const WITHOUT_INERTIA_STIFFNESS: i64 = 5;
-/// The minor version of files with neither that nor a surface.
+/// Minor version of files of bodies in mean axes without stiffness of inertia and without a surface.
 const WITHOUT_MESH: i64 = 4;
-/// The minor version from which on every file has digests.
+/// Minor version from which on every file has digests.
 pub(super) const DIGESTS_SINCE: i64 = 4;
 /// Value of the root attribute `format`.
 pub(super) const FORMAT: &str = "flexbody";
@@ -56,7 +54,7 @@ const PER_ROOT_MASS_LENGTH: Units = Units::Of { mass_halves: -1, length: -1, tim
 const PER_TIME: Units = Units::Of { mass_halves: 0, length: 0, time: -1 };
 const PER_TIME2: Units = Units::Of { mass_halves: 0, length: 0, time: -2 };
 
-/// A required dataset of version 1.0.
+/// Returns a required dataset of version 1.0.
 const fn dataset(
     name: &'static str,
     kind: ItemKind,
@@ -81,7 +79,7 @@ const fn dataset(
     }
 }
 
-/// A required attribute of version 1.0.
+/// Returns a required attribute of version 1.0.
 const fn attribute(
     name: &'static str,
     kind: ItemKind,
@@ -92,7 +90,7 @@ const fn attribute(
     dataset(name, kind, units, "", description, access)
 }
 
-/// A required attribute of version 1.0 with one value for every file.
+/// Returns a required attribute of version 1.0 with one value for every file.
 const fn constant(name: &'static str, kind: ItemKind, origin: Origin, description: &'static str) -> Item {
     Item {
         name,
@@ -183,7 +181,7 @@ const ROOT: &[Item] = &[
         Text,
         ONE,
         "SHA-256 of every group and dataset, as described above: a line for each, by path; absent before 1.4",
-        // Of what was written: the writer adds it at the end.
+        // The writer adds the entry at the end, from the written content.
         written(|_| None),
     )
     .added(DIGESTS_SINCE),
@@ -197,7 +195,7 @@ const ROOT: &[Item] = &[
     .added(DIGESTS_SINCE),
 ];
 
-/// Two entries that need each other.
+/// Returns the message about two entries that require each other.
 fn both_or_none(entries: &[(String, bool)]) -> String {
     format!("{} and {}: expected both or none, found one", entries[0].0, entries[1].0)
 }
@@ -564,7 +562,7 @@ const MODES: &[Item] = &[
     .large(),
 ];
 
-/// The value with this name among `all`.
+/// Returns the element of `all` with the name `found`. The error lists the known names.
 fn named<T: Copy>(found: String, all: &[T], name: fn(T) -> &'static str) -> Result<T, String> {
     all.iter().copied().find(|one| name(*one) == found).ok_or_else(|| {
         let known: Vec<String> = all.iter().map(|one| format!("`{}`", name(*one))).collect();
@@ -572,7 +570,7 @@ fn named<T: Copy>(found: String, all: &[T], name: fn(T) -> &'static str) -> Resu
     })
 }
 
-/// The groups, in the order in which they are written.
+/// Groups of the file, in the order in which they are written.
 pub(super) const TABLE: &[SchemaGroup] = &[
     SchemaGroup { path: "/", per: Per::Body, description: "Format and units.", items: &[ROOT] },
     SchemaGroup {

@@ -1,4 +1,4 @@
-//! The file of a simulation: a small HDF5 file of its own format, described in `docs/simulate.md`.
+//! The file of a simulation: a small HDF5 file with a separate format, described in `docs/simulate.md`.
 
 use super::names;
 use super::value::Units;
@@ -19,33 +19,33 @@ pub(super) const FORMAT: &str = "flexbody-simulation";
 /// Version of the format.
 pub(super) const VERSION: i64 = 2;
 
-/// Unit exponents of mass^(1/2), length and time.
+/// Returns the unit with these exponents of mass^(1/2), length and time.
 const fn unit(mass_halves: i8, length: i8, time: i8) -> Units {
     Units::Of { mass_halves, length, time }
 }
 
-/// Writes the motion of a body whose numbers are in `units` to the temporary file of `slot`; it appears with
-/// the slot's commit.
+/// Writes the motion of a body with numbers in `units` to the temporary file of `slot`, which appears under its name
+/// when the slot is committed.
 ///
 /// # Errors
-/// FB104, FB602.
+/// FB104 if the file cannot be written, FB602 if the disk is full.
 pub fn fill_simulation(recording: &Recording, units: &UnitSystem, slot: &OutputSlot) -> Result<()> {
     fill(recording, units, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))
 }
 
-/// A group and what describes the numbers in it.
+/// A group of the file with the units of its numbers.
 struct DescribedGroup<'a> {
     group: hdf5::Group,
     units: &'a UnitSystem,
 }
 
 impl DescribedGroup<'_> {
-    /// A dataset with a number for every instant.
+    /// Writes a dataset with one number for every instant.
     fn put(&self, name: &str, units: Units, description: &str, values: &[f64]) -> hdf5::Result<()> {
         self.put_shaped(name, units, description, &[values.len()], values)
     }
 
-    /// A matrix with `rows` rows, of two dimensions also where one of them is 1.
+    /// Writes a matrix with `rows` rows, which keeps two dimensions if one of them is 1.
     fn put_rows(
         &self,
         name: &str,
@@ -102,8 +102,7 @@ fn fill(recording: &Recording, units: &UnitSystem, path: &Path) -> hdf5::Result<
     writer.file.close()
 }
 
-/// The file and what it is to hold. Everything is written in a fixed order, so that equal recordings give
-/// equal bytes.
+/// The file with its content. Everything is written in a fixed order, so that equal recordings give equal bytes.
 struct Writer<'a> {
     recording: &'a Recording,
     units: &'a UnitSystem,
@@ -123,7 +122,7 @@ impl Writer<'_> {
         self.file.new_attr::<f64>().create(name)?.write_scalar(&value)
     }
 
-    /// Format, program, scene and body.
+    /// Writes format, program, scene and body.
     fn origin(&self) -> hdf5::Result<()> {
         put_text(&self.file, "format", FORMAT)?;
         self.file.new_attr::<i64>().create("format_version")?.write_scalar(&VERSION)?;
@@ -134,7 +133,7 @@ impl Writer<'_> {
         carrier.map_or(Ok(()), |carrier| put_text(&self.file, "carrier", carrier))
     }
 
-    /// The integration method and its settings.
+    /// Writes the integration method and its settings.
     fn method(&self) -> hdf5::Result<()> {
         match self.recording.scheme {
             Scheme::Adaptive { tolerance } => {
@@ -149,7 +148,7 @@ impl Writer<'_> {
         }
     }
 
-    /// How far conserved quantities drift, and the largest deflection.
+    /// Writes the drift of conserved quantities, and the largest deflection.
     fn summary(&self) -> hdf5::Result<()> {
         let drift = self.recording.drift();
         self.number("energy_drift", drift.energy)?;
@@ -158,7 +157,7 @@ impl Writer<'_> {
         self.number("largest_deflection", self.recording.extremes.deflection.value)
     }
 
-    /// Place, attitude and velocities of the frame.
+    /// Writes position, attitude and velocities of the frame.
     fn frame(&self) -> hdf5::Result<()> {
         let Recording { states, setting, .. } = self.recording;
         let frame = self.group("frame")?;
@@ -188,7 +187,7 @@ impl Writer<'_> {
         )
     }
 
-    /// Modal coordinates and their rates.
+    /// Writes modal coordinates and their rates.
     fn modes(&self) -> hdf5::Result<()> {
         let states = &self.recording.states;
         let modes = self.group("modes")?;
@@ -210,7 +209,7 @@ impl Writer<'_> {
         put("work", "work of loads, damping and prescribed motion since the start", |b| b.work)
     }
 
-    /// Momenta, and the impulses that change them.
+    /// Writes momenta, and the impulses that change them.
     fn momentum(&self) -> hdf5::Result<()> {
         let momentum = self.group("momentum")?;
         let put = |name: &str, units: Units, description: &str, part: fn(&Balance) -> &Vector3<f64>| {
@@ -225,7 +224,7 @@ impl Writer<'_> {
         put("angular_impulse", angular, about_same, |b| &b.angular_impulse)
     }
 
-    /// What prescribed motion takes, where there is such.
+    /// Writes force and torque of prescribed motion, if the scene has it.
     fn reaction(&self) -> hdf5::Result<()> {
         let Some(reactions) = &self.recording.reactions else { return Ok(()) };
         let reaction = self.group("reaction")?;
@@ -235,14 +234,14 @@ impl Writer<'_> {
         reaction.vectors("torque", unit(2, 2, -2), description, reactions.iter().map(|r| &r.1))
     }
 
-    /// What the reference conditions carry, where the frame is a mean one.
+    /// Writes the torque of the reference conditions, if the frame is a mean one.
     fn conditions(&self) -> hdf5::Result<()> {
         let Some(torques) = &self.recording.conditions else { return Ok(()) };
         let description = "torque about the origin of the frame that the reference conditions (mean axes) carry, axes of the model, turning with the body; their force is zero";
         self.group("conditions")?.vectors("torque", unit(2, 2, -2), description, torques.iter())
     }
 
-    /// Paths of watched points, where there are such.
+    /// Writes the paths of watched points, if there are any.
     fn points(&self) -> hdf5::Result<()> {
         if self.recording.paths.is_empty() {
             return Ok(());

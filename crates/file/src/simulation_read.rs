@@ -1,4 +1,4 @@
-//! Reads the file of a simulation as far as pictures need it: how the frame and the modes move.
+//! Reads the file of a simulation as needed for pictures: the motion of the frame and of the modes.
 
 use super::recorded_motion::RecordedMotion;
 use super::simulation::{FORMAT, VERSION};
@@ -12,7 +12,7 @@ use std::path::Path;
 /// Reads the motion that `flexbody simulate` wrote to `path`.
 ///
 /// # Errors
-/// FB101 when it cannot be read; FB734 when it is another file, one of another version, or a damaged one.
+/// FB101 if the file cannot be read; FB734 if it is another file, one of another version, or a damaged one.
 pub fn read_simulation(path: impl AsRef<Path>) -> Result<RecordedMotion> {
     let path = path.as_ref();
     let (file, bytes) = open_sound(path, "motion", Code::MotionUnreadable)?;
@@ -68,7 +68,7 @@ impl RecordingReader {
         })
     }
 
-    /// What carries the body. Files of earlier versions say that something does, but not what.
+    /// Returns the carrier of the body. Files of earlier versions state that there is one, but not which.
     fn carrier(&self, root: &hdf5::Group) -> std::result::Result<Option<Carrier>, String> {
         if let Some(words) = hdf5_file::text(root, "carrier")? {
             let carrier = Carrier::from_words(&words);
@@ -87,7 +87,8 @@ impl RecordingReader {
         }
     }
 
-    /// Finite numbers with a row for every instant, and their columns; so many rows, where that is known.
+    /// Returns finite numbers with a row for every instant, and their number of columns. `rows` is the required number
+    /// of rows, if it is known.
     fn rows(
         &mut self,
         group: &str,

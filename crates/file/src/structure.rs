@@ -1,4 +1,4 @@
-//! What lies in a file, as JSON, without its numbers.
+//! The structure of a file as JSON, without its numbers.
 
 use super::read::open_checked;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -10,18 +10,19 @@ use hdf5_metno as hdf5;
 use serde_json::{Map, Value, json};
 use std::path::Path;
 
-/// Deeper groups are not part of any format version.
+/// Depth of groups above which members are left out: no format version has deeper groups.
 const DEEPEST: usize = 8;
 
-/// Groups may contain themselves, so that even a small file can unfold without end.
+/// Number of members above which a file is refused. Groups may contain themselves, so that even a small file can have
+/// endlessly many paths.
 const MOST_MEMBERS: usize = 20_000;
 
-/// Groups, datasets (type, shape and describing attributes) and attributes of a file, entries unknown to this
-/// version included; `schemas/flexbody-file.schema.json` describes the result.
+/// Returns groups, datasets (type, shape and descriptive attributes) and attributes of a file, including entries
+/// unknown to this version. `schemas/flexbody-file.schema.json` describes the result.
 ///
 /// # Errors
-/// As [`read`](super::read) for files that cannot be opened, are not of this program or of a newer format;
-/// [`BodySchema`](Code::BodySchema) when the file is damaged.
+/// The errors of [`read`](super::read) for files that cannot be opened, are not of this program or have a newer format;
+/// [`BodySchema`](Code::BodySchema) if the file is damaged.
 pub fn structure(path: impl AsRef<Path>) -> Result<Value> {
     let path = path.as_ref();
     let (file, _) = open_checked(path)?;
@@ -58,7 +59,7 @@ fn dataset(place: &hdf5::Dataset) -> hdf5::Result<Value> {
     Ok(Value::Object(out))
 }
 
-/// Texts and numbers; attributes of other types are not listed.
+/// Returns the attributes that are texts or numbers; others are left out.
 fn attributes(place: &hdf5::Location) -> hdf5::Result<Map<String, Value>> {
     let mut out = Map::new();
     for name in place.attr_names()? {

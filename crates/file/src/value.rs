@@ -1,4 +1,4 @@
-//! What an entry of the table holds, and where the writer takes it from.
+//! Values of the entries of the table, and the objects from which the writer takes them.
 
 use faer::{Mat, MatRef};
 use flexbody_base::units::{Unit, UnitSystem};
@@ -10,7 +10,7 @@ use flexbody_body::invariants::Invariants;
 use flexbody_model::BodyNumber;
 use nalgebra::{Matrix3, Vector3};
 
-/// Content of one entry; arrays are row-major in the shape that the table states.
+/// Value of one entry; arrays are row-major in the shape that the table states.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Value {
     Floats(Vec<f64>),
@@ -23,23 +23,23 @@ pub(super) enum Value {
     Named(Vec<(String, f64)>),
 }
 
-/// What the entries of one group are about.
+/// Object that the entries of one group describe: the body, and the part of it for groups with several instances.
 #[derive(Clone, Copy)]
 pub(super) struct View<'a> {
     pub body: &'a Parts,
     pub lumped: Option<&'a LumpedBody>,
     pub interface: Option<&'a Interface>,
-    /// Geometric stiffness or stiffness of inertia.
+    /// Geometric stiffness or stiffness of inertia of a unit load.
     pub geometric_stiffness: Option<&'a GeometricStiffness<Mat<f64>>>,
 }
 
 impl<'a> View<'a> {
-    /// The invariants of the group: exact, or those of its lumping scheme.
+    /// Returns the invariants of the group: the exact ones, or those of its lumping scheme.
     pub(crate) fn invariants(&self) -> &'a Invariants {
         self.lumped.map_or(&self.body.invariants, |l| &l.invariants)
     }
 
-    /// The modes at the reference point of the group's interface.
+    /// Returns the modes at the reference point of the group's interface.
     pub(crate) fn interface_rows(&self) -> Option<InterfaceRows> {
         let Parts { nodes, modes, dimension, .. } = self.body;
         let rotation = modes.rotation.as_ref().map(Mat::as_ref);
@@ -78,13 +78,13 @@ impl<'a> View<'a> {
         self.geometric_stiffness
     }
 
-    /// Node indices of the group's interface.
+    /// Returns the node indices of the group's interface; none for other groups.
     pub(crate) fn interface_nodes(&self) -> &'a [usize] {
         self.interface.map_or(&[], |i| &i.nodes)
     }
 }
 
-/// Components of shapes (3n x nf) at `nodes`, (nf x nodes x 3).
+/// Returns the components of shapes (3n x nf) at `nodes`, as an array (nf x nodes x 3).
 pub(super) fn shape_rows(shape: &Mat<f64>, nodes: impl Iterator<Item = usize> + Clone) -> Value {
     let mut out = Vec::new();
     for j in 0..shape.ncols() {
@@ -93,7 +93,7 @@ pub(super) fn shape_rows(shape: &Mat<f64>, nodes: impl Iterator<Item = usize> + 
     Value::Floats(out)
 }
 
-/// A matrix, row by row.
+/// Returns the elements of a matrix, row by row.
 pub(super) fn rows(m: MatRef<'_, f64>) -> impl Iterator<Item = f64> + '_ {
     (0..m.nrows()).flat_map(move |i| (0..m.ncols()).map(move |j| m[(i, j)]))
 }
@@ -102,12 +102,12 @@ pub(super) fn matrix(m: MatRef<'_, f64>) -> Option<Value> {
     Some(Value::Floats(rows(m).collect()))
 }
 
-/// Indices of nodes, of which no body has more than 2^31.
+/// Returns indices of nodes as a value. No body has more than 2^31 nodes.
 pub(super) fn indices(values: &[u32]) -> Value {
     Value::Indices(values.iter().map(|&i| i32::try_from(i).unwrap_or(i32::MAX)).collect())
 }
 
-/// A list as a text in JSON; no entry where it is empty.
+/// Returns a list as JSON text; `None` for an empty list.
 pub(super) fn json_list<T: serde::Serialize>(list: &[T]) -> Option<Value> {
     text(
         (!list.is_empty())
@@ -119,14 +119,14 @@ pub(super) fn text(value: impl Into<String>) -> Option<Value> {
     Some(Value::Text(value.into()))
 }
 
-/// The value that a file has for an entry.
+/// Value of an entry of a file.
 pub(super) struct ReadValue {
     pub value: Value,
-    /// Last extent of a dataset.
+    /// Last extent of a dataset; 0 for an attribute.
     pub columns: usize,
 }
 
-/// The contents of a value, which is of the kind that its row has.
+/// Makes functions that return the content of a value, which is of the kind of its row.
 macro_rules! contents {
     ($($name:ident $kind:ident $type:ty,)*) => {
         impl ReadValue {
@@ -150,13 +150,13 @@ contents! {
 }
 
 impl ReadValue {
-    /// Contents of a text in JSON, `expected` in words.
+    /// Parses the content from JSON text. `expected` describes the expected content in the message of the error.
     pub(crate) fn json<T: serde::de::DeserializeOwned>(self, expected: &str) -> Result<T, String> {
         serde_json::from_str(&self.text())
             .map_err(|e| format!("expected {expected}, found text that is not ({e})"))
     }
 
-    /// Components of shapes (nf x nodes x 3) as a matrix (3n x nf), the inverse of [`shape_rows`].
+    /// Returns components of shapes (nf x nodes x 3) as a matrix (3n x nf): the inverse of [`shape_rows`].
     pub(crate) fn shapes(self, nf: usize) -> Mat<f64> {
         let values = self.floats();
         let rows = values.len() / nf;
@@ -164,12 +164,12 @@ impl ReadValue {
     }
 }
 
-/// A type that the file stores as one entry.
+/// Type that the file stores as one entry.
 pub(super) trait Stored: Sized {
-    /// The value for the file; `None`: no entry.
+    /// Returns the value for the file; `None` if the file gets no entry.
     fn value(&self) -> Option<Value>;
 
-    /// Takes the value of the file. The error says what was expected and what was found.
+    /// Converts the value of the file. The error names the expected value and the value found.
     fn take(read: ReadValue) -> Result<Self, String>;
 }
 
@@ -211,28 +211,28 @@ stored!(Mat<f64>, own => Value::Floats(rows(own.as_ref()).collect()), read => {
     let values = read.floats();
     Self::from_fn(values.len() / columns, columns, |i, j| values[i * columns + j])
 });
-// Counts of things in memory are far below 2^63.
+// Counts of objects in memory are far below 2^63.
 stored!(usize, own => Value::Int(i64::try_from(*own).unwrap_or(i64::MAX)), read => {
     let value = read.int();
     Self::try_from(value).map_err(|_| format!("expected a count, found {value}"))?
 });
 
-/// Units of an entry in terms of the body's units of mass, length and time.
+/// Unit of an entry in terms of the body's units of mass, length and time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Units {
     /// Dimensionless, written `1`.
     One,
-    /// Hertz, whatever the unit of time.
+    /// Hertz, for any unit of time.
     Hertz,
-    /// They differ between the rows, as the description says.
+    /// Units that differ between the rows; the description states them.
     Mixed,
-    /// mass^(halves/2) length^b time^c: mass-normalised modes carry mass^(-1/2).
+    /// mass^(halves/2) length^b time^c; mass-normalised modes carry mass^(-1/2).
     Of { mass_halves: i8, length: i8, time: i8 },
 }
 
 impl Units {
-    /// With the unit names of a body: `kg m^2`, `tonne^(1/2) mm`, `s^-2`; a unit that the user gave as a
-    /// number is written in SI: `(0.0254 m)^2`.
+    /// Returns the unit with the unit names of a body: `kg m^2`, `tonne^(1/2) mm`, `s^-2`. A unit that the user gave as
+    /// a number is written in SI: `(0.0254 m)^2`.
     pub(crate) fn concrete(self, system: &UnitSystem) -> String {
         let name = |unit: &Unit, si: &str| match unit.name().parse::<f64>() {
             Ok(_) => format!("({} {si})", unit.name()),
@@ -241,7 +241,7 @@ impl Units {
         self.spell([name(&system.mass, "kg"), name(&system.length, "m"), name(&system.time, "s")])
     }
 
-    /// In words: `mass length^2`.
+    /// Returns the unit in words: `mass length^2`.
     pub(crate) fn symbolic(self) -> String {
         self.spell(["mass", "length", "time"].map(str::to_owned))
     }

@@ -1,4 +1,4 @@
-//! Writes a body as the table says.
+//! Writes a body by the rows of the table.
 
 use super::digest::{Number, Numbers, digests_of, of_numbers, sealed};
 use super::item::{Item, ItemKind, Per};
@@ -20,8 +20,8 @@ use std::path::Path;
 /// Reserves `path` for a body file, so that a long computation does not end at an unwritable output.
 ///
 /// # Errors
-/// See [`OutputSlot::prepare`]; also [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot
-/// take, where an open file has no name in UTF-8.
+/// The errors of [`OutputSlot::prepare`]; [`OutputUnwritable`](Code::OutputUnwritable) for paths that HDF5 cannot use,
+/// if an open file has no name in UTF-8.
 pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
     let slot = OutputSlot::prepare(path)?;
     if cfg!(not(unix)) && slot.temporary().to_str().is_none() {
@@ -31,33 +31,32 @@ pub fn prepare_output(path: impl AsRef<Path>) -> Result<OutputSlot> {
     Ok(slot)
 }
 
-/// Writes `body` to `path`; the file appears whole or not at all. Equal bodies give equal bytes.
+/// Writes `body` to `path`. The file appears complete or not at all. Equal bodies give equal bytes.
 ///
 /// # Errors
-/// See [`prepare_output`] and [`write_to`].
+/// The errors of [`prepare_output`] and [`write_to`].
 pub fn write(body: &FlexBody, path: impl AsRef<Path>) -> Result<()> {
     write_to(body, prepare_output(path)?)
 }
 
-/// Writes `body` to a place reserved by [`prepare_output`].
+/// Writes `body` to an output reserved by [`prepare_output`].
 ///
 /// # Errors
-/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then
-/// as it was.
+/// [`DiskShort`](Code::DiskShort) or [`OutputUnwritable`](Code::OutputUnwritable); an existing file is then unchanged.
 pub fn write_to(body: &FlexBody, slot: OutputSlot) -> Result<()> {
     fill_slot(body, &slot)?;
     slot.commit()
 }
 
-/// The same without the end: the file appears when the slot is committed.
+/// Writes `body` to the temporary file of `slot`. The file appears under its name when the slot is committed.
 ///
 /// # Errors
-/// As [`write_to`].
+/// The errors of [`write_to`].
 pub fn fill_slot(body: &FlexBody, slot: &OutputSlot) -> Result<()> {
     fill(body, slot.temporary()).map_err(|e| slot.failure(&system_error(&e.to_string())))
 }
 
-/// HDF5 tells the system's error number in its text only.
+/// Returns the system error in a message of HDF5, which has its number only in the text.
 pub(super) fn system_error(text: &str) -> std::io::Error {
     let number = text.split_once("errno = ").and_then(|(_, rest)| {
         let digits = rest.find(|c: char| !c.is_ascii_digit()).map_or(rest, |end| &rest[..end]);
@@ -66,6 +65,7 @@ pub(super) fn system_error(text: &str) -> std::io::Error {
     number.map_or_else(|| std::io::Error::other(text), std::io::Error::from_raw_os_error)
 }
 
+/// Writes all groups and entries of the body, then the digests.
 fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     let file = create(path)?;
     let mut numbers = Numbers::default();
@@ -90,7 +90,7 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
             }
         }
     }
-    // Every dataset has its fingerprint already: nothing is read back but attributes.
+    // Every dataset has its fingerprint already: only attributes are read back.
     let digests = digests_of(&file, &mut numbers, &mut Stored::new(0))?;
     let (list, whole) = sealed(&digests);
     put_text(&file, LIST, &list)?;
@@ -99,7 +99,7 @@ fn fill(body: &FlexBody, path: &Path) -> hdf5::Result<()> {
     file.close()
 }
 
-/// Writes an entry; of a dataset, gives the fingerprint of its numbers.
+/// Writes an entry. Returns the fingerprint of its numbers if it is a dataset.
 fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5::Result<Option<Fingerprint>> {
     match (item.kind, value) {
         (ItemKind::Floats(_), Value::Floats(values)) if item.is_short(view.body.storage) => {
@@ -124,8 +124,8 @@ fn put(place: &hdf5::Group, item: &Item, view: &View<'_>, value: Value) -> hdf5:
     Ok(None)
 }
 
-/// Writes a dataset of numbers, and gives their fingerprint, which is made meanwhile. Nothing is compressed: mode
-/// shapes would shrink by 5 to 30 %, and take as long as a tenth of the conversion.
+/// Writes a dataset of numbers, and returns their fingerprint, which is computed at the same time. Nothing is
+/// compressed: mode shapes would shrink by 5 to 30 %, at a cost of a tenth of the time of the conversion.
 fn put_numbers<T: hdf5::H5Type + Number>(
     place: &hdf5::Group,
     item: &Item,
@@ -140,7 +140,7 @@ fn put_numbers<T: hdf5::H5Type + Number>(
     Ok(fingerprint)
 }
 
-#[allow(clippy::cast_possible_truncation)] // what it is for
+#[allow(clippy::cast_possible_truncation)] // rounding to 32 bits is intended
 fn nearest_f32(value: f64) -> f32 {
     value as f32
 }

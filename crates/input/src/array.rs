@@ -1,14 +1,14 @@
-//! A dense array of numbers, whatever format it came in.
+//! A dense array of numbers, independent of the file format.
 
-/// A dense array as its file has it.
+/// Dense array as read from its file.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Array {
     pub rows: usize,
     pub cols: usize,
-    /// Whether the values of a row, or of a column, follow each other.
+    /// True if the values of a row are contiguous, false if those of a column are.
     pub row_major: bool,
-    /// As many as rows x cols.
+    /// Values; their number is rows x cols.
     pub values: Vec<f64>,
-    /// Significant decimal digits that they carry at the most.
+    /// Largest number of significant decimal digits that the format stores.
     pub digits: u8,
 }

@@ -1,5 +1,5 @@
-//! From entries in file order to compressed columns, by counting: each task owns some columns and takes the
-//! entries that belong there in file order, so that the bits are the same for any number of tasks.
+//! Compressed columns from entries in file order, by counting. Each task handles some columns and takes their entries
+//! in file order, so that the bits are the same for any number of tasks.
 
 use super::digits::significant_digits;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::path::Path;
 
-/// One stored entry, indices from 0.
+/// Stored entry with indices from 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Entry {
     pub row: u32,
@@ -18,16 +18,16 @@ pub(super) struct Entry {
     pub value: f64,
 }
 
-/// The entries of a matrix that a file has.
+/// Part of a matrix that a file stores.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum StoredEntries {
     /// All entries of the matrix.
     Full,
-    /// One triangle of a symmetric matrix: every off-diagonal entry stands for two.
+    /// One triangle of a symmetric matrix: every off-diagonal entry represents two.
     Triangle,
 }
 
-/// Whether entries lie below and above the diagonal.
+/// Sides of the diagonal on which entries lie.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Sides {
     pub lower: bool,
@@ -35,7 +35,7 @@ pub(super) struct Sides {
 }
 
 impl StoredEntries {
-    /// Of a file that does not say it: entries on one side alone stand for both.
+    /// Returns the stored part for a file without a declaration: entries on one side alone represent both.
     pub(super) fn of(sides: Sides) -> Self {
         match sides {
             Sides { lower: true, upper: true } => Self::Full,
@@ -44,33 +44,34 @@ impl StoredEntries {
     }
 }
 
-/// Entries that a matrix may have for each of its places: contributions of many elements may be listed one by one. A
-/// larger number lets a compressed file unpack to more; all that was seen has less than 10.
+/// Largest number of entries per position of a matrix: contributions of many elements may be listed one by one. A
+/// larger number lets a compressed file unpack to more; every known file has less than 10.
 const ENTRIES_PER_PLACE: u128 = 64;
 
-/// Entries that a matrix of any size may have.
+/// Number of entries that a matrix of any size may have.
 const ALWAYS_ENTRIES: u64 = 1_000_000;
 
-/// Bytes that an entry takes while a matrix is assembled: as it was read, and in a compressed column.
+/// Bytes per entry while a matrix is assembled: as it was read, and in a compressed column.
 const BYTES_PER_ENTRY: f64 = (size_of::<Entry>() + size_of::<u32>() + size_of::<f64>()) as f64;
 
-/// Largest number of entries that a matrix of `n` rows may have.
+/// Returns the largest number of entries of a matrix with `n` rows.
 pub(super) fn most_entries_of(n: u64) -> u64 {
     let places = u128::from(n) * u128::from(n);
     u64::try_from(ENTRIES_PER_PLACE.saturating_mul(places)).unwrap_or(u64::MAX).max(ALWAYS_ENTRIES)
 }
 
-/// Refuses so many entries where they do not fit the memory that is left.
+/// Refuses a number of entries that does not fit the memory left.
 ///
 /// # Errors
-/// FB601.
+/// FB601 if they do not fit.
 pub(super) fn refuse_beyond_memory(entries: u64) -> Result<(), Diagnostic> {
     let what = format!("a matrix of {entries} entries");
     let refused = refuse_beyond(left(), entries as f64 * BYTES_PER_ENTRY, &what, "use a larger machine");
     refused.map_err(|error| error.first_error().clone())
 }
 
-/// Checks a declared size against the number of stored entries, before anything of that size is allocated.
+/// Checks a declared size against the number of stored entries, before memory of this size is allocated. Returns the
+/// number of rows.
 pub fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnostic> {
     if rows != cols {
         return Err(Diagnostic::new(
@@ -81,7 +82,7 @@ pub fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnosti
     if rows > u64::from(u32::MAX) {
         return Err(Diagnostic::new(Code::MatrixTooLarge, format!("matrix has {rows} rows")));
     }
-    // Memory goes with the rows; a file must not be able to ask for it without entries to show.
+    // Memory grows with the rows: a file must not request it without entries.
     if rows > 1_000_000 && rows / 100 > entries {
         let message = format!("matrix declares {rows} rows but stores only {entries} entries");
         return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help("write the matrix again"));
@@ -93,7 +94,8 @@ pub fn check_size(rows: u64, cols: u64, entries: u64) -> Result<usize, Diagnosti
     Ok(rows as usize)
 }
 
-/// FB307 for a matrix of which only one triangle is there although its file does not say so.
+/// Returns FB307 if only one triangle is stored and the file does not declare it; `help` receives the name of the
+/// triangle.
 pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> String) -> Option<Diagnostic> {
     let stored = match sides {
         Sides { lower: true, upper: false } => "lower",
@@ -105,11 +107,11 @@ pub(super) fn undeclared_triangle(sides: Sides, help: impl FnOnce(&str) -> Strin
     Some(Diagnostic::new(Code::MatrixAsymmetric, message).with_help(help(stored)))
 }
 
-/// Builds the matrix (both triangles) from `pieces` of entries in file order: zeros dropped, duplicates
-/// summed in file order. `written` is the largest number of digits as written, see [`significant_digits`].
+/// Builds the matrix (both triangles) from `pieces` of entries in file order. Zeros are dropped, and duplicates are
+/// summed in file order. `written` is the largest number of written digits, see [`significant_digits`].
 ///
 /// # Errors
-/// FB306 when a sum of duplicates is not finite, FB312 when nothing but zeros is left.
+/// FB306 if a sum of duplicates is not finite, FB312 if no nonzero entry is left.
 pub(super) fn assemble(
     n: usize,
     pieces: Vec<Vec<Entry>>,
@@ -121,11 +123,11 @@ pub(super) fn assemble(
     finish(n, Counted::of(n, pieces, stored).added_up(), digits, path)
 }
 
-/// [`assemble`] where no entry may be given twice; `twice` tells the first that is, by row and then column.
-/// Of a triangle it is named by its place below the diagonal.
+/// Builds the matrix like [`assemble`], but refuses duplicates: `twice` receives row and column of the first duplicate,
+/// by row and then column, and returns its diagnostic. For a triangle the position is the one below the diagonal.
 ///
 /// # Errors
-/// What `twice` tells; FB312 when nothing but zeros is left.
+/// The diagnostic from `twice`; FB312 if no nonzero entry is left.
 pub(super) fn assemble_distinct(
     n: usize,
     pieces: Vec<Vec<Entry>>,
@@ -141,10 +143,10 @@ pub(super) fn assemble_distinct(
     }
 }
 
-/// [`assemble`] for columns that are complete: they become the matrix where they lie.
+/// Builds the matrix like [`assemble`] from complete columns, in place.
 ///
 /// # Errors
-/// As [`assemble`].
+/// The errors of [`assemble`].
 pub(super) fn assemble_columns(
     columns: ColumnEntries,
     written: u8,
@@ -154,10 +156,10 @@ pub(super) fn assemble_columns(
     finish(columns.counts.len() - 1, columns.compress(), digits, path)
 }
 
-/// A matrix that is complete.
+/// Returns a complete matrix with its number of significant digits.
 ///
 /// # Errors
-/// As [`assemble`].
+/// The errors of [`assemble`].
 #[cfg(feature = "hdf5")]
 pub(super) fn assembled(matrix: CscMatrix, written: u8, path: &Path) -> Result<RawMatrix, Diagnostic> {
     let digits = significant_digits(matrix.nnz(), written, |k| matrix.values()[k]);
@@ -195,7 +197,7 @@ fn digits_of(pieces: &[Vec<Entry>], written: u8) -> u8 {
     })
 }
 
-/// Entries in compressed columns, each sorted by row; duplicates stand in file order.
+/// Entries in compressed columns, each sorted by row; duplicates stay in file order.
 struct Counted {
     col_ptr: Vec<usize>,
     row_idx: Vec<u32>,
@@ -208,12 +210,14 @@ impl Counted {
         let list = List::new(pieces, stored);
         let mut col_ptr = vec![0usize; n + 1];
         let width = n.div_ceil(4 * rayon::current_num_threads()).max(1);
+        // Each task counts the entries of its columns.
         col_ptr[1..].par_chunks_mut(width).enumerate().for_each(|(task, counts)| {
             let first = task * width;
             list.visit(first..first + counts.len(), |_, col, _| counts[col - first] += 1);
         });
         add_up(&mut col_ptr);
         let entries = col_ptr[n];
+        // Each task then puts the entries of its columns in file order, and sorts the columns.
         let (mut row_idx, mut values) = (vec![0u32; entries], vec![0.0f64; entries]);
         let fill = |block: ColumnBlock<'_>| {
             let (first, end) = (block.columns.start, block.columns.end);
@@ -232,7 +236,7 @@ impl Counted {
         Self { col_ptr, row_idx, values, has_duplicates }
     }
 
-    /// `Err` holds the entry whose sum is not finite.
+    /// Returns the matrix with summed duplicates. The error is the position of a sum that is not finite.
     fn added_up(self) -> Result<CscMatrix, (u32, u32)> {
         let Self { mut col_ptr, mut row_idx, mut values, has_duplicates } = self;
         if has_duplicates {
@@ -242,7 +246,8 @@ impl Counted {
         Ok(CscMatrix::from_parts(n, n, col_ptr, row_idx, values))
     }
 
-    /// `Err` holds the first entry that is there twice, by row and then column.
+    /// Returns the matrix if it has no duplicates. The error is the position of the first duplicate, by row and then
+    /// column.
     fn distinct(self, stored: StoredEntries) -> Result<CscMatrix, (u32, u32)> {
         if !self.has_duplicates {
             return self.added_up();
@@ -251,14 +256,13 @@ impl Counted {
             let rows = &self.row_idx[ends[0]..ends[1]];
             rows.windows(2).filter(|pair| pair[0] == pair[1]).map(move |pair| (pair[0], col))
         });
-        // Each of a triangle was put into both.
+        // For a triangle every entry is also in the other triangle.
         let twice = twice.filter(|(row, col)| stored == StoredEntries::Full || row >= col);
         Err(twice.min().expect("duplicates were found"))
     }
 }
 
-/// Adds an entry to the last piece, or begins a new one: pieces that cover few columns are left out by most
-/// tasks.
+/// Adds an entry to the last piece, or begins a new one. Small pieces cover few columns, so that most tasks skip them.
 pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
     const PIECE: usize = 1 << 15;
     match pieces.last_mut() {
@@ -271,19 +275,19 @@ pub(super) fn push(pieces: &mut Vec<Vec<Entry>>, entry: Entry) {
     }
 }
 
-/// Entries that come column by column, in any order within a column, without zeros.
+/// Entries that come column by column, without zeros, in any order within a column.
 pub(super) struct ColumnEntries {
-    /// At j + 1: the number of entries of column j.
+    /// Number of entries of column j, at index j + 1.
     counts: Vec<usize>,
     row_idx: Vec<u32>,
     values: Vec<f64>,
 }
 
 impl ColumnEntries {
-    /// None yet, of `n` columns; about `entries` will come.
+    /// Creates an empty list for `n` columns, with capacity for about `entries`.
     pub(super) fn with_room(n: usize, entries: usize) -> Self {
         let (mut row_idx, mut values) = (Vec::new(), Vec::new());
-        // A number that a file states: where there is no such room the lists grow as far as they have to.
+        // The number comes from a file. Without memory for it the lists grow as needed.
         or_go_without(|| {
             if row_idx.try_reserve_exact(entries).is_ok() {
                 let _ = values.try_reserve_exact(entries);
@@ -292,21 +296,21 @@ impl ColumnEntries {
         Self { counts: vec![0; n + 1], row_idx, values }
     }
 
-    /// Of `n` columns; `lengths` has each column with entries and their number, in ascending order.
+    /// Creates the list of `n` columns. `lengths` holds each column with entries and their number, in ascending order.
     pub(super) fn new(n: usize, lengths: &[(u32, usize)], row_idx: Vec<u32>, values: Vec<f64>) -> Self {
         let mut counts = vec![0; n + 1];
         lengths.iter().for_each(|&(column, length)| counts[column as usize + 1] = length);
         Self { counts, row_idx, values }
     }
 
-    /// Adds an entry to its column; columns come in ascending order.
+    /// Adds an entry to its column. Columns must come in ascending order.
     pub(super) fn push(&mut self, entry: Entry) {
         self.counts[entry.col as usize + 1] += 1;
         self.row_idx.push(entry.row);
         self.values.push(entry.value);
     }
 
-    /// The entries one by one.
+    /// Returns the entries one by one.
     #[cfg(feature = "hdf5")]
     pub(super) fn into_entries(self) -> Vec<Vec<Entry>> {
         let mut entries = Vec::new();
@@ -321,6 +325,7 @@ impl ColumnEntries {
         entries
     }
 
+    /// Sorts the columns and sums duplicates. The error is the position of a sum that is not finite.
     fn compress(self) -> Result<CscMatrix, (u32, u32)> {
         let Self { counts: mut col_ptr, mut row_idx, mut values } = self;
         add_up(&mut col_ptr);
@@ -336,15 +341,14 @@ impl ColumnEntries {
     }
 }
 
-/// From the number of entries of column j at j + 1 to column pointers.
+/// Turns the numbers of entries of columns j, at j + 1, into column pointers.
 fn add_up(counts: &mut [usize]) {
     for j in 1..counts.len() {
         counts[j] += counts[j - 1];
     }
 }
 
-/// Cuts the columns into several times as many parts as there are threads, with about equal numbers of
-/// entries.
+/// Cuts the columns into four parts per thread, with about equal numbers of entries.
 fn equal_shares(col_ptr: &[usize]) -> Vec<usize> {
     let (n, parts) = (col_ptr.len() - 1, 4 * rayon::current_num_threads());
     let cut = |part: usize| col_ptr.partition_point(|&p| p < col_ptr[n] / parts * part).min(n);
@@ -354,7 +358,7 @@ fn equal_shares(col_ptr: &[usize]) -> Vec<usize> {
 /// All entries of a file.
 struct List {
     pieces: Vec<Vec<Entry>>,
-    /// First and last column that each piece has entries for.
+    /// First and last column of the entries of each piece.
     extents: Vec<(u32, u32)>,
     mirror: bool,
 }
@@ -372,7 +376,7 @@ impl List {
         Self { pieces, extents, mirror }
     }
 
-    /// Calls `take` with row, column and value of every nonzero entry of some columns, in file order.
+    /// Calls `take` with row, column and value of every nonzero entry of `columns`, in file order.
     fn visit(&self, columns: Range<usize>, mut take: impl FnMut(u32, usize, f64)) {
         let (start, len) = (columns.start as u32, columns.len() as u32);
         let here = |column: u32| column.wrapping_sub(start) < len;
@@ -392,8 +396,8 @@ impl List {
     }
 }
 
-/// Sorts every column by row, duplicates staying in file order; says whether there are any. `pointers` are
-/// those of the columns whose entries `rows` and `values` are.
+/// Sorts every column by row, with duplicates in file order. Returns true when there are duplicates. `pointers` are the
+/// column pointers of the entries in `rows` and `values`.
 fn sort_columns(pointers: &[usize], rows: &mut [u32], values: &mut [f64]) -> bool {
     let mut duplicates = false;
     let mut scratch: Vec<(u32, f64)> = Vec::new();
@@ -415,12 +419,14 @@ fn sort_columns(pointers: &[usize], rows: &mut [u32], values: &mut [f64]) -> boo
     duplicates
 }
 
-/// Sums runs of equal rows and drops sums that are zero, in place.
+/// Sums runs of equal rows and drops sums that are zero, in place. The error is the position of a sum that is not
+/// finite.
 fn merge_duplicates(
     col_ptr: &mut [usize],
     row_idx: &mut Vec<u32>,
     values: &mut Vec<f64>,
 ) -> Result<(), (u32, u32)> {
+    // Entries are read at `from` and written at `to`, which never passes it.
     let (mut from, mut to) = (0, 0);
     for j in 0..col_ptr.len() - 1 {
         let end = col_ptr[j + 1];
@@ -468,7 +474,8 @@ mod tests {
         assert_eq!(raw.matrix, expected);
     }
 
-    /// Entries of a lower triangle in no order, with zeros and duplicates whose sums depend on their order.
+    /// Returns entries of a lower triangle in random order, with zeros and with duplicates whose sums depend on their
+    /// order.
     fn disordered(n: u32, count: u32) -> Vec<Entry> {
         let at = |k: u32| k.wrapping_mul(2_654_435_761) >> 7;
         let place = |k: u32| (at(k) % n, at(k + count) % n);
@@ -501,7 +508,7 @@ mod tests {
                 pool.install(|| assemble(n, pieces.clone(), StoredEntries::Triangle, 17, Path::new("K.mtx")));
             assert_eq!(raw.unwrap().matrix, expected, "{threads} threads");
         }
-        // The same column by column, as binary files have them.
+        // Column by column, as in binary files, the matrix must be equal.
         let mut ordered: Vec<Entry> = list.into_iter().filter(|e| e.value != 0.0).collect();
         ordered.sort_by_key(|e| e.col);
         let columns = || {

@@ -1,5 +1,5 @@
-//! Decks of Nastran: lines of case control, then bulk data cards in free, small and large fields, with
-//! continuations, comments and included files.
+//! Decks of Nastran: lines of case control, then bulk data cards in free, small and large fields, with continuations,
+//! comments and included files.
 
 mod apart;
 mod matrix_lines;
@@ -15,56 +15,56 @@ use replication::{Asked, Replication};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Files that include one another deeper than this include themselves.
+/// Depth of included files above which a file is taken to include itself.
 const DEEPEST: usize = 20;
-/// A deck has no more files than these.
+/// Largest number of files of a deck.
 const MOST_FILES: usize = 1000;
 
-/// What a deck is made of, in its order.
+/// Part of a deck, in the order of the deck.
 pub(super) enum Item<'a> {
-    /// A line above the bulk data, without its comment.
+    /// Line above the bulk data, without its comment.
     Control(&'a str),
-    /// BEGIN BULK, BEGIN SUPER.
+    /// Line `BEGIN BULK` or `BEGIN SUPER`.
     Begin(&'a Place<'a>),
     Card(&'a Card, &'a Path),
-    /// DMIG cards that stand one below the other, not read yet.
+    /// Consecutive DMIG cards, not yet read.
     Matrices(&'a MatrixLines<'a>),
 }
 
-/// Where something stands.
+/// Position in a file.
 pub(super) struct Place<'a> {
     pub path: &'a Path,
     pub line: usize,
 }
 
-/// A bulk data card: its name and its fields, eight to a line of small fields, four to one of large fields.
+/// Bulk data card: its name and its fields, eight per line of small fields, four per line of large fields.
 #[derive(Clone, Default)]
 pub(super) struct Card {
-    /// In upper case, without asterisk.
+    /// Name in upper case, without asterisk.
     pub name: String,
     text: Vec<u8>,
-    /// Where each field ends in the text.
+    /// End of each field in the text.
     ends: Vec<usize>,
-    /// The first field of each line, and the number of the line.
+    /// First field of each line, and the number of the line.
     lines: Vec<(usize, usize)>,
-    /// Name that the continuation has to have, in upper case, where one is given.
+    /// Name that the continuation must have, in upper case; empty if none is given.
     continuation: Vec<u8>,
 }
 
 impl Card {
-    /// A field, trimmed, from 0 for what follows the name; empty where the card has none.
+    /// Returns field `k`, trimmed, counted from 0 after the name; empty if the card does not have it.
     pub(super) fn field(&self, k: usize) -> &[u8] {
         let Some(&end) = self.ends.get(k) else { return b"" };
         let start = if k == 0 { 0 } else { self.ends[k - 1] };
         &self.text[start..end]
     }
 
-    /// Number of fields, empty ones included.
+    /// Returns the number of fields, empty ones included.
     pub(super) fn len(&self) -> usize {
         self.ends.len()
     }
 
-    /// A whole number; zero where the field is empty.
+    /// Returns field `k` as a whole number; zero if it is empty, `None` if it is no whole number.
     pub(crate) fn integer(&self, k: usize) -> Option<i64> {
         match self.field(k) {
             b"" => Some(0),
@@ -72,7 +72,7 @@ impl Card {
         }
     }
 
-    /// A finite real number; zero where the field is empty.
+    /// Returns field `k` as a finite real number; zero if it is empty, `None` if it is no such number.
     pub(crate) fn real(&self, k: usize) -> Option<f64> {
         match self.field(k) {
             b"" => Some(0.0),
@@ -80,13 +80,13 @@ impl Card {
         }
     }
 
-    /// The line that a field stands in.
+    /// Returns the number of the line with field `k`.
     pub(super) fn line_of(&self, k: usize) -> usize {
         let at = self.lines.partition_point(|(first, _)| *first <= k);
         self.lines.get(at.saturating_sub(1)).map_or(1, |(_, line)| *line)
     }
 
-    /// The line that it begins in.
+    /// Returns the number of the first line of the card.
     pub(super) fn line(&self) -> usize {
         self.line_of(0)
     }
@@ -99,7 +99,7 @@ impl Card {
         self.continuation.clear();
     }
 
-    /// Its continuation has to have the name in this field.
+    /// Sets the name of the continuation to that in `field`.
     fn continue_as(&mut self, field: &[u8]) {
         self.continuation.clear();
         self.continuation.extend(bare(field.trim_ascii()).iter().map(u8::to_ascii_uppercase));
@@ -111,9 +111,9 @@ impl Card {
     }
 }
 
-/// A whole number as cards have it.
+/// Returns the whole number in a field of a card; `None` if it is none.
 pub(super) fn whole(field: &[u8]) -> Option<i64> {
-    /// As many digits fit into the number, whichever they are.
+    /// Number of digits that fit into an i64, whichever digits they are.
     const FIT: usize = 18;
     let digits = match field {
         [b'+' | b'-', digits @ ..] => digits,
@@ -129,12 +129,12 @@ pub(super) fn whole(field: &[u8]) -> Option<i64> {
     Some(if field[0] == b'-' { -number } else { number })
 }
 
-/// Components of a grid: digits from 0 to 6. Scalar points have 0 or none.
+/// Returns the components of a grid: digits from 0 to 6. Scalar points have 0 or none.
 pub(super) fn components(field: &[u8]) -> Option<Vec<u8>> {
     field.iter().map(|b| (b'0'..=b'6').contains(b).then(|| b - b'0')).collect()
 }
 
-/// True if a file that begins with `bytes` is a deck of Nastran or bulk data, by its first lines that say so.
+/// Returns true when a file that begins with `bytes` is a deck of Nastran or bulk data.
 pub(super) fn is_bulk_data(bytes: &[u8]) -> bool {
     bytes.split(|&b| b == b'\n').any(|line| {
         let upper: Vec<u8> = line.iter().take(16).map(u8::to_ascii_uppercase).collect();
@@ -147,7 +147,7 @@ pub(super) fn is_bulk_data(bytes: &[u8]) -> bool {
     })
 }
 
-/// Whether a line begins bulk data.
+/// Returns true when a line begins bulk data.
 fn is_begin(line: &[u8]) -> bool {
     let word = |text: &[u8], word: &[u8]| {
         text.get(..word.len()).is_some_and(|begin| begin.eq_ignore_ascii_case(word))
@@ -159,10 +159,10 @@ fn is_begin(line: &[u8]) -> bool {
     }
 }
 
-/// Whether a line is of case control or executive control, or ends them.
+/// Returns true when a line belongs to case control or executive control, or ends them.
 fn is_control(line: &[u8]) -> bool {
     let line = &line[..line.len().min(40)];
-    // What most lines are not is told by one letter.
+    // The first letter excludes most lines.
     if !matches!(line.trim_ascii_start().first(), Some(b'b' | b'B' | b'c' | b'C' | b's' | b'S')) {
         return false;
     }
@@ -172,13 +172,11 @@ fn is_control(line: &[u8]) -> bool {
 
 type Taken = Result<(), Diagnostic>;
 
-/// Reads a deck with the files that it includes and gives what it is made of to `take`. The files, the main
-/// one first.
+/// Reads a deck with the files that it includes, and passes its parts to `take`. Returns the files, the main one first.
 ///
 /// # Errors
-/// FB101, FB106 for files that cannot be read; FB110 for continuations without a card, fields beyond the
-/// line, and files that include themselves; FB301 for a matrix at the end of a file that has no line end;
-/// what `take` gives.
+/// FB101, FB106 for files that cannot be read; FB110 for continuations without a card, fields beyond the line, and
+/// files that include themselves; FB301 for a matrix at the end of a file without a line end; the errors of `take`.
 pub(super) fn read_deck(
     path: &Path,
     take: &mut dyn FnMut(Item<'_>) -> Taken,
@@ -191,11 +189,10 @@ pub(super) fn read_deck(
     Ok(reading.files)
 }
 
-/// Gives the cards of some whole lines of bulk data to `take`; `above` is the number of lines above them in
-/// their file.
+/// Passes the cards of whole lines of bulk data to `take`. `above` is the number of lines above them in their file.
 ///
 /// # Errors
-/// FB110 for continuations without a card and fields beyond the line; what `take` gives.
+/// FB110 for continuations without a card and fields beyond the line; the errors of `take`.
 pub(super) fn read_cards(
     text: &[u8],
     path: &Path,
@@ -213,18 +210,18 @@ pub(super) fn read_cards(
     reading.flush()
 }
 
-/// A deck while it is read.
+/// State of reading a deck.
 struct BulkReader<'t> {
     files: Vec<SeenFile>,
     in_bulk: bool,
-    /// ENDDATA has come.
+    /// True after ENDDATA.
     ended: bool,
-    /// The card that was read last, and its file.
+    /// Last card that was read, and its file.
     card: Card,
     card_path: PathBuf,
-    /// Continuations may go on with that card: it was not given yet.
+    /// True while continuations may extend the last card, which has not been passed on.
     is_open: bool,
-    /// Continuations of the file that stand apart from their cards.
+    /// Continuations of the file that do not follow their cards.
     apart: Apart,
     /// Changes from card to card by the last line of replication.
     replication: Replication,
@@ -283,7 +280,7 @@ impl<'t> BulkReader<'t> {
                 }
             } else if is_include(bare) {
                 let mut name = String::from_utf8_lossy(&bare[7..]).trim().to_owned();
-                // A name between quotes may go on in the next lines.
+                // A name in quotes may continue in the next lines.
                 while unclosed(&name) {
                     let Some(more) = lines.next() else { break };
                     name += String::from_utf8_lossy(more.text).trim();
@@ -335,6 +332,7 @@ impl<'t> BulkReader<'t> {
         let line = Line::of(line);
         let head = line.head();
         let here = |diagnostic: Diagnostic| diagnostic.in_file(at.path).at_line(at.line);
+        // A line of replication makes cards from the last one.
         match Replication::asked(&line).map_err(here)? {
             None => {}
             Some(Asked::One(replication)) => {
@@ -349,6 +347,7 @@ impl<'t> BulkReader<'t> {
                 Diagnostic::new(Code::DeckSyntax, message).in_file(at.path).at_line(at.line)
             };
             let (name, card) = (bare(head).to_ascii_uppercase(), &self.card);
+            // A continuation elsewhere is stored until the end of the file; others must follow their card.
             let is_below = self.is_open && !name.is_empty() && name == card.continuation;
             if !is_below && self.apart.keep(&name, &line.text, at.line) {
                 return Ok(());
@@ -368,7 +367,7 @@ impl<'t> BulkReader<'t> {
         card_fields(&mut self.card, &line, at.line).map_err(here)
     }
 
-    /// Another card begins.
+    /// Passes on the last card, and begins another one.
     fn open(&mut self, at: &Place<'_>) -> Taken {
         self.flush()?;
         self.apart.close();
@@ -379,7 +378,7 @@ impl<'t> BulkReader<'t> {
         Ok(())
     }
 
-    /// Cards that follow from the last one by replication.
+    /// Makes `count` cards from the last one by replication.
     fn replicate(&mut self, count: i64, at: &Place<'_>) -> Taken {
         for _ in 0..count {
             let next = self.replication.next(&self.card);
@@ -391,7 +390,7 @@ impl<'t> BulkReader<'t> {
         Ok(())
     }
 
-    /// Gives the card that has been read.
+    /// Passes on the last card, unless its continuation comes later.
     fn flush(&mut self) -> Taken {
         if !std::mem::take(&mut self.is_open) {
             return Ok(());
@@ -403,7 +402,7 @@ impl<'t> BulkReader<'t> {
         (self.take)(Item::Card(&self.card, &self.card_path))
     }
 
-    /// FB301 where the last card is of a matrix and has no line end: digits may be missing.
+    /// Returns FB301 if the last card belongs to a matrix and has no line end: digits may be missing.
     fn refuse_cut_off(&mut self, path: &Path, bytes: &[u8]) -> Taken {
         let is_matrix = self.is_open && self.card.name == "DMIG" && self.card_path == path;
         if is_matrix && !bytes.ends_with(b"\n") {
@@ -419,16 +418,16 @@ fn cut_off(path: &Path, line: usize) -> Diagnostic {
     diagnostic.with_help("write the file again; if it is whole, end the last line")
 }
 
-/// A line up to its comment.
+/// Returns a line without its comment.
 fn without_comment(line: &[u8]) -> &[u8] {
     line[..memchr::memchr(b'$', line).unwrap_or(line.len())].trim_ascii_end()
 }
 
-/// A line of a card, without its comment.
+/// Line of a card, without its comment.
 struct Line<'a> {
-    /// Fields lie between commas.
+    /// True if commas separate the fields.
     is_free: bool,
-    /// Without tabs where fields lie between columns.
+    /// Text; without tabs if fields have fixed columns.
     text: Cow<'a, [u8]>,
 }
 
@@ -438,7 +437,7 @@ impl<'a> Line<'a> {
         Self { is_free, text: if is_free { Cow::Borrowed(line) } else { without_tabs(line) } }
     }
 
-    /// What stands before the fields: the name of the card, or a continuation.
+    /// Returns the text before the fields: the name of the card, or a continuation.
     fn head(&self) -> &[u8] {
         let head = match self.is_free {
             true => self.text.split(|&b| b == b',').next().unwrap_or_default(),
@@ -448,7 +447,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// A continuation without the sign that it begins with.
+/// Returns the name of a continuation without its leading sign.
 fn bare(field: &[u8]) -> &[u8] {
     let first = field.iter().position(|b| !b"+*".contains(b)).unwrap_or(field.len());
     field[first..].trim_ascii()
@@ -465,7 +464,7 @@ fn unclosed(name: &str) -> bool {
     name.chars().next().is_some_and(|quote| matches!(quote, '\'' | '"') && !name[1..].contains(quote))
 }
 
-/// Tabs go on to the next column that is a multiple of eight.
+/// Replaces tabs by blanks up to the next column that is a multiple of eight.
 fn without_tabs(line: &[u8]) -> Cow<'_, [u8]> {
     if memchr::memchr(b'\t', line).is_none() {
         return Cow::Borrowed(line);

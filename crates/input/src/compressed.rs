@@ -1,36 +1,37 @@
-//! Entries of matrices in binary files, whose arrays are there in full: checks of each, and compressed columns.
+//! Entries of matrices in binary files with complete arrays: checks of each entry, and compressed columns.
 
 use super::assemble::{ColumnEntries, Entry, Sides, assemble_columns, undeclared_triangle};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::RawMatrix;
 use std::path::Path;
 
-/// Compressed columns, or rows, as a file has them, indices from 0. Both become columns: for the symmetric
-/// matrices that are wanted they are the same.
+/// Compressed columns or rows as in a file, with indices from 0. Rows are read as columns: symmetric matrices have
+/// equal rows and columns.
 pub(super) struct Compressed<'a> {
     /// Number of columns.
     pub n: usize,
-    /// Whether they are rows: what follows is said of columns.
+    /// True for rows; the other fields then describe rows instead of columns.
     pub by_rows: bool,
-    /// Where each column begins among the entries, and their number.
+    /// Index of the first entry of each column, and the number of entries at the end.
     pub pointers: Vec<u64>,
     /// Name of the pointers in messages.
     pub pointers_name: &'static str,
-    /// Number of entries that the file has.
+    /// Number of entries in the file.
     pub entries: usize,
-    /// Row and value of an entry.
+    /// Function that returns row and value of an entry.
     pub entry: &'a dyn Fn(usize) -> (i64, f64),
-    /// How to write the file again.
+    /// Help for messages: the way to write the file again.
     pub help: &'static str,
-    /// How to write both triangles.
+    /// Help for messages: the way to write both triangles.
     pub both_triangles: &'static str,
 }
 
 impl Compressed<'_> {
-    /// The matrix; symmetry is not checked, but that both triangles are there.
+    /// Builds the matrix. Both triangles must be stored; symmetry is not checked.
     ///
     /// # Errors
-    /// FB301, FB303, FB304, FB306, FB307, FB312.
+    /// FB301, FB304 for pointers that do not fit the entries, FB303 for indices outside the matrix, FB306 for values
+    /// that are not finite, FB307 for a single triangle, FB312 if there is no nonzero entry.
     pub(super) fn assemble(self, path: &Path) -> Result<RawMatrix, Diagnostic> {
         self.check_pointers()?;
         let mut columns = ColumnEntries::with_room(self.n, self.entries);
@@ -67,7 +68,7 @@ impl Compressed<'_> {
     }
 }
 
-/// Checks the entries of a matrix one by one, and remembers on which sides of the diagonal they lie.
+/// Checks the entries of a matrix one by one, and records their sides of the diagonal.
 pub(super) struct EntryCheck {
     n: usize,
     help: &'static str,
@@ -75,15 +76,15 @@ pub(super) struct EntryCheck {
 }
 
 impl EntryCheck {
-    /// Of a matrix with `n` rows; `help` says how to write it again.
+    /// Creates the check for a matrix with `n` rows; `help` says how to write the matrix again.
     pub(super) fn new(n: usize, help: &'static str) -> Self {
         Self { n, help, sides: Sides::default() }
     }
 
-    /// The entry at (`row`, `column`), from 0.
+    /// Checks the entry at (`row`, `column`), from 0.
     ///
     /// # Errors
-    /// FB303 outside of the matrix, FB306 for a value that is not finite.
+    /// FB303 outside the matrix, FB306 for a value that is not finite.
     pub(super) fn entry(&mut self, row: i64, column: i64, value: f64) -> Result<Entry, Diagnostic> {
         let inside = |index: i64| (0..self.n as i64).contains(&index);
         if !inside(row) || !inside(column) {

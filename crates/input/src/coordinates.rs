@@ -1,6 +1,6 @@
-//! Lines `row column value`: the body of Matrix Market files, and all of what some FE programs write.
+//! Lines `row column value`: the body of Matrix Market files, and the complete matrix files of some FE programs.
 //!
-//! The text is cut at line ends into pieces that are parsed in parallel; pieces keep the order of the file.
+//! The text is cut at line ends into pieces that are parsed in parallel. Pieces keep the order of the file.
 
 use super::assemble::{Entry, Sides, check_size, refuse_beyond_memory};
 use super::digits::{COUNTED, written_digits};
@@ -19,20 +19,20 @@ pub(crate) use text::{Blocks, line_aligned, most_entries};
 /// Number of bad lines that are reported one by one.
 const SHOWN: usize = 5;
 
-/// The entries of a file, and what is wrong with its lines.
+/// Entries of a file, and the problems of its lines.
 pub(super) struct Coordinates {
     limits: Limits,
     /// Number of entries that the file announces, if it does.
     announced: Option<u64>,
-    /// The entries in file order.
+    /// Entries in file order.
     pub pieces: Vec<Vec<Entry>>,
-    /// Data lines so far, bad ones included.
+    /// Number of data lines so far, bad ones included.
     pub count: u64,
-    /// True if reading ended at an entry too many.
+    /// True if reading ended because of too many entries.
     pub stopped: bool,
-    /// Lines of the file so far.
+    /// Number of lines of the file so far.
     lines: usize,
-    /// The first bad lines with their numbers, from 1.
+    /// First bad lines with their numbers, from 1.
     bad: Vec<(usize, Diagnostic)>,
     bad_count: usize,
     /// First line with an entry below the diagonal.
@@ -44,7 +44,7 @@ pub(super) struct Coordinates {
 }
 
 impl Coordinates {
-    /// Nothing yet, below so many `lines` of a header.
+    /// Creates an empty list below a header of `lines` lines.
     pub(super) fn new(limits: Limits, announced: Option<u64>, lines: usize) -> Self {
         Self {
             limits,
@@ -61,11 +61,11 @@ impl Coordinates {
         }
     }
 
-    /// Reads the rest of a file: what follows the first `skip` bytes of the block `first`, and all `blocks`
-    /// after it. Says whether the file ends with a line end.
+    /// Reads the rest of a file: the bytes of the block `first` after the first `skip`, and all further `blocks`.
+    /// Returns true when the file ends with a line end, or reading stopped at too many entries.
     ///
     /// # Errors
-    /// FB103 for a compressed file that is damaged.
+    /// FB103 for a damaged compressed file.
     pub(super) fn read(
         &mut self,
         path: &Path,
@@ -90,10 +90,11 @@ impl Coordinates {
         }
     }
 
-    /// True if there are more entries than the file announces, or than any matrix of its rows has.
+    /// Returns true when there are more entries than the file announces.
     ///
     /// # Errors
-    /// FB601 where the number of entries is not announced, and those that were read leave no memory for others.
+    /// FB601 or the errors of [`check_size`] if the number of entries is not announced and exceeds the memory or that
+    /// of any matrix.
     fn is_too_much(&self) -> Result<bool, Vec<Diagnostic>> {
         if let Some(announced) = self.announced {
             return Ok(self.count > announced);
@@ -117,10 +118,10 @@ impl Coordinates {
             self.upper = self.upper.or(piece.upper.map(|line| line + before));
             self.written = self.written.max(piece.written);
             self.lines += piece.lines;
-            // A compressed file may hold any number of lines: keep no more than the header announces.
+            // A compressed file may hold any number of lines: no more are kept than the header announces.
             if self.announced.is_none_or(|announced| self.count <= announced) {
                 let mut entries = piece.entries;
-                // Lines without an entry leave room that is not needed.
+                // Lines without an entry leave unused capacity.
                 if entries.capacity() > 2 * entries.len() {
                     entries.shrink_to_fit();
                 }
@@ -133,12 +134,12 @@ impl Coordinates {
         }
     }
 
-    /// On which sides of the diagonal entries lie.
+    /// Returns the sides of the diagonal on which entries lie.
     pub(super) fn sides(&self) -> Sides {
         Sides { lower: self.lower.is_some(), upper: self.upper.is_some() }
     }
 
-    /// The bad lines, the first few one by one.
+    /// Returns diagnostics of the bad lines, the first few one by one.
     pub(super) fn bad_lines(&self, ends_with_newline: bool) -> Vec<Diagnostic> {
         let more = self.bad_count - self.bad.len();
         let told = |(k, (line, bad)): (usize, &(usize, Diagnostic))| {
@@ -155,7 +156,7 @@ impl Coordinates {
     }
 }
 
-/// A line, or its begin, printable.
+/// Returns the line, or its beginning, in printable form.
 pub(crate) fn excerpt(line: &[u8]) -> String {
     const SHOWN: usize = 60;
     match std::str::from_utf8(line) {

@@ -1,22 +1,21 @@
-//! How many decimal digits the values of a matrix really carry.
+//! The number of decimal digits that the values of a matrix really carry.
 //!
-//! FE programs write 6, 14 or 17 digits, and scripts copy a 14-digit value as 17 digits
-//! (`7.9642450142449999e+08` is 796424501.4245). The digits that matter are those of the shortest decimal
-//! number that reads back as the value.
+//! FE programs write 6, 14 or 17 digits, and scripts copy a 14-digit value as 17 digits (`7.9642450142449999e+08` is
+//! 796424501.4245). The relevant digits are those of the shortest decimal number that reads back as the value.
 
 use std::collections::HashSet;
 
-/// Entries looked at, evenly spread.
+/// Number of examined entries, evenly spread.
 const SAMPLES: usize = 20_000;
 
-/// From here on the digits of the values are believed without further evidence.
+/// Number of digits from which on the digits of the values are accepted without further evidence.
 const MANY: u8 = 10;
 
-/// Significant decimal digits (1 to 17) of `count` values of which `value(k)` gives the k-th; `written` is
-/// the largest number of digits in which the file writes one (17 for binary files).
+/// Returns the number of significant decimal digits (1 to 17) of `count` values; `value(k)` returns the k-th. `written`
+/// is the largest number of digits with which the file writes a value (17 for binary files).
 ///
-/// Few digits mean rounding only when there is evidence of it: the mass matrix of a uniform mesh holds a
-/// handful of exact short numbers. Such a matrix counts as exact (17).
+/// Few digits mean rounding only if there is evidence: the mass matrix of a uniform mesh holds a few exact short
+/// numbers. Such a matrix counts as exact (17).
 pub(super) fn significant_digits(count: usize, written: u8, value: impl Fn(usize) -> f64) -> u8 {
     let step = count.div_ceil(SAMPLES).max(1);
     let (mut digits, mut distinct) = (0u8, HashSet::new());
@@ -36,7 +35,7 @@ pub(super) fn significant_digits(count: usize, written: u8, value: impl Fn(usize
     }
 }
 
-/// Digits of the shortest decimal number that reads back as `v`.
+/// Returns the number of digits of the shortest decimal number that reads back as `v`.
 fn shortest(v: f64, text: &mut String) -> u8 {
     use std::fmt::Write;
     text.clear();
@@ -45,10 +44,10 @@ fn shortest(v: f64, text: &mut String) -> u8 {
     mantissa.bytes().filter(u8::is_ascii_digit).count() as u8
 }
 
-/// Numbers of a piece of a file whose written digits are counted.
+/// Number of values per piece of a file whose written digits are counted.
 pub(super) const COUNTED: usize = 512;
 
-/// Significant digits of a number as written: leading zeros and the exponent do not count.
+/// Returns the number of written significant digits: leading zeros and the exponent do not count.
 pub(super) fn written_digits(number: &[u8]) -> u8 {
     let mantissa = number.iter().take_while(|b| matches!(b, b'0'..=b'9' | b'.' | b'+' | b'-'));
     let digits = mantissa.filter(|b| b.is_ascii_digit()).skip_while(|&&b| b == b'0').count();

@@ -20,31 +20,31 @@ use std::path::{Path, PathBuf};
 
 pub(super) use columns::Point;
 
-/// Bad cards that are told one by one.
+/// Number of bad cards that are reported one by one.
 const SHOWN: usize = 5;
 
 /// Form of rectangular matrices, such as loads.
 const RECTANGULAR: i64 = 9;
 
-/// All matrices of a deck.
+/// All DMIG matrices of a deck.
 #[derive(Default)]
 pub(super) struct Dmigs {
     matrices: Vec<Dmig>,
     points: Vec<Point>,
     numbers: HashMap<Point, u32>,
     bad: Vec<Diagnostic>,
-    /// Files that were read for these matrices alone, without those that they include.
+    /// Files that were read only for these matrices, without the files that they include.
     pub files: Vec<SeenFile>,
 }
 
 struct Dmig {
     name: String,
     form: i64,
-    /// 1, 2: real numbers; complex ones are passed over.
+    /// Kind of the numbers: 1 and 2 are real; complex ones are skipped.
     kind: i64,
     path: PathBuf,
     line: usize,
-    /// In the order of the deck. Row and column are numbers of points.
+    /// Entries in the order of the deck; row and column are indices of points.
     pieces: Vec<Vec<Entry>>,
     written: u8,
 }
@@ -60,10 +60,11 @@ impl Dmig {
 }
 
 impl Dmigs {
-    /// Those of some files.
+    /// Reads the DMIG matrices of files.
     ///
     /// # Errors
-    /// FB101, FB106, FB110, FB301, FB302, as many as are found.
+    /// FB101, FB106 for files that cannot be read, FB110 for a deck that cannot be read, FB301 for bad cards, FB302 for
+    /// unsupported matrices, all that are found.
     pub(super) fn of(paths: &[PathBuf]) -> Result<Self, Vec<Diagnostic>> {
         let mut all = Self::default();
         for path in paths {
@@ -81,7 +82,7 @@ impl Dmigs {
         if bad.is_empty() { Ok(all) } else { Err(bad) }
     }
 
-    /// Takes a DMIG card.
+    /// Reads a DMIG card.
     pub(super) fn card(&mut self, card: &Card, path: &Path) {
         match card.field(1) {
             b"0" => {
@@ -97,11 +98,11 @@ impl Dmigs {
         }
     }
 
-    /// Takes DMIG cards that stand one below the other. Those of columns are read in parallel, some at a
-    /// time, and put together in the order of the file.
+    /// Reads consecutive DMIG cards. Cards of columns are read in parallel, a group at a time, and joined in the order
+    /// of the file.
     ///
     /// # Errors
-    /// FB110.
+    /// FB110 for cards that cannot be read.
     pub(super) fn cards(&mut self, lines: &MatrixLines<'_>) -> Result<(), Diagnostic> {
         let (bytes, path) = (lines.file.bytes(), lines.file.path());
         let at_once = 8 * rayon::current_num_threads();
@@ -130,12 +131,12 @@ impl Dmigs {
         Ok(())
     }
 
-    /// What columns have to know of the headers above them.
+    /// Returns name and kind of the matrices whose headers were read, for reading columns.
     fn heads(&self) -> Heads {
         self.matrices.iter().map(|matrix| (matrix.name.clone(), matrix.is_real())).collect()
     }
 
-    /// Takes columns that follow those that were taken.
+    /// Appends columns to those that were read.
     fn take(&mut self, all: Vec<Columns>) {
         let places: Vec<Vec<u32>> = all
             .iter()
@@ -148,7 +149,7 @@ impl Dmigs {
                 let own = &mut self.matrices[matrix];
                 own.written = own.written.max(written);
                 match entries.as_slice() {
-                    // Columns that come one by one.
+                    // Columns that come one by one are collected in larger pieces.
                     few if few.len() < 1 << 10 => few.iter().for_each(|entry| push(&mut own.pieces, *entry)),
                     _ => own.pieces.push(entries),
                 }
@@ -161,7 +162,7 @@ impl Dmigs {
         self.bad.extend(bad.filter(|_| self.bad.len() < SHOWN));
     }
 
-    /// The number of a point.
+    /// Returns the index of a point, which is created if necessary.
     fn number(&mut self, point: Point) -> u32 {
         let next = self.points.len() as u32;
         *self.numbers.entry(point).or_insert_with(|| {
@@ -170,26 +171,26 @@ impl Dmigs {
         })
     }
 
-    /// What is wrong with the cards.
+    /// Returns the diagnostics of the cards, and removes them.
     pub(super) fn take_bad(&mut self) -> Vec<Diagnostic> {
         std::mem::take(&mut self.bad)
     }
 
-    /// Names of the matrices, in the order of the deck.
+    /// Returns the names of the matrices, in the order of the deck.
     pub(super) fn names(&self) -> Vec<String> {
         self.matrices.iter().map(|matrix| matrix.name.clone()).collect()
     }
 
-    /// The matrices that may be K or M: square ones with entries; all if there are none.
+    /// Returns the indices of matrices that may be K or M: square ones with entries, or all if there are none.
     pub(super) fn candidates(&self) -> Vec<usize> {
-        // Entries of complex matrices are not kept.
+        // Entries of complex matrices are not stored.
         let has_entries = |own: &Dmig| own.count() > 0 || !own.is_real();
         let is_one = |k: &usize| self.matrices[*k].form != RECTANGULAR && has_entries(&self.matrices[*k]);
         let some: Vec<usize> = (0..self.matrices.len()).filter(is_one).collect();
         if some.is_empty() { (0..self.matrices.len()).collect() } else { some }
     }
 
-    /// The points that entries of some matrices which are not zero name, ascending.
+    /// Returns the points named by nonzero entries of the matrices `of`, ascending.
     pub(super) fn points(&self, of: &[usize]) -> Vec<Point> {
         let mut named = vec![false; self.points.len()];
         for entry in of.iter().flat_map(|&k| &self.matrices[k].pieces).flatten() {
@@ -204,12 +205,12 @@ impl Dmigs {
         points
     }
 
-    /// A matrix with its rows in the order of `points`, which ascend and hold all that its entries name. Its
-    /// entries are taken out: it can be had once.
+    /// Returns a matrix with its rows in the order of `points`, which ascend and contain every point that its entries
+    /// name. Its entries are moved out: the matrix can be taken once.
     ///
     /// # Errors
-    /// FB302 for matrices that are not square, FB307 for a triangle that is not declared, FB309 for entries
-    /// that are given twice, FB301, FB306, FB312.
+    /// FB302 for complex matrices and other forms, FB307 for an undeclared triangle, FB309 for duplicate entries, FB301
+    /// for more rows than the entries can fill, FB312 if there is no nonzero entry.
     pub(super) fn take_matrix(&mut self, k: usize, points: &[Point]) -> Result<RawMatrix, Diagnostic> {
         let own = &mut self.matrices[k];
         let (count, pieces) = (own.count(), std::mem::take(&mut own.pieces));
@@ -248,8 +249,7 @@ impl Dmigs {
         })
     }
 
-    /// Entries without zeros whose rows and columns are places in `points` instead of numbers, and their
-    /// sides.
+    /// Returns the nonzero entries with rows and columns as indices in `points`, and their sides of the diagonal.
     fn in_rows(&self, mut pieces: Vec<Vec<Entry>>, points: &[Point]) -> (Vec<Vec<Entry>>, Sides) {
         let row_of = |point| points.binary_search(point).map_or(u32::MAX, |row| row as u32);
         let row_of: Vec<u32> = self.points.par_iter().map(row_of).collect();
@@ -295,7 +295,7 @@ impl Dmigs {
     }
 }
 
-/// Label of a row. Scalar points have one direction.
+/// Returns the label of a row. Scalar points have direction 1.
 pub(super) fn label((node, component): Point) -> DofLabel {
     DofLabel { node, direction: component.max(1) }
 }
@@ -307,7 +307,7 @@ fn named((id, component): Point) -> String {
     }
 }
 
-/// The reader of matrices in punch files.
+/// Reader of matrices in punch files.
 pub(super) struct DmigPunch;
 
 impl Reader for DmigPunch {
@@ -327,8 +327,8 @@ impl Reader for DmigPunch {
         true
     }
 
-    /// Rows are the points that any matrix of the file names which may be one of K and M, ascending: not the
-    /// numbers of loads and other rectangular matrices.
+    /// Reads a matrix. Its rows are the points, ascending, of all matrices of the file that may be K or M. Points of
+    /// loads and other rectangular matrices are left out.
     fn read(&self, source: &MatrixSource<'_>) -> Outcome<RawMatrix> {
         let path = source.file.path();
         if source.compression != Compression::None {
@@ -353,7 +353,7 @@ mod tests {
     const NODES: i64 = 3000;
     const BAND: i64 = 6;
 
-    /// Two matrices of chains in large fields, K and M one below the other.
+    /// Returns a text of two matrices of chains in large fields, K and then M.
     fn punch() -> String {
         let mut text = String::from("$ a comment\n");
         for (name, scale) in [("KAAX", 1e9), ("MAAX", 1e-3)] {
@@ -413,7 +413,7 @@ mod tests {
         for threads in [1, 3] {
             let found = read(&(lines.join("\n") + "\n"), threads).expect_err("refused");
             let at: Vec<_> = found.iter().map(Diagnostic::line).collect();
-            // The first five.
+            // Only the first five are reported.
             assert_eq!(at, [0, 1, 2, 3, 4].map(|k| Some(bad[k] + 1)), "{found:?}");
         }
         let cut_off = read(text.trim_end(), 2).expect_err("refused");

@@ -1,4 +1,4 @@
-//! Sparse matrices in HDF5 files: opening, and finding the group that holds the matrix.
+//! Sparse matrices in HDF5 files: opens the file, and finds the group with the matrix.
 
 use super::named_matrices::NamedMatrices;
 use super::reader::{MatrixRole, MatrixSource, Reader};
@@ -21,12 +21,12 @@ pub(super) use exodus::read_exodus;
 use members::Members;
 use values::Found;
 
-/// The HDF5 reader.
+/// Reader of HDF5 files.
 pub(super) struct Hdf5;
 
 const NAMES: NamedMatrices = NamedMatrices { holder: "group", file: "FILE.h5", matrices: "sparse matrices" };
 
-/// Groups that are searched at most, and how deep: a file must not keep us busy.
+/// Largest number of groups that are searched, and their largest depth: a file must not make the search endless.
 const GROUPS: usize = 1000;
 const DEPTH: usize = 6;
 
@@ -66,7 +66,7 @@ impl Reader for Hdf5 {
     }
 }
 
-/// Opens a file by the HDF5 library, which loads no plugins.
+/// Opens a file with the HDF5 library, which loads no plugins.
 fn opened(file: &InputFile) -> Found<File> {
     without_plugins();
     by_utf8_name(file.path(), |path| File::open(path)).map_err(|e| {
@@ -75,7 +75,7 @@ fn opened(file: &InputFile) -> Found<File> {
     })
 }
 
-/// The group that the user named.
+/// Opens the group that the user named.
 fn named(file: &File, name: &str) -> Found<Group> {
     let mut group = file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])?;
     for part in name.split('/').filter(|part| !part.is_empty()) {
@@ -99,7 +99,7 @@ fn named(file: &File, name: &str) -> Found<Group> {
     Err(vec![layout(message).with_help(listing(&matrices(file)))])
 }
 
-/// The only matrix of the file, or the only one named after its role.
+/// Returns the only matrix of the file, or the only one named after its role.
 fn search(file: &File, role: MatrixRole) -> Found<(String, Group)> {
     let mut found = matrices(file);
     if found.is_empty() {
@@ -109,7 +109,7 @@ fn search(file: &File, role: MatrixRole) -> Found<(String, Group)> {
     Ok(found.swap_remove(chosen))
 }
 
-/// Names and groups of all sparse matrices of the file, breadth first.
+/// Returns names and groups of all sparse matrices of the file, breadth first.
 fn matrices(file: &File) -> Vec<(String, Group)> {
     let mut found = Vec::new();
     let mut level: Vec<(String, Group)> =
@@ -124,7 +124,7 @@ fn matrices(file: &File) -> Vec<(String, Group)> {
                 found.push((name, group));
                 continue;
             }
-            // MATLAB keeps its own things in groups that begin with `#`.
+            // MATLAB keeps internal data in groups that begin with `#`.
             for child in members.hard_links().filter(|child| !child.starts_with('#')) {
                 visited += 1;
                 if visited > GROUPS {

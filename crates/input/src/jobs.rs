@@ -1,5 +1,5 @@
-//! Models as FE programs write them: one file names the job, its other files stand beside it. One file per
-//! program behind [`JobReader`] and [`JOBS`].
+//! Models as FE programs write them: one file identifies the job, its other files are in the same folder. Each program
+//! has one file behind [`JobReader`] and [`JOBS`].
 
 mod abaqus;
 mod abaqus_rows;
@@ -31,20 +31,20 @@ use nastran::Nastran;
 pub(super) use nastran::nodes_of_bulk;
 use std::path::{Path, PathBuf};
 
-/// A job of an FE program: its main file, and the program where the user said which.
+/// Job of an FE program: its main file, and the program if the user named it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct JobFile {
-    /// Input deck of the job, or the file that the program's reader asks for.
+    /// Input deck of the job, or the file that the reader of the program expects.
     pub path: PathBuf,
-    /// Name of the program; `None`: by the content of the file and what stands beside it.
+    /// Name of the program; `None` if it follows from the content of the file and the files in its folder.
     pub program: Option<String>,
-    /// Names of the stiffness and the mass matrix, where the job has several pairs and the user said which.
+    /// Names of the stiffness and the mass matrix, if the user chose among several pairs.
     pub matrices: Option<[String; 2]>,
 }
 
 impl JobFile {
-    /// The main file, the files beside it that have its name, and that of the substructure which it names: a
-    /// run must not replace them.
+    /// Returns the files that a run must not replace: the main file, the matrix files with its name, and the file of
+    /// the substructure that it names.
     pub(super) fn family(&self) -> Vec<PathBuf> {
         const MATRICES: &[&str] = &[".sti", ".mas", ".dof", ".mtx", ".pch", ".op4"];
         let is_matrix = |rest: &str| MATRICES.iter().any(|extension| rest.ends_with(extension));
@@ -58,20 +58,20 @@ impl JobFile {
     }
 }
 
-/// What a job says of its model.
+/// Model of a job as read from its files.
 pub(super) struct JobModel {
     pub stiffness: RawMatrix,
     pub mass: RawMatrix,
     pub nodes: Nodes,
     /// Label of every matrix row.
     pub dofs: Vec<DofLabel>,
-    /// Maps from the rows of the files to the rows here.
+    /// Maps from the rows of the files to the rows of this model.
     pub given_rows: GivenRows,
-    /// Names are compared without regard to case.
+    /// Node sets; their names are compared without regard to case.
     pub sets: NodeSets,
-    /// Sets of which nobody knows the nodes.
+    /// Sets whose nodes are unknown.
     pub unresolved: Unresolved,
-    /// What the part is drawn by.
+    /// Elements by which the part is drawn.
     pub elements: Elements,
     /// Every file that was read, with its role.
     pub files: Vec<(&'static str, SeenFile)>,
@@ -82,41 +82,41 @@ pub(super) struct JobModel {
 /// A matrix and the file that it was read from.
 type FromFile = (RawMatrix, SeenFile);
 
-/// All that is wrong with a job.
+/// Result of reading a job; the error lists all problems.
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// Reads the jobs of one FE program.
+/// Reader of the jobs of one FE program.
 pub(super) trait JobReader: Sync {
-    /// Name of the program, as `--format` and the manifest take it.
+    /// Returns the name of the program for `--format` and the manifest.
     fn name(&self) -> &'static str;
 
-    /// What the reader needs, in words: the main file and what stands beside it.
+    /// Returns the files that the reader needs, in words: the main file and those in its folder.
     fn needs(&self) -> &'static str;
 
-    /// Whether the file at `path` is the main file of such a job.
+    /// Returns true when the file at `path` is the main file of such a job.
     fn recognises(&self, path: &Path) -> bool;
 
     /// Reads matrices, nodes, labels and sets.
     ///
     /// # Errors
-    /// FB101 to FB112, FB2xx and FB3xx, as many as are found.
+    /// FB101 to FB112 for files and decks, FB2xx for tables and nodes, FB3xx for matrices, all that are found.
     fn read(&self, job: &JobFile) -> Found<JobModel>;
 
-    /// True if the matrices of a job have names by which a user may choose.
+    /// Returns true when the matrices of a job have names by which a user may choose.
     fn names_matrices(&self) -> bool {
         false
     }
 }
 
-/// Every FE program whose jobs are read; the first that recognises a file takes it.
+/// Every FE program whose jobs are read. The first that recognises a file reads it.
 const JOBS: &[&dyn JobReader] = &[&Calculix, &Abaqus, &Nastran];
 
-/// Names of the FE programs whose jobs are read.
+/// Returns the names of the FE programs whose jobs are read.
 pub fn job_programs() -> impl Iterator<Item = &'static str> {
     JOBS.iter().map(|reader| reader.name())
 }
 
-/// Whether a path is that of a job: a keyword deck by its name, or what a reader recognises.
+/// Returns true when a path is that of a job: a keyword deck by its name, or a file that a reader recognises.
 pub fn is_job(path: &Path) -> bool {
     is_deck(path) || JOBS.iter().any(|reader| reader.recognises(path))
 }
@@ -124,7 +124,7 @@ pub fn is_job(path: &Path) -> bool {
 /// Reads a job.
 ///
 /// # Errors
-/// FB102 for a compressed file, FB108 when no reader knows the file, and those of [`JobReader::read`].
+/// FB102 for a compressed file, FB108 if no reader recognises the file, and the errors of [`JobReader::read`].
 pub(super) fn read_job(job: &JobFile) -> Found<JobModel> {
     let reader = match &job.program {
         Some(program) => JOBS.iter().find(|reader| reader.name() == program.as_str()),
@@ -156,10 +156,10 @@ fn unknown(job: &JobFile) -> Diagnostic {
     Diagnostic::new(Code::JobUnknown, message).in_file(&job.path).with_help(needed.join("; "))
 }
 
-/// The nodes, node sets and elements of a keyword deck.
+/// Returns the nodes, node sets and elements of a keyword deck.
 ///
 /// # Errors
-/// FB101, FB106, FB110, FB111.
+/// FB101, FB106 for files that cannot be read; FB110, FB111 for decks that cannot be read.
 pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
     let mesh = DeckMesh::of(&Deck::read(file.path())?)?;
     let elements = mesh.drawn();
@@ -168,29 +168,30 @@ pub(super) fn nodes_of_deck(file: &InputFile) -> Found<NodeFile> {
     Ok(NodeFile { nodes: Nodes { ids, positions }, sets, unresolved, elements, ..NodeFile::default() })
 }
 
-/// Whether a path is that of a keyword deck, by its name.
+/// Returns true when a path is that of a keyword deck, by its name.
 fn is_deck(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("inp"))
 }
 
-/// Files beside the main file of a job that are named like it, in any case: its stem, then a dot, an underscore
-/// or the like, or what Abaqus calls matrices. What follows the stem, in lower case, and the path.
+/// Returns the files in the folder of the main file of a job that are named like it, in any case: its stem, then a dot,
+/// an underscore or the like, or a matrix name of Abaqus. Each comes as the rest of its name after the stem, in lower
+/// case, and the path.
 fn siblings(main: &Path) -> impl Iterator<Item = (String, PathBuf)> {
     let own = beginning_alike(main).into_iter().filter(|file| file.is_own);
     own.map(|Beside { rest, path, .. }| (rest, path))
 }
 
-/// A file beside the main file of a job whose name begins with the stem of the job.
+/// File in the folder of the main file of a job whose name begins with the stem of the job.
 struct Beside {
-    /// The rest of its name, in lower case.
+    /// Rest of the name, in lower case.
     rest: String,
     path: PathBuf,
-    /// False for files of other decks, whose names go on (`job_2.op4` beside `job_2.bdf`), and those that a letter
-    /// or a number tells from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
+    /// False for files of other decks, whose names continue the stem (`job_2.op4` beside `job_2.bdf`), and for files
+    /// that a letter or a number distinguishes from the job (`job2.op4`, `job_2.op4`, `job_v2.op4`).
     is_own: bool,
 }
 
-/// Files beside the main file of a job whose names begin with its stem, in any case.
+/// Returns the files in the folder of the main file of a job whose names begin with its stem, in any case.
 fn beginning_alike(main: &Path) -> Vec<Beside> {
     let Some(stem) = main.file_stem().map(|stem| stem.to_string_lossy().to_lowercase()) else {
         return Vec::new();
@@ -206,9 +207,12 @@ fn beginning_alike(main: &Path) -> Vec<Beside> {
     };
     let all: Vec<(String, PathBuf)> = listed.filter_map(|file| rest_of(file.file_name())).collect();
     let decks: Vec<String> = all.iter().filter_map(|(rest, _)| stem_of_deck(rest)).collect();
+    // A file belongs to another deck if its name continues the stem of that deck.
     let goes_on = |rest: &str, deck: &String| {
         rest.strip_prefix(deck.as_str()).is_some_and(|more| !more.starts_with(char::is_alphanumeric))
     };
+    // A name that continues the stem by a letter or a version number belongs to another job, except for the matrices of
+    // Abaqus.
     let is_own = |rest: &str| {
         let name = rest.trim_start_matches(|c: char| !c.is_alphanumeric());
         let version = name.strip_prefix('v').unwrap_or(name);
@@ -221,14 +225,14 @@ fn beginning_alike(main: &Path) -> Vec<Beside> {
     all.into_iter().map(beside).collect()
 }
 
-/// Returns the part of the stem of another deck behind the stem of the job; `rest` is that part of its file name.
+/// Returns the part of the stem of another deck after the stem of the job; `rest` is that part of its file name.
 fn stem_of_deck(rest: &str) -> Option<String> {
     const DECKS: &[&str] = &[".inp", ".bdf", ".dat", ".nas"];
     let stem = DECKS.iter().find_map(|extension| rest.strip_suffix(extension))?;
     (!stem.is_empty()).then(|| stem.to_owned())
 }
 
-/// Both of two, or all that is wrong with them.
+/// Returns both values, or the errors of both.
 fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
     match (a, b) {
         (Ok(a), Ok(b)) => Ok((a, b)),
@@ -236,7 +240,7 @@ fn both<A, B>(a: Found<A>, b: Found<B>) -> Found<(A, B)> {
     }
 }
 
-/// FB119: what is exact of a body whose matrices are condensed to some of its nodes.
+/// Returns FB119: the quantities that are exact for a body whose matrices are condensed to some of its nodes.
 fn condensed(nodes: usize, stiffness: &Path) -> Diagnostic {
     let message = format!(
         "the matrices are condensed to {nodes} nodes: mass, I0, C1, C2 and frequencies are those of the condensed model, W0 to W3 know only how these nodes move"
@@ -244,7 +248,7 @@ fn condensed(nodes: usize, stiffness: &Path) -> Diagnostic {
     Diagnostic::new(Code::JobCondensed, message).in_file(stiffness)
 }
 
-/// FB109: a part of a job is missing.
+/// Returns FB109: a part of a job is missing.
 fn missing(path: &Path, what: &str, help: &str) -> Diagnostic {
     Diagnostic::new(Code::JobIncomplete, format!("{what} is missing")).in_file(path).with_help(help)
 }

@@ -1,5 +1,5 @@
-//! Numbers of a matrix that are kept in a file instead of in memory. The system reads them when they are touched
-//! and forgets them when memory is short, so that a matrix may be larger than that.
+//! Numbers of a matrix that are stored in a file instead of in memory. The operating system reads them on access and
+//! discards them when memory is short, so that a matrix may be larger than the memory.
 
 use super::assemble::Entry;
 use bytemuck::{AnyBitPattern, NoUninit};
@@ -14,16 +14,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tempfile::tempfile_in;
 
-/// Bytes that are written at a time.
+/// Number of bytes that are written at a time.
 const PIECE: usize = 1 << 20;
 
-/// What is kept so.
+/// Type of stored numbers.
 pub(super) trait Number: AnyBitPattern + NoUninit + Send + Sync + UnwindSafe + RefUnwindSafe {}
 
 impl Number for u32 {}
 impl Number for f64 {}
 
-/// Numbers on their way into a file without a name, which goes when nobody needs it any more.
+/// Numbers that are written to a file without a name, which disappears with its last use.
 pub(super) struct Kept<T> {
     out: BufWriter<File>,
     folder: PathBuf,
@@ -32,27 +32,29 @@ pub(super) struct Kept<T> {
 }
 
 impl<T: Number> Kept<T> {
-    /// In a file in `folder`.
+    /// Creates a file in `folder`.
     ///
     /// # Errors
-    /// FB104 when none can be made there.
+    /// FB104 if no file can be created.
     pub(crate) fn new(folder: &Path) -> Result<Self, Diagnostic> {
         let file = tempfile_in(folder).map_err(|e| unwritable(folder, &e))?;
         let out = BufWriter::with_capacity(PIECE, file);
         Ok(Self { out, folder: folder.to_owned(), count: 0, numbers: PhantomData })
     }
 
+    /// Appends a number.
+    ///
     /// # Errors
-    /// FB104 when the disk is full.
+    /// FB104 if the disk is full.
     pub(crate) fn push(&mut self, number: T) -> Result<(), Diagnostic> {
         self.count += 1;
         self.out.write_all(bytemuck::bytes_of(&number)).map_err(|e| unwritable(&self.folder, &e))
     }
 
-    /// All of them, in the order in which they came.
+    /// Returns all numbers, in the order in which they were appended.
     ///
     /// # Errors
-    /// FB104 when the disk is full, FB101 when the file cannot be read again.
+    /// FB104 if the disk is full, FB101 if the file cannot be read again.
     pub(crate) fn lend(self) -> Result<Stored<T>, Diagnostic> {
         if self.count == 0 {
             return Ok(Vec::new().into());
@@ -63,7 +65,7 @@ impl<T: Number> Kept<T> {
     }
 }
 
-/// Compressed columns on their way into files.
+/// Compressed columns that are written to files.
 pub(super) struct KeptColumns {
     col_ptr: Vec<usize>,
     rows: Kept<u32>,
@@ -74,15 +76,19 @@ pub(super) struct KeptColumns {
 }
 
 impl KeptColumns {
+    /// Creates the files in `folder` for a matrix of `n` columns.
+    ///
     /// # Errors
-    /// As [`Kept::new`].
+    /// The errors of [`Kept::new`].
     pub(crate) fn new(folder: &Path, n: usize) -> Result<Self, Diagnostic> {
         let (rows, values) = (Kept::new(folder)?, Kept::new(folder)?);
         Ok(Self { col_ptr: vec![0; n + 1], rows, values, last: None, ascends: true })
     }
 
+    /// Appends an entry.
+    ///
     /// # Errors
-    /// As [`Kept::push`].
+    /// The errors of [`Kept::push`].
     pub(crate) fn push(&mut self, entry: Entry) -> Result<(), Diagnostic> {
         let at = Some((entry.col, entry.row));
         self.ascends &= self.last < at;
@@ -92,10 +98,10 @@ impl KeptColumns {
         self.values.push(entry.value)
     }
 
-    /// The matrix; `None` where entries did not come sorted, or one came twice.
+    /// Returns the matrix; `None` if entries did not come sorted, or one came twice.
     ///
     /// # Errors
-    /// As [`Kept::lend`].
+    /// The errors of [`Kept::lend`].
     pub(crate) fn compress(mut self) -> Result<Option<CscMatrix>, Diagnostic> {
         if !self.ascends {
             return Ok(None);
@@ -113,8 +119,9 @@ fn unwritable(folder: &Path, error: &std::io::Error) -> Diagnostic {
     Diagnostic::new(Code::OutputUnwritable, message)
 }
 
-// The one exception to `unsafe_code = "deny"` in this room: a memory map is sound only while nobody truncates the file
-// under it. The files of this module have no name: no other program can open them, and nothing here writes to them.
+// The one exception to `unsafe_code = "deny"` in this crate: a memory map is safe only while no program truncates its
+// file. The files of this module have no name: no other program can open them, and this module does not write to them
+// after mapping.
 #[allow(unsafe_code)]
 fn mapped(file: &File, folder: &Path) -> Result<Mmap, Diagnostic> {
     // SAFETY: the map is read-only and private to this module, and the file has no name.
@@ -123,10 +130,10 @@ fn mapped(file: &File, folder: &Path) -> Result<Mmap, Diagnostic> {
     })
 }
 
-/// A file of numbers.
+/// Mapped file of numbers.
 struct Lent<T> {
     map: Mmap,
-    /// Open as long as it is mapped.
+    /// File that stays open while it is mapped.
     _file: File,
     numbers: PhantomData<T>,
 }

@@ -1,6 +1,6 @@
-//! Reading: manifest, matrices, tables of nodes and degrees of freedom, jobs of FE programs. One file per
-//! matrix format behind [`Reader`] and [`READERS`], one per FE program in `jobs`; the contracts users see
-//! are `docs/input.md` and `docs/fe_programs.md`.
+//! Reads manifests, matrices, tables of nodes and degrees of freedom, and jobs of FE programs. Each matrix format has
+//! one file behind [`Reader`] and [`READERS`], each FE program one in `jobs`. The contracts with users are
+//! `docs/input.md` and `docs/fe_programs.md`.
 
 #![deny(
     clippy::exit,

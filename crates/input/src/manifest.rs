@@ -22,16 +22,16 @@ const MODEL: &[&str] = &["name", "dimension", "units", "allow_implausible"];
 const UNITS: &[&str] = &["length", "mass", "time"];
 const FILES: &[&str] = &["stiffness", "mass", "nodes", "dofs", "job", "program", "matrices", "mesh"];
 
-/// Reads a manifest. Relative paths in it are taken from its folder. The files themselves are not touched.
+/// Reads a manifest. Relative paths in it are taken from its folder. The files that it names are not opened.
 ///
 /// # Errors
-/// FB101, FB106 when it cannot be read; FB201 for syntax, unknown, missing or mistyped keys; FB202 for units;
-/// FB205 for nodes listed twice in an interface. All of them, in the order of lines.
+/// FB101, FB106 if it cannot be read; FB201 for syntax, unknown, missing or mistyped keys; FB202 for units; FB205 for
+/// nodes listed twice in an interface. All errors are reported, in the order of lines.
 pub fn read_manifest(path: impl AsRef<Path>) -> Result<ModelFiles> {
     read_toml(path.as_ref(), "manifest", Code::ManifestSyntax, |walk, top| ManifestWalk(walk).model(top))
 }
 
-/// The walk through a manifest: the methods that read its tables stand beside the types they fill.
+/// Walk through a manifest. The methods that read its tables are defined next to the types that they return.
 struct ManifestWalk<'w, 'a>(&'w mut Walk<'a>);
 
 impl<'a> Deref for ManifestWalk<'_, 'a> {
@@ -49,7 +49,7 @@ impl DerefMut for ManifestWalk<'_, '_> {
 }
 
 impl ManifestWalk<'_, '_> {
-    /// `None` only with something in `found`.
+    /// Reads the manifest. `None` means that `found` has errors.
     fn model(&mut self, top: &TomlTable) -> Option<ModelFiles> {
         self.known_keys(top, "the manifest", TOP);
         let model = self.table(top, "model");
@@ -96,7 +96,7 @@ impl ManifestWalk<'_, '_> {
         })
     }
 
-    /// Where the matrices come from: a file each, or a job.
+    /// Reads the source of the matrices: one file each, or a job.
     fn source(&mut self, files: &TomlTable, span: Range<usize>) -> Option<ModelSource> {
         self.known_keys(files, "[files]", FILES);
         let folder = self.path.parent().unwrap_or(Path::new("")).to_path_buf();
@@ -131,7 +131,7 @@ impl ManifestWalk<'_, '_> {
         }))
     }
 
-    /// The names of stiffness and mass matrix among those of a job.
+    /// Reads the names of stiffness and mass matrix among those of a job.
     fn matrix_names(&mut self, files: &TomlTable) -> Option<[String; 2]> {
         let value = files.get("matrices")?;
         let names = value.get_ref().as_array().map(|all| {
@@ -183,7 +183,7 @@ impl ManifestWalk<'_, '_> {
         UnitSystem::parse(length, mass, time).ok()
     }
 
-    /// The name of one unit, or its factor to SI as it is written.
+    /// Reads the name of one unit, or its factor to SI as written.
     fn unit(&mut self, table: &TomlTable, key: &str, span: Range<usize>) -> Option<String> {
         let Some(value) = table.get(key) else {
             let message = format!("key `{key}` is missing in [model.units]");
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use flexbody_model::DAMPING_BAND_KEYS;
 
-    /// The schema and the reader name the same keys.
+    /// Schema and reader must name the same keys.
     #[test]
     fn schema_lists_the_keys_of_the_reader() {
         let schema: serde_json::Value =

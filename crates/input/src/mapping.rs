@@ -1,4 +1,4 @@
-//! Which degree of freedom each matrix row is: our table, or what Ansys writes beside its matrices.
+//! The degree of freedom of each matrix row: the table of this program, or files that Ansys writes with its matrices.
 
 use super::matrix_market::read_array;
 use super::scanner::{Lines, words};
@@ -12,20 +12,20 @@ use std::path::Path;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// What a file says of the rows.
+/// Content of a file about the rows.
 pub(super) enum Mapping {
-    /// The label of every row.
+    /// Label of every row.
     Labels(Vec<DofLabel>),
-    /// The nodes in the order of the rows, each with as many directions as fit (`*EXPORT` of Ansys).
+    /// Nodes in the order of the rows, each with an equal number of directions (`*EXPORT` of Ansys).
     Nodes(Vec<i64>),
 }
 
 impl Mapping {
-    /// Reads a table of labels (`node,dir`), a Matrix Market array of node numbers, or lines `row node
-    /// direction` with directions such as `UX` (the mapping of `HBMAT`).
+    /// Reads a table of labels (`node,dir`), a Matrix Market array of node numbers, or lines `row node direction` with
+    /// directions such as `UX` (the mapping of `HBMAT`).
     ///
     /// # Errors
-    /// FB203 to FB208, FB301, FB302.
+    /// FB203 to FB208 for a table that is not valid, FB301, FB302 for an array that is not valid.
     pub(super) fn read(file: &InputFile) -> Found<Self> {
         let bytes = file.bytes();
         if bytes.get(..14).is_some_and(|start| start.eq_ignore_ascii_case(b"%%MatrixMarket")) {
@@ -37,10 +37,10 @@ impl Mapping {
         }
     }
 
-    /// The labels of a matrix of `n` rows.
+    /// Returns the labels of a matrix of `n` rows.
     ///
     /// # Errors
-    /// FB402 where the nodes do not share the rows equally.
+    /// FB402 if the rows are not an equal number (2, 3 or 6) for each node.
     pub(super) fn labels(self, n: usize, path: &Path) -> Found<Vec<DofLabel>> {
         let nodes = match self {
             Self::Labels(labels) => return Ok(labels),
@@ -74,15 +74,15 @@ fn node_array(file: &InputFile) -> Found<Vec<i64>> {
     array.values.iter().map(whole).collect()
 }
 
-/// Labels of lines `row node direction`, whose directions have names; `None` where a line is not of that
-/// form, or a row is missing.
+/// Reads labels from lines `row node direction` with named directions; returns `None` if a line has another form, or a
+/// row is missing.
 fn named_directions(bytes: &[u8]) -> Option<Vec<DofLabel>> {
     const NAMES: [&str; 6] = ["UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"];
     let mut rows: Vec<(i64, DofLabel)> = Vec::new();
     for line in Lines::of(bytes) {
         let words: Vec<&[u8]> = words(line.text).collect();
         let &[row, node, name] = words.as_slice() else {
-            // Heads and blank lines stand above the first row.
+            // Headings and blank lines may precede the first row.
             if rows.is_empty() || words.is_empty() {
                 continue;
             }

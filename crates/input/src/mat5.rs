@@ -13,10 +13,10 @@ mod variable;
 use elements::{Found, Order};
 use variable::{Variable, VariableKind};
 
-/// The reader of MAT-files.
+/// Reader of MAT-files.
 pub(super) struct Mat5;
 
-/// Text and order of bytes.
+/// Number of bytes of the header: text, version and byte order.
 const HEADER: usize = 128;
 /// Kinds of elements that are variables.
 const MATRIX: u32 = 14;
@@ -34,7 +34,7 @@ impl Reader for Mat5 {
         &["mat"]
     }
 
-    /// A file with the version and the order of bytes where they stand behind 124 bytes of text.
+    /// Recognises a file by version and byte order after 124 bytes of text.
     fn recognises(&self, head: &[u8]) -> bool {
         Order::of(head).is_some()
     }
@@ -58,7 +58,7 @@ impl Reader for Mat5 {
     }
 }
 
-/// What the file holds.
+/// Reads the heads of all variables of the file.
 fn variables(bytes: &[u8], order: Order) -> Found<Vec<Variable<'_>>> {
     let mut variables = Vec::new();
     let mut rest = &bytes[HEADER..];
@@ -73,7 +73,7 @@ fn variables(bytes: &[u8], order: Order) -> Found<Vec<Variable<'_>>> {
         match kind {
             MATRIX => variables.push(Variable::open(body, false, order)?),
             COMPRESSED => variables.push(Variable::open(body, true, order)?),
-            // Contents that are none of ours.
+            // Elements of other kinds are skipped.
             _ => {}
         }
         rest = after;
@@ -81,7 +81,7 @@ fn variables(bytes: &[u8], order: Order) -> Found<Vec<Variable<'_>>> {
     Ok(variables)
 }
 
-/// The variable that the user named.
+/// Returns the variable that the user named.
 fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Found<&'v Variable<'a>> {
     let path = name.trim_matches('/');
     let outer = path.split('/').next().unwrap_or(path);
@@ -107,8 +107,8 @@ fn named<'v, 'a>(variables: &'v [Variable<'a>], name: &str) -> Found<&'v Variabl
     }
 }
 
-/// The only sparse matrix, or the only one named after its role; in a file without sparse matrices the same of
-/// square full ones.
+/// Returns the only sparse matrix, or the only one named after its role; in a file without sparse matrices, the only
+/// square full one or the one named after its role.
 fn search<'v, 'a>(variables: &'v [Variable<'a>], role: MatrixRole) -> Found<&'v Variable<'a>> {
     let sparse: Vec<&Variable<'a>> = variables.iter().filter(|v| v.kind == VariableKind::Sparse).collect();
     let is_full = |v: &&Variable<'a>| v.kind == VariableKind::Full && v.rows == v.columns && v.rows > 1;

@@ -14,7 +14,7 @@ mod header;
 pub(super) use array::read_array;
 use header::{Header, Symmetry};
 
-/// The Matrix Market reader.
+/// Reader of Matrix Market files.
 pub(super) struct MatrixMarket;
 
 impl Reader for MatrixMarket {
@@ -71,11 +71,11 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Vec<Diagnos
     assemble(header.rows as usize, body.pieces, stored, body.written, path).map_err(|d| vec![d])
 }
 
-/// Largest number of entries that can stand in the file, whatever it announces.
+/// Returns the largest number of entries that the file can hold, whatever it announces.
 fn possible_entries(source: &MatrixSource<'_>) -> u64 {
     /// Bytes of the shortest line, `1 1 1`, with its end.
     const SHORTEST_LINE: u64 = 6;
-    /// Deflate does not shrink data further.
+    /// Largest ratio by which deflate shrinks data.
     const GZIP_RATIO: u64 = 1032;
     let unpacked = match source.compression {
         Compression::None => source.file.length(),

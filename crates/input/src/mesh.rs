@@ -1,4 +1,4 @@
-//! The surface that a part is drawn by, out of the elements of its files.
+//! The surface by which a part is drawn, from the elements of its files.
 
 use super::node_files::NodeFile;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -6,31 +6,30 @@ use flexbody_model::{Elements, Nodes, Skin, SurfaceMesh, extents, skin};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Nodes of a mesh may be this far from those of the model, relative to the largest extent of the model:
-/// meshes are written with few digits.
+/// Largest distance of a node of a mesh from the node of the model, relative to the largest extent of the model: meshes
+/// are written with few digits.
 const APART: f64 = 1e-3;
 
-/// Kinds of elements that a message names.
+/// Number of kinds of elements that a message names.
 const NAMED: usize = 6;
 
-/// What the surface of a model is made of.
+/// Sources of the surface of a model.
 pub(super) struct MeshReading<'m> {
     pub nodes: &'m Nodes,
     /// Elements that were read with the nodes.
     pub elements: &'m Elements,
-    /// The file of the nodes.
+    /// File of the nodes.
     pub path: &'m Path,
 }
 
-/// A surface, and what it lacks.
+/// Surface with notes about missing elements, or errors.
 type Found = Result<(Option<SurfaceMesh>, Vec<Diagnostic>), Vec<Diagnostic>>;
 
 impl MeshReading<'_> {
-    /// The surface, by the elements of the file `from` where there is one, else by those read with the
-    /// nodes.
+    /// Returns the surface by the elements of the file `from`, else by the elements that were read with the nodes.
     ///
     /// # Errors
-    /// FB125 when `from` is not a mesh on the nodes of the model.
+    /// FB125 if `from` is not a mesh on the nodes of the model.
     pub(crate) fn mesh(&self, from: Option<(&NodeFile, &Path)>) -> Found {
         let Some((mesh, path)) = from else {
             return Ok(self.drawn(self.elements, self.path));
@@ -49,7 +48,7 @@ impl MeshReading<'_> {
         }
     }
 
-    /// A node of a mesh that lies elsewhere in the model.
+    /// Returns a message about a node of a mesh with another position in the model; `None` if there is none.
     fn stranger(&self, mesh: &Nodes) -> Option<String> {
         let index: HashMap<i64, usize> = self.nodes.ids.iter().copied().zip(0..).collect();
         let allowed = APART * extents(&self.nodes.positions).into_iter().fold(0.0, f64::max);

@@ -1,4 +1,4 @@
-//! Modes as FE programs write them, by nodes and with their eigenvalues. One file per format, each told by
+//! Modes as FE programs write them, by nodes and with their eigenvalues. Each format has one file and is recognised by
 //! its content.
 
 mod ansys_list;
@@ -16,13 +16,13 @@ use table::ModeTable;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// A format of files of modes.
+/// Format of files of modes.
 struct Format {
     recognises: fn(&[u8]) -> bool,
     read: fn(&InputFile) -> Found<ModeTable>,
 }
 
-/// The first that recognises the begin of a file reads it.
+/// Formats of files of modes. The first that recognises the beginning of a file reads it.
 const FORMATS: &[Format] = &[
     Format { recognises: frd::recognises, read: frd::read },
     Format { recognises: op2::recognises, read: op2::read },
@@ -30,13 +30,14 @@ const FORMATS: &[Format] = &[
     Format { recognises: ansys_list::recognises, read: ansys_list::read },
 ];
 
-/// Number of bytes that formats are told by.
+/// Number of bytes by which formats are recognised.
 const HEAD: usize = 4096;
 
-/// The modes of a file; `None` of a file in none of the formats. `role` names it in the provenance.
+/// Reads the modes of a file; returns `None` for a file of another format. `role` is the role of the file in the
+/// provenance.
 ///
 /// # Errors
-/// FB128 for what cannot be read, FB306 for values that are not finite.
+/// FB128 for a file that cannot be read, FB306 for values that are not finite.
 pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Found<RawModes>> {
     let bytes = file.bytes();
     let head = &bytes[..bytes.len().min(HEAD)];
@@ -51,17 +52,17 @@ pub(super) fn read_modes(file: &InputFile, role: &str) -> Option<Found<RawModes>
     Some((format.read)(file).and_then(modes))
 }
 
-/// FB128 at a line.
+/// Returns FB128 at a line.
 fn syntax(file: &InputFile, line: usize, message: impl Into<String>) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).at_line(line)]
 }
 
-/// FB128 of a file as a whole.
+/// Returns FB128 about a file as a whole.
 fn unreadable(file: &InputFile, message: impl Into<String>, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::ModeFileSyntax, message).in_file(file.path()).with_help(help)]
 }
 
-/// FB128 for a line that is not what was expected.
+/// Returns FB128 for a line of an unexpected form.
 fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
     vec![expected(Code::ModeFileSyntax, what, found).in_file(file.path()).at_line(line)]
 }

@@ -1,4 +1,4 @@
-//! Which files make up a model.
+//! The files of a model.
 
 use super::jobs::JobFile;
 use super::region::Region;
@@ -9,48 +9,49 @@ use flexbody_model::{Coupling, Damping, GeometricStiffness, Reference};
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// The files of one model and what is said about them, from a manifest or from the command line.
+/// Files of a model with their settings, from a manifest or from the command line.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelFiles {
     /// Name of the model.
     pub name: String,
-    /// 3 or 2.
+    /// Number of dimensions: 3 or 2.
     pub dimension: u8,
     /// Units of the numbers in the files.
     pub units: UnitSystem,
-    /// Whether findings that a person has looked at are warnings: see [`RawModel`](flexbody_model::RawModel).
+    /// True if implausible properties that a person has checked are warnings: see
+    /// [`RawModel`](flexbody_model::RawModel).
     pub allow_implausible: bool,
-    /// Where matrices, nodes and labels come from.
+    /// Source of matrices, nodes and labels.
     pub source: ModelSource,
-    /// File whose elements the part is drawn by, where it is not the one of the nodes.
+    /// File whose elements draw the part, if it is not the file of the nodes.
     pub mesh: Option<PathBuf>,
     /// Named node sets.
     pub interfaces: Vec<InterfaceSource>,
-    /// Damping, where it is given.
+    /// Damping, if it is given.
     pub damping: Option<Damping<MatrixLocation>>,
     /// Geometric stiffness of unit loads.
     pub geometric_stiffness: Vec<GeometricStiffness<MatrixLocation>>,
-    /// Loads whose static responses are to join the modes.
+    /// Loads whose static responses join the modes.
     pub residual_vectors: Vec<LoadSource>,
-    /// The manifest, when there is one.
+    /// Path of the manifest, if there is one.
     pub manifest: Option<PathBuf>,
-    /// SHA-256 of the manifest as it was parsed, lowercase hex.
+    /// SHA-256 of the manifest as it was parsed, in lowercase hex.
     pub manifest_sha256: Option<String>,
-    /// The folder in which the numbers of K and M are kept, in files that go with them, instead of in memory:
-    /// those of sorted compressed columns in HDF5. `None`: all are held in memory.
+    /// Folder in which the numbers of K and M are stored, in temporary files instead of in memory. This applies to
+    /// sorted compressed columns in HDF5. `None`: all numbers are held in memory.
     pub keep_in: Option<PathBuf>,
 }
 
-/// Where matrices, nodes and labels of a model come from.
+/// Source of matrices, nodes and labels of a model.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ModelSource {
-    /// A file each.
+    /// One file each.
     Tables(TableFiles),
-    /// What an FE program has written.
+    /// Output of an FE program.
     Job(JobFile),
 }
 
-/// Matrices and tables in files of their own.
+/// Matrices and tables in separate files.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableFiles {
     /// Stiffness matrix K.
@@ -59,18 +60,18 @@ pub struct TableFiles {
     pub mass: MatrixLocation,
     /// Node table.
     pub nodes: PathBuf,
-    /// Labels of the matrix rows; without it node-major x, y, z in the order of the node table.
+    /// Labels of the matrix rows; without it rows are node-major x, y, z in the order of the node table.
     pub dofs: Option<PathBuf>,
 }
 
-/// An interface and where its nodes are listed.
+/// Interface and the source of its nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct InterfaceSource {
     /// Name, unique within the model.
     pub name: String,
     /// Nodes of the interface.
     pub nodes: InterfaceNodes,
-    /// How it is coupled to its reference point, where that is said.
+    /// Coupling to the reference point, if it is given.
     pub coupling: Option<Coupling>,
     /// Reference point of the interface.
     pub reference: Reference,
@@ -89,7 +90,7 @@ pub enum InterfaceNodes {
     Region(Region),
 }
 
-/// Loads of residual vectors and where they come from.
+/// Loads of residual vectors and their source.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LoadSource {
     /// The six centrifugal loads.
@@ -98,22 +99,22 @@ pub enum LoadSource {
     Interfaces,
     /// Nodal forces by matrix rows in a file.
     File(MatrixLocation),
-    /// Loads whose responses at a frequency are wanted instead of the static ones.
+    /// Loads whose responses at a frequency replace the static ones.
     At {
-        /// The loads, not these again.
+        /// Loads without a frequency.
         loads: Box<LoadSource>,
-        /// Positive; in hertz.
+        /// Frequency in hertz, positive.
         hertz: f64,
     },
 }
 
 impl LoadSource {
-    /// The same loads at a frequency; static at zero.
+    /// Returns the loads at a frequency; at zero hertz the static loads themselves.
     pub fn at(self, hertz: f64) -> Self {
         if hertz == 0.0 { self } else { Self::At { loads: Box::new(self), hertz } }
     }
 
-    /// The file that they come from.
+    /// Returns the file of the loads, if they come from one.
     pub fn file(&self) -> Option<&MatrixLocation> {
         match self {
             Self::Centrifugal | Self::Interfaces => None,
@@ -122,7 +123,7 @@ impl LoadSource {
         }
     }
 
-    /// `NAME@HZ` in its parts; the frequency is zero where the text names none.
+    /// Splits `NAME@HZ` into its parts; the frequency is zero if the text names none.
     ///
     /// ```
     /// use flexbody_input::LoadSource;
@@ -135,17 +136,17 @@ impl LoadSource {
     }
 }
 
-/// A matrix file and, for formats that hold several matrices, the group within it.
+/// Matrix file and, for formats with several matrices, the group within it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MatrixLocation {
     /// The file.
     pub path: PathBuf,
-    /// Group within the file, with its leading `/`; `None`: the only one, or the one named after its role.
+    /// Group within the file, with its leading `/`; `None` for the only one, or the one named after its role.
     pub group: Option<String>,
 }
 
 impl MatrixLocation {
-    /// Reads `FILE` or `FILE:/group`. A single letter before the `:/` is a Windows drive, not a file.
+    /// Parses `FILE` or `FILE:/group`. A single letter before the `:/` is a Windows drive, not a file.
     ///
     /// ```
     /// use flexbody_input::MatrixLocation;
@@ -165,7 +166,7 @@ impl MatrixLocation {
         Self { path: text.into(), group: None }
     }
 
-    /// The same, with a relative path taken from `folder`.
+    /// Returns the location with a relative path taken from `folder`.
     pub fn relative_to(mut self, folder: &Path) -> Self {
         self.path = folder.join(self.path);
         self
@@ -180,7 +181,7 @@ impl std::fmt::Display for MatrixLocation {
 }
 
 impl ModelFiles {
-    /// The files of the matrices and tables; `None` of a job.
+    /// Returns the files of the matrices and tables; `None` for a job.
     pub fn tables(&self) -> Option<&TableFiles> {
         match &self.source {
             ModelSource::Tables(tables) => Some(tables),
@@ -188,8 +189,8 @@ impl ModelFiles {
         }
     }
 
-    /// Every file that they name, but those of [`ModelFiles::residual_vectors`], which a conversion may
-    /// replace. Of a job, the main file and those beside it that have its name.
+    /// Returns every named file except those of [`ModelFiles::residual_vectors`], which a conversion may replace. For a
+    /// job these are the main file and the files in its folder with its name.
     pub fn paths(&self) -> Vec<PathBuf> {
         let interfaces = self.interfaces.iter().filter_map(|interface| match &interface.nodes {
             InterfaceNodes::File(path) => Some(path.clone()),
@@ -212,11 +213,11 @@ impl ModelFiles {
             .collect()
     }
 
-    /// The job of an FE program without a manifest, named after its main file; `units` as in
+    /// Creates the files of a job of an FE program without a manifest, named after its main file. `units` is as in
     /// [`ModelFiles::from_arguments`].
     ///
     /// # Errors
-    /// FB202 when the units are not three known ones.
+    /// FB202 if the units are not three known ones.
     pub fn from_job(
         path: impl Into<PathBuf>,
         program: Option<String>,
@@ -247,11 +248,11 @@ impl ModelFiles {
         })
     }
 
-    /// A three-dimensional model without a manifest, named after its stiffness file; `units` is
+    /// Creates the files of a three-dimensional model without a manifest, named after its stiffness file. `units` is
     /// `length,mass,time` as in `m,kg,s`.
     ///
     /// # Errors
-    /// FB202 when the units are not three known ones.
+    /// FB202 if the units are not three known ones.
     pub fn from_arguments(
         stiffness: impl AsRef<OsStr>,
         mass: impl AsRef<OsStr>,
@@ -266,10 +267,10 @@ impl ModelFiles {
     }
 }
 
-/// Units as a command line names them: `length,mass,time`.
+/// Parses units as on the command line: `length,mass,time`.
 ///
 /// # Errors
-/// FB202 when they are not three known ones.
+/// FB202 if they are not three known ones.
 pub fn parse_units(text: &str) -> Result<UnitSystem> {
     let names: Vec<&str> = text.split(',').map(str::trim).collect();
     let &[length, mass, time] = names.as_slice() else {
@@ -281,7 +282,7 @@ pub fn parse_units(text: &str) -> Result<UnitSystem> {
     })
 }
 
-/// File name up to its first dot.
+/// Returns the file name up to its first dot.
 pub(super) fn stem(path: &Path) -> String {
     let name = path.file_name().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
     match name.split('.').next() {

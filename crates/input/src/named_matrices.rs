@@ -1,23 +1,24 @@
-//! Which matrix is meant of a file that holds several under names.
+//! The choice of a matrix in a file that holds several under names.
 
 use super::reader::MatrixRole;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// How a format calls what holds a matrix, in messages.
+/// Words of a format for messages.
 pub(super) struct NamedMatrices {
-    /// One of them, as in `group`.
+    /// Holder of a matrix, as in `group`.
     pub holder: &'static str,
-    /// A file, as in `FILE.h5`.
+    /// Pattern of a file name, as in `FILE.h5`.
     pub file: &'static str,
-    /// Several matrices, as in `sparse matrices`.
+    /// Plural of the matrices, as in `sparse matrices`.
     pub matrices: &'static str,
 }
 
 impl NamedMatrices {
-    /// The only matrix of the file, or the only one named after its role. `names` are paths from `/`.
+    /// Returns the index of the only matrix of the file, or of the only one named after its role. `names` are paths
+    /// from `/`.
     ///
     /// # Errors
-    /// FB310 when the only matrix is named like another one, or when names do not tell which is meant.
+    /// FB310 if the only matrix is named after another role, or if the names do not determine the matrix.
     pub(super) fn choose(&self, names: &[&str], role: MatrixRole) -> Result<usize, Diagnostic> {
         let last = |name: &str| name.rsplit('/').next().unwrap_or("").to_owned();
         if let [name] = names {
@@ -45,7 +46,7 @@ impl NamedMatrices {
         }
     }
 
-    /// The help that names what there is.
+    /// Returns the help that lists the matrices of the file.
     pub(super) fn listing(&self, names: &[&str]) -> String {
         let more = if names.len() > 8 { ", ..." } else { "" };
         let shown = names[..names.len().min(8)].join(", ");

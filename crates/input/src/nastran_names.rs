@@ -1,11 +1,10 @@
-//! Which of several matrices in a file of Nastran is meant: by their names, of which the first letter says
-//! the role.
+//! The choice of a matrix among several in a file of Nastran, by their names, whose first letter is the role.
 
 use super::reader::MatrixRole;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// Whether Nastran calls a matrix of this role so: `K...`, `M...`, `B...`, and `KD...` for differential
-/// stiffness. `K4...` is structural damping.
+/// Returns true when Nastran gives this name to a matrix of this role: `K...`, `M...`, `B...`, and `KD...` for
+/// differential stiffness. `K4...` is structural damping.
 pub(super) fn is_called(role: MatrixRole, name: &str) -> bool {
     let name = name.to_ascii_uppercase();
     let begins = |head: &str| name.starts_with(head);
@@ -17,10 +16,10 @@ pub(super) fn is_called(role: MatrixRole, name: &str) -> bool {
     }
 }
 
-/// The index of the matrix that a user has named, or the only one of its role.
+/// Returns the index of the matrix that a user has named, or of the only one of its role.
 ///
 /// # Errors
-/// FB310 when there is none, or more than one.
+/// FB310 if there is none, or more than one.
 pub(super) fn choose(names: &[String], role: MatrixRole, group: Option<&str>) -> Result<usize, Diagnostic> {
     let refused = |message: String| Diagnostic::new(Code::Hdf5Layout, message).with_help(listing(names));
     if let Some(group) = group {
@@ -71,10 +70,10 @@ fn listing(names: &[String]) -> String {
     format!("name the matrix as FILE:/NAME; the file has {}{more}", shown.join(", "))
 }
 
-/// The matrices that a user has named, stiffness and mass; their names may begin with a `/`.
+/// Returns the indices of the stiffness and mass matrix that a user has named; their names may begin with a `/`.
 ///
 /// # Errors
-/// No pair, if there is not one matrix of each name.
+/// An empty list of pairs, if there is not exactly one matrix of each name.
 pub(super) fn named_pair(
     names: &[String],
     stated: &[String; 2],
@@ -87,11 +86,11 @@ pub(super) fn named_pair(
     k.zip(m).ok_or_else(Vec::new)
 }
 
-/// The pair of stiffness and mass matrix among the matrices of a job: names that differ in their first letter
+/// Returns the pair of stiffness and mass matrix among the matrices of a job: names that differ in their first letter
 /// only, or the only two.
 ///
 /// # Errors
-/// The pairs, when there is not exactly one.
+/// The candidate pairs, if there is not exactly one.
 pub(super) fn pair(names: &[String]) -> Result<(usize, usize), Vec<(usize, usize)>> {
     let of = |role| (0..names.len()).filter(move |&k| is_called(role, &names[k])).collect::<Vec<_>>();
     let (stiffness, mass) = (of(MatrixRole::Stiffness), of(MatrixRole::Mass));

@@ -1,5 +1,4 @@
-//! Files that say where nodes lie: tables, and what FE programs and meshers write. Each is told by its
-//! content.
+//! Files with node positions: tables, and files of FE programs and meshers. Each format is recognised by its content.
 
 mod ansys_axes;
 mod ansys_list;
@@ -24,13 +23,13 @@ use std::collections::HashSet;
 
 type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// A format of node files besides our table.
+/// Format of node files besides the table of this program.
 struct Format {
     recognises: fn(&str) -> bool,
     read: fn(&InputFile) -> Found<NodeFile>,
 }
 
-/// The first that recognises the begin of a file reads it.
+/// Formats of node files. The first that recognises the beginning of a file reads it.
 const FORMATS: &[Format] = &[
     Format { recognises: gmsh::recognises, read: gmsh::read },
     Format { recognises: vtk_xml::recognises, read: vtk_xml::read },
@@ -42,10 +41,10 @@ const FORMATS: &[Format] = &[
     Format { recognises: |head| is_bulk_data(head.as_bytes()), read: bulk },
 ];
 
-/// Number of bytes that formats are told by.
+/// Number of bytes by which formats are recognised.
 const HEAD: usize = 4096;
 
-/// Reads the nodes of a file; in the plane z is zero.
+/// Reads the nodes of a file; z is zero in the plane.
 ///
 /// # Errors
 /// FB102 for compressed files; FB106, FB203 to FB206 for tables; FB110, FB111, FB115, FB205 for other files.
@@ -84,7 +83,7 @@ pub(super) fn read_node_file(file: &InputFile, dimension: u8) -> Found<NodeFile>
     Ok(read)
 }
 
-/// Whether a file is a keyword deck: its first line that is no comment is a keyword.
+/// Returns true when a file is a keyword deck: its first line that is no comment is a keyword.
 fn is_deck(head: &str) -> bool {
     let first = head.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with("**"));
     first
@@ -95,17 +94,17 @@ fn bulk(file: &InputFile) -> Found<NodeFile> {
     nodes_of_bulk(file.path())
 }
 
-/// FB115 at a line.
+/// Returns FB115 at a line.
 fn syntax(file: &InputFile, line: usize, message: String) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).at_line(line)]
 }
 
-/// FB115 for a line that is not what was expected.
+/// Returns FB115 for a line of an unexpected form.
 fn unexpected(file: &InputFile, line: usize, what: &str, found: &[u8]) -> Vec<Diagnostic> {
     vec![expected(Code::NodeFileSyntax, what, found).in_file(file.path()).at_line(line)]
 }
 
-/// FB115 of a file without lines.
+/// Returns FB115 about a file without lines.
 fn refused(file: &InputFile, message: String, help: &str) -> Vec<Diagnostic> {
     vec![Diagnostic::new(Code::NodeFileSyntax, message).in_file(file.path()).with_help(help)]
 }

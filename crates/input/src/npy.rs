@@ -14,13 +14,13 @@ pub(super) fn recognises(head: &[u8]) -> bool {
 pub(super) struct Blocks {
     /// Number of matrices.
     pub count: usize,
-    /// Rows of each.
+    /// Number of rows of each matrix.
     pub rows: usize,
-    /// Columns of each.
+    /// Number of columns of each matrix.
     pub columns: usize,
-    /// All values.
+    /// Values of all matrices.
     pub values: Vec<f64>,
-    /// Significant decimal digits that the values carry at the most.
+    /// Largest number of significant decimal digits of the values.
     pub digits: u8,
 }
 
@@ -31,7 +31,7 @@ pub(super) fn read_blocks(bytes: &[u8]) -> Result<Blocks, Diagnostic> {
     let &[count, rows, columns] = shape.as_slice() else { return Err(other_extents(&shape, 3)) };
     let length = announced(&shape, size, data)?;
     let own = rows * columns;
-    // In Fortran's order the first index runs fastest.
+    // In Fortran order the first index varies fastest.
     let at = |k: usize| match fortran {
         true => k / own + count * (k % own / columns + rows * (k % columns)),
         false => k,
@@ -45,7 +45,7 @@ fn other_extents(shape: &[usize], expected: usize) -> Diagnostic {
     Diagnostic::new(Code::MatrixKind, message)
 }
 
-/// Number of values of `size` bytes in an array with these extents, which `data` has.
+/// Returns the number of values of `size` bytes in an array with these extents, which must be that of `data`.
 fn announced(shape: &[usize], size: usize, data: &[u8]) -> Result<usize, Diagnostic> {
     let count = shape.iter().try_fold(1usize, |count, &extent| count.checked_mul(extent));
     count.filter(|count| count.checked_mul(size) == Some(data.len())).ok_or_else(|| {
@@ -59,7 +59,7 @@ fn announced(shape: &[usize], size: usize, data: &[u8]) -> Result<usize, Diagnos
     })
 }
 
-/// Header and numbers of an array.
+/// Splits an array into its parsed header and its numbers.
 fn described(bytes: &[u8]) -> Result<(Header<'_>, &[u8]), Diagnostic> {
     let (header, data) = split(bytes)?;
     let text = header.escape_ascii().to_string();
@@ -68,7 +68,7 @@ fn described(bytes: &[u8]) -> Result<(Header<'_>, &[u8]), Diagnostic> {
     Ok((header, data))
 }
 
-/// An array of real numbers with one or two extents.
+/// Reads an array of real numbers with one or two extents.
 pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
     let (Header { descr, fortran, shape }, data) = described(bytes)?;
     let (size, decode) = number_type(descr)?;
@@ -85,7 +85,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Array, Diagnostic> {
     Ok(Array { rows, cols, row_major: !fortran, values, digits: if size == 4 { 7 } else { 17 } })
 }
 
-/// Whole numbers with one extent, of any integer type.
+/// Reads whole numbers with one extent, of any integer type.
 pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     let (header, data) = split(bytes)?;
     let Header { descr, shape, .. } =
@@ -114,16 +114,16 @@ pub(super) fn read_integers(bytes: &[u8]) -> Result<Vec<i64>, Diagnostic> {
     Ok(data.chunks_exact(size).map(decode).collect())
 }
 
-/// Number of values that the header of an array announces; `bytes` are those at its begin.
+/// Returns the number of values that the header of an array announces; `bytes` is the beginning of the array.
 ///
 /// # Errors
-/// FB301 for what is no header.
+/// FB301 if there is no header.
 pub(super) fn announced_values(bytes: &[u8]) -> Result<u64, Diagnostic> {
     let (Header { shape, .. }, _) = described(bytes)?;
     Ok(shape.iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64)))
 }
 
-/// Bytes of an array by its header, which is within `bytes`; `None` of what is no array.
+/// Returns the number of bytes of an array by its header, which `bytes` must contain; `None` if there is no array.
 pub(super) fn announced_bytes(bytes: &[u8]) -> Option<u64> {
     let (header, data) = split(bytes).ok()?;
     let Header { descr, shape, .. } = parse(header)?;
@@ -134,7 +134,7 @@ pub(super) fn announced_bytes(bytes: &[u8]) -> Option<u64> {
     Some(((bytes.len() - data.len()) as u64).saturating_add(values))
 }
 
-/// The text of an array that is one word (`|S3`, `<U3`).
+/// Returns the text of an array that is one word (`|S3`, `<U3`).
 pub(super) fn read_word(bytes: &[u8]) -> Option<String> {
     let (header, data) = split(bytes).ok()?;
     let Header { descr, .. } = parse(header)?;
@@ -151,7 +151,7 @@ fn syntax(what: String) -> Diagnostic {
     Diagnostic::new(Code::MatrixSyntax, what).with_help("write the array again by numpy.save")
 }
 
-/// The header and the numbers behind it.
+/// Returns the header and the numbers after it.
 fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Diagnostic> {
     let number = |range: std::ops::Range<usize>| {
         let bytes = bytes.get(range)?;
@@ -168,10 +168,10 @@ fn split(bytes: &[u8]) -> Result<(&[u8], &[u8]), Diagnostic> {
     Ok((header, &bytes[start + header.len()..]))
 }
 
-/// Decodes the bytes of one number.
+/// Function that decodes the bytes of one number.
 type Decode = fn(&[u8]) -> f64;
 
-/// Bytes of a number of the type that the header names, and how they are decoded.
+/// Returns the number of bytes of the type in the header, and its decoder.
 fn number_type(descr: &str) -> Result<(usize, Decode), Diagnostic> {
     Ok(match descr {
         "<f8" => (8, |b| f64::from_le_bytes(b.try_into().expect("eight bytes"))),
@@ -192,7 +192,7 @@ struct Header<'a> {
     shape: Vec<usize>,
 }
 
-/// The header: a Python dictionary with exactly the keys descr, fortran_order and shape.
+/// Parses the header: a Python dictionary with exactly the keys descr, fortran_order and shape.
 fn parse(text: &[u8]) -> Option<Header<'_>> {
     let mut cursor = Cursor(std::str::from_utf8(text).ok()?.trim());
     let (mut descr, mut fortran, mut shape) = (None, None, None);
@@ -222,11 +222,11 @@ fn parse(text: &[u8]) -> Option<Header<'_>> {
     Some(Header { descr: descr?, fortran: fortran?, shape: shape? }).filter(|_| all)
 }
 
-/// The rest of a text that is read.
+/// Rest of a text that is parsed.
 struct Cursor<'a>(&'a str);
 
 impl<'a> Cursor<'a> {
-    /// Takes `token` and the blanks after it.
+    /// Consumes `token` and the blanks after it.
     fn take(&mut self, token: &str) -> Option<()> {
         self.0 = self.0.strip_prefix(token)?.trim_start();
         Some(())
@@ -239,7 +239,7 @@ impl<'a> Cursor<'a> {
         Some(text)
     }
 
-    /// Whole numbers in parentheses.
+    /// Parses whole numbers in parentheses.
     fn tuple(&mut self) -> Option<Vec<usize>> {
         self.take("(")?;
         let mut numbers = Vec::new();

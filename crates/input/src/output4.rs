@@ -1,5 +1,5 @@
-//! Matrices that Nastran writes with OUTPUT4: as text or binary, dense or as strings of nonzeros (their
-//! starts packed with their lengths, or apart: BIGMAT).
+//! Matrices that Nastran writes with OUTPUT4: as text or binary, dense or as strings of nonzeros (with starts packed
+//! into their lengths, or in separate words: BIGMAT).
 
 mod binary;
 mod layout;
@@ -18,10 +18,10 @@ use layout::{Columns, SINGLE_DIGITS, Stored, Stretch};
 use rayon::prelude::*;
 use text::Format;
 
-/// Digits in which OUTPUT4 writes numbers of single precision as text.
+/// Number of digits with which OUTPUT4 writes single-precision numbers as text.
 const PADDED_DIGITS: u8 = 10;
 
-/// The reader of OUTPUT4 files.
+/// Reader of OUTPUT4 files.
 pub(super) struct Output4;
 
 impl Reader for Output4 {
@@ -54,12 +54,12 @@ impl Reader for Output4 {
 
 type Found<T> = std::result::Result<T, Diagnostic>;
 
-/// The matrices of a file, in its order.
+/// Matrices of a file, in its order.
 pub(super) struct Contents {
     matrices: Vec<(Stored, Encoding)>,
 }
 
-/// How the columns of a matrix are written.
+/// Encoding of the columns of a matrix.
 #[derive(Clone, Copy)]
 enum Encoding {
     Text(Format),
@@ -67,10 +67,10 @@ enum Encoding {
 }
 
 impl Contents {
-    /// Goes through a file without reading a value.
+    /// Scans a file without reading a value.
     ///
     /// # Errors
-    /// FB301 for what is no OUTPUT4 file, FB303, FB304 for files that are cut off.
+    /// FB301 for a file that is no OUTPUT4 file, FB303, FB304 for files that are cut off.
     pub(super) fn of(file: &InputFile) -> Found<Self> {
         let matrices = match Binary::of(file.bytes()) {
             Some(binary) => {
@@ -85,22 +85,24 @@ impl Contents {
         Ok(Self { matrices })
     }
 
-    /// Names of the matrices.
+    /// Returns the names of the matrices.
     pub(super) fn names(&self) -> Vec<String> {
         self.matrices.iter().map(|(stored, _)| stored.header.name.clone()).collect()
     }
 
-    /// Number of rows of a square matrix with entries; `None` of another.
+    /// Returns the number of rows of a square matrix with entries; `None` for another matrix.
     pub(super) fn square(&self, at: usize) -> Option<usize> {
         let (stored, _) = self.matrices.get(at)?;
         let is_square = stored.header.rows == stored.header.columns && stored.values > 0;
         usize::try_from(stored.header.rows).ok().filter(|_| is_square)
     }
 
-    /// The matrix with this index of the file that these are the contents of.
+    /// Returns the matrix with this index; `file` must be the file that was scanned.
     ///
     /// # Errors
-    /// FB301, FB302 for complex and other matrices, FB303, FB305, FB306, FB307, FB312.
+    /// FB301 for text that cannot be parsed, FB302 for complex and other matrices, FB303 for rows outside the matrix,
+    /// FB305 for a matrix that is not square, FB306 for values that are not finite, FB307 for a single triangle, FB312
+    /// if there is no nonzero entry.
     pub(super) fn matrix(&self, file: &InputFile, wanted: usize) -> Found<RawMatrix> {
         let Some((stored, encoding)) = self.matrices.get(wanted) else {
             return Err(Diagnostic::new(Code::MatrixSyntax, "the matrix is not in the file"));
@@ -124,15 +126,15 @@ impl Contents {
         }
         let written = columns.written;
         let raw = columns.into_matrix(n, stored.ascending, file.path())?;
-        // Nastran with words of eight bytes calls its numbers single as well, but writes all their digits.
+        // Nastran with words of eight bytes also declares single precision, but writes all digits of its numbers.
         let is_single = header.is_single() && written <= PADDED_DIGITS;
         let digits = if is_single { raw.digits.min(SINGLE_DIGITS) } else { raw.digits };
         Ok(RawMatrix { digits, ..raw })
     }
 }
 
-/// All columns of a matrix. Stretches of them are read in parallel, and put together in the order of the file
-/// before the next ones are read: the entries are in memory once.
+/// Reads all columns of a matrix. Groups of stretches are read in parallel and joined in the order of the file before
+/// the next group, so that the entries are in memory once.
 fn columns(file: &InputFile, stored: &Stored, encoding: Encoding) -> Found<Columns> {
     let at_once = 8 * rayon::current_num_threads();
     let mut all = Columns::with_room(stored.values);
@@ -161,7 +163,7 @@ mod tests {
     const N: usize = 3000;
     const BAND: usize = 16;
 
-    /// The band of a column: its first row, and its values, which are symmetric and of all digits.
+    /// Returns the band of a column: its first row, and its values, which are symmetric and have all digits.
     fn column(j: usize) -> (usize, Vec<f64>) {
         let (first, end) = (j.saturating_sub(BAND), (j + BAND + 1).min(N));
         (first, (first..end).map(|i| ((i * j) as f64).sqrt() + (i + j) as f64 + 1.0).collect())
@@ -175,7 +177,7 @@ mod tests {
         CscMatrix::from_triplets(N, N, &(0..N).flat_map(entries).collect::<Vec<_>>())
     }
 
-    /// The matrix as text, with its columns in some order.
+    /// Returns the matrix as text, with its columns in the given order.
     fn text(order: impl Iterator<Item = usize>) -> String {
         let mut text = format!("{N:8}{:8}{:8}{:8}{:8}1P,3E24.16\n", -(N as i64), 6, 2, "KGG");
         for j in order {

@@ -1,6 +1,7 @@
 //! Matrices of PETSc in its binary form, as `MatView` writes them into a binary viewer:
-//! <https://petsc.org/release/manualpages/Mat/MatLoad/>. All numbers are big-endian. Whole numbers have 32 or 64
-//! bits and values 4, 8 or 16 bytes, as PETSc was configured; the file does not say which, but its size does.
+//! <https://petsc.org/release/manualpages/Mat/MatLoad/>. All numbers are big-endian. Integers have 32 or 64 bits and
+//! values 4, 8 or 16 bytes, by the configuration of PETSc. The file does not state these sizes, but they follow from
+//! its first number and its length.
 
 use super::assemble::check_size;
 use super::compressed::Compressed;
@@ -9,10 +10,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::{Error, Result};
 use flexbody_model::RawMatrix;
 
-/// The reader of PETSc's binary files.
+/// Reader of PETSc's binary files.
 pub(super) struct Petsc;
 
-/// Number that begins a matrix. Other objects have numbers near it.
+/// Number at the beginning of a matrix. Other objects have similar numbers.
 const MATRIX: u64 = 1_211_216;
 const OTHERS: &[(u64, &str)] =
     &[(1_211_214, "a vector"), (1_211_218, "an index set"), (1_211_219, "a bag"), (1_211_221, "a mesh")];
@@ -29,7 +30,7 @@ impl Reader for Petsc {
         &["petsc"]
     }
 
-    /// A file that begins with the number of an object of PETSc.
+    /// Recognises a file that begins with the number of an object of PETSc.
     fn recognises(&self, head: &[u8]) -> bool {
         Whole::of(head).is_some()
     }
@@ -43,7 +44,7 @@ impl Reader for Petsc {
     }
 }
 
-/// Bytes of a whole number.
+/// Size of an integer.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Whole {
     Four,
@@ -51,7 +52,7 @@ enum Whole {
 }
 
 impl Whole {
-    /// How many of them the number has that begins the file, if it is that of an object.
+    /// Returns the size of the integers, if the file begins with the number of an object.
     fn of(head: &[u8]) -> Option<Self> {
         let known = |number: i64| {
             u64::try_from(number).is_ok_and(|own| own == MATRIX || OTHERS.iter().any(|(id, _)| *id == own))
@@ -66,7 +67,7 @@ impl Whole {
         }
     }
 
-    /// The k-th number of a list.
+    /// Returns the k-th number of a list.
     fn get(self, bytes: &[u8], k: usize) -> Option<i64> {
         let own = bytes.get(k * self.bytes()..(k + 1) * self.bytes())?;
         Some(match self {
@@ -91,6 +92,7 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
         let message = "file does not begin with the number of a matrix of PETSc, 1211216";
         return Err(Diagnostic::new(Code::MatrixSyntax, message).with_help(HELP));
     };
+    // A matrix has a head of four numbers, the lengths of its rows, the column indices and the values.
     let (head, rest) = whole.list(bytes, 4).ok_or_else(cut_off)?;
     let [kind, rows, columns, entries] = std::array::from_fn(|k| whole.get(head, k).unwrap_or(-1));
     let entries = entry_count(kind, entries)?;
@@ -122,7 +124,7 @@ fn read(bytes: &[u8], source: &MatrixSource<'_>) -> std::result::Result<RawMatri
     Ok(RawMatrix { digits: if single { raw.digits.min(7) } else { raw.digits }, ..raw })
 }
 
-/// The number of stored entries of what is a sparse matrix.
+/// Returns the number of stored entries of a sparse matrix; refuses other objects.
 fn entry_count(kind: i64, entries: i64) -> std::result::Result<u64, Diagnostic> {
     let refuse = |message: String, help| Err(Diagnostic::new(Code::MatrixKind, message).with_help(help));
     if let Some((_, what)) = OTHERS.iter().find(|(id, _)| *id as i64 == kind) {
@@ -140,12 +142,12 @@ fn entry_count(kind: i64, entries: i64) -> std::result::Result<u64, Diagnostic> 
     }
 }
 
-/// Bytes of a real value, when `bytes` are `entries` of them.
+/// Returns the number of bytes of a real value, if `bytes` are those of `entries` values.
 fn value_bytes(bytes: usize, entries: u64) -> Option<u64> {
     [8, 4].into_iter().find(|size| entries.checked_mul(*size) == Some(bytes as u64))
 }
 
-/// What the bytes behind the indices are, when they are not as many real values as there are entries.
+/// Returns a diagnostic of the bytes after the indices, if they do not hold one real value per entry.
 fn wrong_size(values: &[u8], entries: u64, whole: Whole) -> Diagnostic {
     let bytes = values.len();
     let following = entries.checked_mul(8).and_then(|end| values.get(usize::try_from(end).ok()?..));

@@ -1,4 +1,4 @@
-//! Reads every file of a model and collects all that is wrong with any of them.
+//! Reads all files of a model and collects all their problems.
 
 use super::jobs::{JobModel, comparable, read_job};
 use super::mapping::Mapping;
@@ -23,23 +23,23 @@ use flexbody_model::{
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Below this many significant digits a matrix is warned about.
+/// Number of significant digits below which a matrix gets a warning.
 const FEW_DIGITS: u8 = 10;
 
-/// Reads one matrix: both triangles, whatever is stored.
+/// Reads one matrix with both triangles, whichever of them are stored.
 ///
 /// # Errors
-/// FB101 to FB106 and FB301 to FB313, all that are found in the file.
+/// FB101 to FB106 for a file that cannot be read, FB301 to FB313 for an invalid matrix, all that are found in the file.
 pub fn read_matrix(location: &MatrixLocation, role: MatrixRole) -> Result<RawMatrix> {
     read_opened(&InputFile::open_unread(&location.path)?, location.group.as_deref(), role, None)
 }
 
-/// Reads all files of a model and takes their fingerprints. The model is parsed, not yet checked: sizes,
-/// symmetry and mechanics are the business of [`flexbody_model`].
+/// Reads all files of a model and computes their fingerprints. The model is parsed, not checked: sizes, symmetry and
+/// mechanics are checked by [`flexbody_model`].
 ///
 /// # Errors
-/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric
-/// stiffness, interfaces, mesh; FB132 for files that changed meanwhile, whatever else is wrong with them.
+/// Every diagnostic of every file, in the order manifest, stiffness, mass, nodes, dofs, damping, geometric stiffness,
+/// interfaces, mesh; FB132 for files that changed during reading, in place of other errors.
 pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     let mut opened = OpenFiles::new(files);
     let read = read_opened_files(files, &opened);
@@ -51,7 +51,7 @@ pub fn read_model(files: &ModelFiles) -> Result<RawModel> {
     Ok(RawModel { sources: Sources::later(move || sources(&given, &of_job, &opened)), ..model })
 }
 
-/// The error without quotes of files that the manifest or the deck names elsewhere on the machine.
+/// Returns the error without quotes from files that the manifest or the deck names outside the model.
 fn told_to_users(files: &ModelFiles, error: Error) -> Error {
     let main = match (&files.manifest, &files.source) {
         (Some(manifest), _) => manifest,
@@ -65,7 +65,7 @@ fn told_to_users(files: &ModelFiles, error: Error) -> Error {
 /// Role of a file of a job, and the file.
 type JobFileRead = (&'static str, SeenFile);
 
-/// Reads the files of a model, and those of its job, which are named by it.
+/// Reads the files of a model, and the files of its job.
 fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel, Vec<JobFileRead>)> {
     let parsed = Parsed::of(files, opened);
     let mut diagnostics = Vec::new();
@@ -76,6 +76,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Matrices::Tables(tables) => tables.taken(files, &mut diagnostics),
         Matrices::Job(job) => take(&mut diagnostics, *job),
     };
+    // Damping and geometric stiffness follow K and M to the rows of the model.
     let no_rows = GivenRows::default();
     let rows = matrices.as_ref().map_or(&no_rows, |matrices| &matrices.given_rows);
     let damping = parsed.damping.and_then(|damping| {
@@ -88,6 +89,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
         Some(GeometricStiffness { load, matrix })
     });
     let geometric_stiffness = geometric.collect();
+    // Interfaces and surface refer to the nodes.
     let places = NodeLookup::of(matrices.as_ref(), files.dimension);
     let interfaces: Vec<NodeSet> = files
         .interfaces
@@ -102,6 +104,7 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     });
     let mesh = mesh.and_then(|mesh| take(&mut diagnostics, mesh));
     diagnostics.extend(matrices.as_ref().and_then(|matrices| few_digits(&matrices.stiffness)));
+    // Errors end here, with all diagnostics that were found.
     let (Some(matrices), false) = (matrices, diagnostics.iter().any(|d| d.severity() == Severity::Error))
     else {
         return Err(Error::new(diagnostics));
@@ -131,17 +134,17 @@ fn read_opened_files(files: &ModelFiles, opened: &OpenFiles) -> Result<(RawModel
     Ok((model, matrices.files))
 }
 
-/// Reads nodal masses, `node,mass`: what a multibody package would have imported.
+/// Reads nodal masses `node,mass`, as a multibody program would have imported them.
 ///
 /// # Errors
-/// FB101 to FB106, FB203 to FB205 and FB803.
+/// FB101 to FB106 for a file that cannot be read, FB203 to FB205 for an invalid table, FB803 for invalid masses.
 pub fn read_nodal_masses(path: &Path) -> Result<Vec<(i64, f64)>> {
     read_masses(&InputFile::open(path)?).map_err(Error::new)
 }
 
 type Found<T> = std::result::Result<T, Vec<Diagnostic>>;
 
-/// What stands in the files, each with what is wrong with it.
+/// Parsed content of the files, each with its problems.
 struct Parsed {
     matrices: Matrices,
     mesh: Option<Found<NodeFile>>,
@@ -165,9 +168,9 @@ struct ModelMatrices {
     given_rows: GivenRows,
     /// Node sets of a job.
     sets: NodeSets,
-    /// Sets that cannot be resolved, and why.
+    /// Sets that cannot be resolved, with the reason.
     unresolved: Unresolved,
-    /// What the part is drawn by.
+    /// Elements by which the part is drawn.
     elements: Elements,
     /// Files of a job.
     files: Vec<JobFileRead>,
@@ -175,7 +178,7 @@ struct ModelMatrices {
 }
 
 impl ModelMatrices {
-    /// Nodes with stiffness or mass; `None` where the rows are not those of the nodes in turn and have no labels.
+    /// Returns the nodes with stiffness or mass; `None` if the rows have no labels and do not follow the nodes.
     fn moving(&self, dimension: u8) -> Option<HashSet<i64>> {
         let n = self.stiffness.matrix.n_cols();
         let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], n);
@@ -220,7 +223,7 @@ struct ParsedTables {
 }
 
 impl ParsedTables {
-    /// The tables, if all of them could be read.
+    /// Returns the tables, if all of them could be read.
     fn taken(self, files: &ModelFiles, diagnostics: &mut Vec<Diagnostic>) -> Option<ModelMatrices> {
         let stiffness = take(diagnostics, self.stiffness);
         let mass = take(diagnostics, self.mass);
@@ -299,10 +302,10 @@ impl Parsed {
     }
 }
 
-/// Where the nodes of a model lie, and its sets, for interfaces that name these.
+/// Node positions and sets of a model, for interfaces that refer to them.
 struct NodeLookup<'m> {
     matrices: Option<&'m ModelMatrices>,
-    /// Nodes with stiffness or mass, where rows are known.
+    /// Nodes with stiffness or mass, if the rows are known.
     moving: Option<HashSet<i64>>,
 }
 
@@ -311,7 +314,8 @@ impl<'m> NodeLookup<'m> {
         Self { matrices, moving: matrices.and_then(|matrices| matrices.moving(dimension)) }
     }
 
-    /// The nodes of an interface. Without a model, whose files say why, regions and sets have none.
+    /// Returns the nodes of an interface. Regions and sets of a model that could not be read are empty; its files
+    /// report the reason.
     fn node_set(
         &self,
         interface: &InterfaceSource,
@@ -343,7 +347,7 @@ impl<'m> NodeLookup<'m> {
         self.moving.as_ref().is_none_or(|moving| moving.contains(&node))
     }
 
-    /// Returns the members of a node set, with those that have no rows.
+    /// Returns the members of a node set, including those without rows.
     fn members(&self, name: &str) -> Option<&[i64]> {
         let sets = &self.matrices?.sets;
         let known = sets.iter().find(|(own, _)| own.eq_ignore_ascii_case(name));
@@ -368,7 +372,7 @@ impl<'m> NodeLookup<'m> {
             };
             return Err(vec![said_in(files, Diagnostic::new(Code::NodeSetUnknown, message)).with_help(help)]);
         };
-        // A set may list nodes without degrees of freedom, and some twice.
+        // A set may list nodes without degrees of freedom, and some nodes twice.
         let mut seen = HashSet::new();
         let nodes = nodes.iter().copied().filter(|id| self.moves(*id) && seen.insert(*id)).collect();
         self.refuse_empty(
@@ -414,13 +418,13 @@ fn read_opened(
         file.load()?;
     }
     let read = reader.read(&MatrixSource { file, compression, group, role, keep_in });
-    // What is wrong with a file that changed meanwhile may be wrong for this reason.
+    // A change of the file during reading may be the cause of other problems, so it is reported first.
     file.refuse_changed()?;
     read
 }
 
-/// Digits of the stiffness matrix decide how well rigid motion and bending are told apart; those of the mass
-/// matrix enter results as they are, and exact short numbers are common there.
+/// Returns a warning if the stiffness matrix has few digits. Its digits decide how well rigid motion and bending can be
+/// distinguished. Those of the mass matrix enter results unchanged, and exact short numbers are common there.
 fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
     (stiffness.digits < FEW_DIGITS).then(|| {
         let message =
@@ -429,14 +433,14 @@ fn few_digits(stiffness: &RawMatrix) -> Option<Diagnostic> {
     })
 }
 
-/// Labels of rows that follow the nodes of a table, each with its displacements.
+/// Returns the labels of rows that follow the nodes of a table, each with its displacements.
 fn in_order_of_nodes(nodes: &Nodes, dimension: u8) -> Vec<DofLabel> {
     let of_node = |&node: &i64| (1..=dimension).map(move |direction| DofLabel { node, direction });
     nodes.ids.iter().flat_map(of_node).collect()
 }
 
-/// FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do not
-/// have these constraints.
+/// Returns FB111 for matrices with rows that follow others by constraints of the deck of their nodes: the matrices do
+/// not contain these constraints.
 fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], deck: &Path) -> Found<()> {
     let labels: HashSet<DofLabel> = labels.iter().copied().collect();
     let open = followers.iter().filter(|(_, rows)| rows.iter().any(|row| labels.contains(row)));
@@ -450,11 +454,11 @@ fn refuse_followers(followers: &[(String, Vec<DofLabel>)], labels: &[DofLabel], 
     Err(vec![diagnostic.with_help("give the deck as the model, with its matrices beside it")])
 }
 
-/// K and M along the axes of the model, where rows stand along `axes` of nodes, and how others with these rows
-/// become the same.
+/// Returns K and M along the axes of the model, with rows originally along the `axes` of nodes, and the map that
+/// transforms other data by these rows.
 ///
 /// # Errors
-/// FB404 for a rotated node that lacks directions which turn together.
+/// FB404 for a rotated node without all directions that are rotated together.
 fn turned(
     matrices: [RawMatrix; 2],
     labels: &[DofLabel],
@@ -462,7 +466,7 @@ fn turned(
 ) -> Found<([RawMatrix; 2], GivenRows)> {
     let [stiffness, mass] = matrices;
     let has_rows = |raw: &RawMatrix| raw.matrix.n_cols() == labels.len();
-    // Numbers of rows that differ are found later.
+    // Different numbers of rows are reported later.
     if !labels.iter().any(|label| axes.contains_key(&label.node)) || !has_rows(&stiffness) || !has_rows(&mass)
     {
         return Ok(([stiffness, mass], GivenRows::default()));
@@ -480,7 +484,7 @@ fn turned(
     Ok((matrices, GivenRows::new(vec![map], axes)))
 }
 
-/// A matrix that is given beside K and M, by the rows of the model.
+/// Returns an additional matrix, such as damping, by the rows of the model.
 fn by_rows_of_model(raw: RawMatrix, rows: &GivenRows) -> Found<RawMatrix> {
     let RawMatrix { matrix, digits, path } = raw;
     match rows.matrix(matrix) {
@@ -497,7 +501,7 @@ fn take<T>(diagnostics: &mut Vec<Diagnostic>, found: Found<T>) -> Option<T> {
     found.map_err(|list| collect(diagnostics, list)).ok()
 }
 
-/// Adds what is not there yet: a file used twice is complained about once.
+/// Adds the diagnostics that are not in the list yet: a file that is used twice is reported once.
 fn collect(diagnostics: &mut Vec<Diagnostic>, found: Vec<Diagnostic>) {
     for diagnostic in found {
         if !diagnostics.contains(&diagnostic) {
@@ -506,7 +510,7 @@ fn collect(diagnostics: &mut Vec<Diagnostic>, found: Vec<Diagnostic>) {
     }
 }
 
-/// Every file of the model, opened once.
+/// Files of the model, each opened once.
 struct OpenFiles {
     files: Vec<(PathBuf, std::result::Result<InputFile, Diagnostic>)>,
 }
@@ -522,7 +526,7 @@ impl OpenFiles {
         Self { files: opened }
     }
 
-    /// A file whose bytes are in memory.
+    /// Returns a file whose bytes are in memory.
     fn get(&self, path: &Path) -> Found<&InputFile> {
         let file = self.unread(path)?;
         file.load().map_err(|diagnostic| vec![diagnostic])?;
@@ -535,11 +539,13 @@ impl OpenFiles {
         file.as_ref().map_err(|diagnostic| vec![diagnostic.clone()])
     }
 
-    /// Files that could be opened.
+    /// Returns the files that could be opened.
     fn all(&self) -> impl Iterator<Item = &InputFile> {
         self.files.iter().filter_map(|(_, file)| file.as_ref().ok())
     }
 
+    /// Checks that no file has changed.
+    ///
     /// # Errors
     /// FB132 for every file that is no longer the one that was opened.
     fn refuse_changed(&self) -> Result<()> {
@@ -552,7 +558,7 @@ impl OpenFiles {
     }
 }
 
-/// Role and path of every file of the model, in the order of diagnostics and sources.
+/// Returns role and path of every file of the model, in the order of diagnostics and sources.
 fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     let mut roles: Vec<(&'static str, &Path)> = Vec::new();
     roles.extend(files.manifest.as_deref().map(|path| ("manifest", path)));
@@ -574,12 +580,12 @@ fn roles(files: &ModelFiles) -> Vec<(&'static str, &Path)> {
     roles
 }
 
-/// Every file with its fingerprint: the manifest, those of a job, then the others. Those of which not all was read are
-/// read one after the other: whoever waits for [`Sources`] to be found must not be given other work by the pool, which
-/// may ask for the same.
+/// Returns every file with its fingerprint: the manifest, the files of a job, then the others. Files that were not read
+/// completely are read one after the other: a thread that waits for [`Sources`] must not get other work from the pool,
+/// which may request the same.
 ///
 /// # Errors
-/// FB101, FB132.
+/// FB101 for files that cannot be read, FB132 for files that changed.
 fn sources(
     files: &ModelFiles,
     job: &[JobFileRead],

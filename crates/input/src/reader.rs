@@ -1,4 +1,4 @@
-//! What a reader of a matrix format is, and what it is given.
+//! The interface of a reader of a matrix format, and its input.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::error::Result;
@@ -7,16 +7,16 @@ use flexbody_base::text::InputFile;
 use flexbody_model::RawMatrix;
 use std::path::Path;
 
-/// The role of a matrix in the model. Files that hold several matrices tell them apart by it.
+/// Role of a matrix in the model. It selects among several matrices of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MatrixRole {
-    /// K.
+    /// Stiffness matrix K.
     Stiffness,
-    /// M.
+    /// Mass matrix M.
     Mass,
-    /// D.
+    /// Damping matrix D.
     Damping,
-    /// K_geo of a unit load.
+    /// Geometric stiffness matrix K_geo of a unit load.
     GeometricStiffness,
 }
 
@@ -24,7 +24,7 @@ impl MatrixRole {
     /// Every role.
     pub const ALL: [Self; 4] = [Self::Stiffness, Self::Mass, Self::Damping, Self::GeometricStiffness];
 
-    /// Its name in messages and in [`flexbody_base::provenance::SourceFile::role`].
+    /// Returns the name in messages and in [`flexbody_base::provenance::SourceFile::role`].
     pub fn name(self) -> &'static str {
         match self {
             Self::Stiffness => "stiffness",
@@ -34,8 +34,8 @@ impl MatrixRole {
         }
     }
 
-    /// Whether a matrix called `name` (any case) is meant to be this one: `K` or `stiffness`, `M` or `mass`,
-    /// `D` or `damping`, `Kg` or `geometric_stiffness`.
+    /// Returns true when a matrix called `name` (in any case) has this role: `K` or `stiffness`, `M` or `mass`, `D` or
+    /// `damping`, `Kg` or `geometric_stiffness`.
     pub fn is_named(self, name: &str) -> bool {
         let letter = match self {
             Self::Stiffness => "k",
@@ -47,30 +47,31 @@ impl MatrixRole {
     }
 }
 
-/// A matrix to read: a file and where in it.
+/// Location of a matrix to read.
 #[derive(Debug, Clone, Copy)]
 pub struct MatrixSource<'a> {
-    /// The file.
+    /// File of the matrix.
     pub file: &'a InputFile,
     /// Compression of the file.
     pub compression: Compression,
-    /// Group within the file, when the user named one.
+    /// Group within the file, if the user named one.
     pub group: Option<&'a str>,
     /// Role of the matrix in the model.
     pub role: MatrixRole,
-    /// The folder for files of its numbers where they are not to be held in memory, and a reader can do so.
+    /// Folder for files of the numbers, if these should not be held in memory and the reader supports it.
     pub keep_in: Option<&'a Path>,
 }
 
 impl<'a> MatrixSource<'a> {
-    /// Refuses a group in a file of a format (`what`, as in "an archive of SciPy") that has none.
+    /// Refuses a group in a file of a format (`what`, as in "an archive of SciPy") without groups.
     pub(super) fn has_one_matrix(&self, what: &str) -> std::result::Result<(), Diagnostic> {
         let Some(group) = self.group else { return Ok(()) };
         let message = format!("group `{group}` is named, but {what} holds one matrix");
         Err(Diagnostic::new(Code::Hdf5Layout, message).with_help("give the file without a group"))
     }
 
-    /// The bytes of a file of a binary format (`what`, as in "PETSc file") that is read where it lies.
+    /// Returns the bytes of an uncompressed file of a binary format (`what`, as in "PETSc file"); refuses a compressed
+    /// one.
     pub(super) fn not_packed(&self, what: &str) -> std::result::Result<&'a [u8], Diagnostic> {
         if self.compression == Compression::None {
             return Ok(self.file.bytes());
@@ -80,35 +81,36 @@ impl<'a> MatrixSource<'a> {
     }
 }
 
-/// Reads one matrix format. A new format is one file of this room, one entry in [`READERS`](super::READERS)
-/// and one folder in `fixtures/readers/`.
+/// Reader of one matrix format. A new format has one file in this crate, one entry in [`READERS`](super::READERS) and
+/// one folder in `fixtures/readers/`.
 pub trait Reader: Sync {
-    /// Name of the format in messages; in lower case with `-` for blanks, of its fixture folder.
+    /// Returns the name of the format in messages; in lower case with `-` for blanks it is the name of its fixture
+    /// folder.
     fn name(&self) -> &'static str;
 
-    /// File extensions in lower case, without the dot and without `.gz` or `.zst`. They decide only where the
+    /// Returns the file extensions in lower case, without the dot and without `.gz` or `.zst`. They decide only if the
     /// content does not.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// Whether a file (unpacked) that begins with `head` is of this format. `head` has at least [`HEAD`]
-    /// bytes unless the file is shorter.
+    /// Returns true when an (unpacked) file that begins with `head` has this format. `head` has at least [`HEAD`] bytes
+    /// unless the file is shorter.
     fn recognises(&self, head: &[u8]) -> bool;
 
-    /// True if the reader takes the file piece by piece or by its path; others are given a file whose bytes are in
-    /// memory.
+    /// Returns true when the reader reads the file piece by piece or by its path. Other readers get a file whose bytes
+    /// are in memory.
     fn reads_by_itself(&self) -> bool {
         false
     }
 
-    /// Reads the matrix: both triangles, zeros dropped, duplicates summed; symmetry of a matrix that is
-    /// stored in full is not checked here.
+    /// Reads the matrix with both triangles, without zeros, with summed duplicates. The symmetry of a matrix that is
+    /// stored in full is not checked.
     ///
     /// # Errors
-    /// FB103, FB301 to FB313 and FB101 for what the file is not, as many as are found.
+    /// FB101, FB103 for a file that cannot be read, FB301 to FB313 for an invalid matrix, all that are found.
     fn read(&self, source: &MatrixSource<'_>) -> Result<RawMatrix>;
 }
 
-/// Number of bytes that [`Reader::recognises`] is shown. HDF5 files may begin with a user block of this size.
+/// Number of bytes that [`Reader::recognises`] receives. HDF5 files may begin with a user block of this size.
 pub const HEAD: usize = 2048 + 8;
 
 #[cfg(test)]

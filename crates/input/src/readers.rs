@@ -1,4 +1,4 @@
-//! The registry of matrix formats, and which of them a file is of.
+//! The registry of matrix formats, and the choice of the format of a file.
 
 use super::dmig::DmigPunch;
 use super::hdf5::Hdf5;
@@ -14,13 +14,13 @@ use flexbody_base::text::Compression;
 use flexbody_base::text::InputFile;
 use std::path::Path;
 
-/// Every matrix format that is understood.
+/// Every supported matrix format.
 pub const READERS: &[&dyn Reader] = &[&MatrixMarket, &Hdf5, &ScipyNpz, &Mat5, &Petsc, &Output4, &DmigPunch];
 
-/// The reader for a file: by its content, else by its extension.
+/// Returns the reader for a file: by its content, else by its extension.
 ///
 /// # Errors
-/// FB102 when neither tells, with what the file seems to be.
+/// FB102 if neither determines the format, with the likely kind of the file.
 pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&'static dyn Reader> {
     let head = compression.head(file, HEAD);
     let by_content = READERS.iter().find(|reader| reader.recognises(&head));
@@ -28,7 +28,7 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
         let extension = extension(file.path());
         READERS.iter().find(|reader| reader.extensions().contains(&extension.as_str()))
     };
-    // A known format of others is better named than parsed as what its extension says.
+    // A known foreign format is reported by name rather than parsed by its extension.
     let not_read = NOT_READ.iter().find(|(magic, ..)| head.starts_with(magic));
     match (by_content, not_read) {
         (Some(reader), _) => Ok(*reader),
@@ -47,7 +47,7 @@ pub(super) fn reader_for(file: &InputFile, compression: Compression) -> Result<&
     }
 }
 
-/// First bytes of files that people have and that are not read, what they are, and what to do.
+/// First bytes of known file formats that are not supported, with their kind and advice.
 const NOT_READ: &[(&[u8], &str, &str)] = &[
     (b"PK\x03\x04", "a zip archive", "unpack it"),
     (
@@ -76,7 +76,7 @@ const NOT_READ: &[(&[u8], &str, &str)] = &[
     (b"\x28\xb5\x2f\xfd", "compressed twice", "unpack it once"),
 ];
 
-/// Extension in lower case, without that of the compression: `k.MTX.gz` gives `mtx`.
+/// Returns the extension in lower case, without that of the compression: `mtx` for `k.MTX.gz`.
 fn extension(path: &Path) -> String {
     let lower = |p: &Path| p.extension().map_or_else(String::new, |e| e.to_string_lossy().to_lowercase());
     match lower(path).as_str() {

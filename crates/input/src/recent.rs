@@ -1,6 +1,6 @@
-//! Where labels that came lately stand in a list of labels.
+//! A cache of the indices of recent labels in a list of labels.
 
-/// Numbers labels as they come. A label that was pushed out by others stands in the list once more.
+/// Cache that numbers labels as they come. A label that was displaced by others is added to the list again.
 pub(super) struct Recent<T> {
     slots: Vec<Option<(T, u32)>>,
 }
@@ -12,8 +12,8 @@ impl<T: Copy + PartialEq> Recent<T> {
         Self { slots: vec![None; 1 << Self::BITS] }
     }
 
-    /// The place of a label in `labels`, to which it is added where it did not come lately. Labels of one
-    /// node have one `direction` each.
+    /// Returns the index of a label in `labels`, to which the label is added if it is not in the cache. Labels of one
+    /// node differ in `direction`.
     pub(super) fn place(&mut self, label: T, (node, direction): (i64, u8), labels: &mut Vec<T>) -> u32 {
         let key = (node as u64).wrapping_mul(8).wrapping_add(u64::from(direction));
         let slot = &mut self.slots[(key.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> (64 - Self::BITS)) as usize];

@@ -1,27 +1,27 @@
-//! How FE programs are made to write their matrices: the lines of the deck, the run, the command that goes on
-//! from there. `docs/fe_programs.md` shows the same lines.
+//! The way FE programs write their matrices: the lines of the deck, the run, and the command that continues from there.
+//! `docs/fe_programs.md` shows these lines as well.
 
-/// The way from a deck of one FE program to a flexible body.
+/// Way from a deck of one FE program to a flexible body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Recipe {
     /// Name of the program.
     pub program: &'static str,
-    /// What is done one after the other.
+    /// Steps in their order.
     pub steps: &'static [Step],
-    /// What the model must be.
+    /// Requirements of the model.
     pub mind: &'static str,
 }
 
-/// Lines and where they belong.
+/// Lines with the place where they belong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// Where, in a few words.
+    /// Place of the lines, in a few words.
     pub place: &'static str,
-    /// The lines, without a newline behind the last.
+    /// Lines, without a newline after the last.
     pub lines: &'static str,
 }
 
-/// Every recipe.
+/// Recipes of all FE programs.
 pub const RECIPES: &[Recipe] = &[CALCULIX, ABAQUS, ANSYS, NASTRAN];
 
 const CALCULIX: Recipe = Recipe {

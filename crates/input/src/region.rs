@@ -1,48 +1,48 @@
-//! Node sets by geometry: the nodes that lie in a box, about an axis, in a plane, or nearest to a point.
+//! Node sets by geometry: the nodes in a box, about an axis, in a plane, or nearest to a point.
 
 use flexbody_model::Reference;
 use nalgebra::Vector3;
 
-/// Where the nodes of a set lie, in model axes.
+/// Region that contains the nodes of a set, in model axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Region {
-    /// Between two corners, with what lies on the faces.
+    /// Box between two corners, including its faces.
     Box {
-        /// Least coordinates.
+        /// Smallest coordinates.
         min: [f64; 3],
         /// Largest coordinates.
         max: [f64; 3],
     },
-    /// At a distance from an axis, between the ends of it.
+    /// Hollow cylinder: distances from an axis, between its ends.
     Cylinder {
         /// One end of the axis.
         from: [f64; 3],
-        /// The other end.
+        /// Other end of the axis.
         to: [f64; 3],
-        /// Least and largest distance from the axis.
+        /// Smallest and largest distance from the axis.
         radius: [f64; 2],
     },
-    /// On both sides of a plane.
+    /// Layer on both sides of a plane.
     Plane {
         /// A point of the plane.
         point: [f64; 3],
-        /// Its normal, of any length.
+        /// Normal of the plane, of any length.
         normal: [f64; 3],
         /// Largest distance from the plane.
         within: f64,
     },
-    /// The nodes nearest to a point.
+    /// Nodes nearest to a point.
     Nearest {
-        /// The point.
+        /// Point from which distances are measured.
         point: [f64; 3],
-        /// How many nodes.
+        /// Number of nodes.
         count: usize,
     },
 }
 
 impl Region {
-    /// The nodes among `nodes` (number and position) that lie in it, in their order. Of equally near nodes
-    /// those that come first.
+    /// Returns the nodes among `nodes` (number and position) in the region, in their order. Among equally near nodes
+    /// the first ones are chosen.
     pub fn nodes(&self, nodes: impl Iterator<Item = (i64, [f64; 3])>) -> Vec<i64> {
         if let Self::Nearest { point, count } = *self {
             let away = |x: [f64; 3]| (Vector3::from(x) - Vector3::from(point)).norm();
@@ -56,8 +56,8 @@ impl Region {
         nodes.filter(|(_, x)| self.holds(*x)).map(|(id, _)| id).collect()
     }
 
-    /// Returns where the reference point of an interface in the region lies if no other is stated: on the axis of a
-    /// cylinder.
+    /// Returns the default reference point of an interface in the region: on the axis for a cylinder, at the centre for
+    /// others.
     pub fn reference(&self) -> Reference {
         match *self {
             Self::Cylinder { from, to, .. } => {
@@ -76,7 +76,7 @@ impl Region {
                 let axis = (to - from) / length;
                 let along = (x - from).dot(&axis);
                 let away = (x - from - along * axis).norm();
-                // Ends and surfaces belong to it, whatever the rounding of the coordinates.
+                // Ends and surfaces belong to the region, whatever the rounding of the coordinates.
                 let slack = 1e-9 * (length + radius[1]);
                 (-slack..=length + slack).contains(&along)
                     && (radius[0] - slack..=radius[1] + slack).contains(&away)
@@ -94,7 +94,7 @@ impl Region {
 mod tests {
     use super::*;
 
-    /// A block of 5 x 3 x 3 nodes, numbered from 10.
+    /// Returns a block of 5 x 3 x 3 nodes, numbered from 10.
     fn block() -> impl Iterator<Item = (i64, [f64; 3])> {
         (0..45).map(|k| (10 + k, [(k % 5) as f64, (k / 5 % 3) as f64, (k / 15) as f64]))
     }

@@ -1,5 +1,5 @@
-//! Rows along axes of their nodes, turned into those of the model: K becomes A K A', where A has the axes of the
-//! rows of each node in its columns.
+//! Transformation of rows along axes of their nodes to the axes of the model: K becomes A K A', where the columns of A
+//! are the row axes of each node.
 
 use crate::assemble::{Entry, StoredEntries, assemble, push};
 use flexbody_base::diagnostic::Diagnostic;
@@ -7,25 +7,25 @@ use flexbody_linalg::CscMatrix;
 use flexbody_model::{DofLabel, NodeAxes as Block, RawMatrix};
 use std::collections::HashMap;
 
-/// Three rows that are turned together, or one that is not.
+/// Three rows that are rotated together, or a single row that is not.
 struct RowTriple {
     rows: [u32; 3],
-    /// Unit vectors along the rows; `None` where they stand.
+    /// Unit vectors along the rows; `None` for rows that are not rotated.
     axes: Option<Block>,
 }
 
-/// Which rows are turned.
+/// Rotation of the rows.
 pub(super) struct Turn {
     groups: Vec<RowTriple>,
-    /// Group of each row, and which of its rows it is.
+    /// Group of each row, and index of the row in the group.
     group_of: Vec<(u32, u8)>,
 }
 
 impl Turn {
-    /// From the labels of the rows and the unit vectors along the rows of some nodes.
+    /// Creates the rotation from the labels of the rows and the unit vectors along the rows of some nodes.
     ///
     /// # Errors
-    /// A node that has some displacements, or some rotations, but not each of them once.
+    /// The number of a node that has some displacements, or some rotations, but not each of them once.
     pub(super) fn new(labels: &[DofLabel], axes: &HashMap<i64, Block>) -> Result<Self, i64> {
         let mut triples: HashMap<(i64, bool), [u32; 3]> = HashMap::new();
         for (row, label) in labels.iter().enumerate().filter(|(_, label)| axes.contains_key(&label.node)) {
@@ -44,7 +44,7 @@ impl Turn {
                 continue;
             };
             let rows = triples[&(label.node, label.direction > 3)];
-            // Two rows of one direction: component 0 of a grid counts as its first.
+            // Two rows have one direction: component 0 of a grid counts as its first.
             if !rows.contains(&(row as u32)) {
                 return Err(label.node);
             }
@@ -57,7 +57,7 @@ impl Turn {
     }
 
     /// Returns the matrix with its rows and columns along the basic axes. Blocks that are a multiple of the identity
-    /// stay as they are where both their nodes have the same axes.
+    /// are unchanged if both their nodes have equal axes.
     pub(super) fn turned(&self, raw: RawMatrix) -> Result<RawMatrix, Diagnostic> {
         let mut pieces = Vec::new();
         for group in &self.groups {
@@ -89,7 +89,7 @@ impl Turn {
 }
 
 impl Turn {
-    /// Returns A: column i has the rows of the model that row i moves with.
+    /// Returns A: column i holds the rows of the model that move with row i.
     pub(super) fn axes(&self) -> CscMatrix {
         let mut entries = Vec::new();
         for (row, &(group, k)) in (0u32..).zip(&self.group_of) {
@@ -112,7 +112,7 @@ impl RowTriple {
     }
 }
 
-/// A B C' with the axes of the rows and of the columns in the columns of A and C.
+/// Returns A B C', where the columns of A and C are the axes of the rows and of the columns.
 fn turned_block(block: Block, rows: &RowTriple, columns: &RowTriple) -> Block {
     let is_multiple = (0..3).all(|j| (0..3).all(|k| block[j][k] == if j == k { block[0][0] } else { 0.0 }));
     if rows.axes == columns.axes && (is_multiple || rows.axes.is_none()) {
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(Turn::new(&labels, &axes).err(), Some(7));
     }
 
-    /// A spring along the first axis of two nodes whose axes differ, and a mass.
+    /// A spring along the first axis of two nodes with different axes, and a mass.
     #[test]
     fn a_spring_between_turned_nodes_pulls_along_its_line() {
         let labels: Vec<DofLabel> =
@@ -152,7 +152,7 @@ mod tests {
             digits: 12,
             path: PathBuf::new(),
         };
-        // Along the first row of node 1 and the third of node 2: both are z.
+        // The spring acts along the first row of node 1 and the third of node 2, which are both along z.
         let spring = raw(&[(0, 0, 5.0), (0, 5, -5.0), (5, 0, -5.0), (5, 5, 5.0)]);
         let turned = turn.turned(spring).expect("turned");
         let expected = [(2, 2, 5.0), (2, 5, -5.0), (5, 2, -5.0), (5, 5, 5.0)];

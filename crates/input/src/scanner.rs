@@ -1,25 +1,25 @@
-//! The text scanner under the line readers: lines with their numbers, words across lines, fields between columns, and
-//! the message about text that is not as expected.
+//! The text scanner behind the line readers: lines with their numbers, words across lines, fields of fixed columns, and
+//! the message about unexpected text.
 
 use crate::coordinates::excerpt;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// A line of a text.
+/// Line of a text.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Line<'a> {
     /// Number of the line, from 1.
     pub number: usize,
-    /// The line without its end and the blanks before it.
+    /// Text of the line without its end and leading blanks.
     pub text: &'a [u8],
 }
 
-/// The lines of a text. Bytes behind the last line end are a line, too.
+/// Iterator over the lines of a text. Bytes after the last line end count as a line.
 #[derive(Debug, Clone)]
 pub(crate) struct Lines<'a> {
     text: &'a [u8],
-    /// Where the next line begins.
+    /// Start of the next line.
     pub at: usize,
-    /// Number of the line that was given last.
+    /// Number of the last line.
     pub number: usize,
 }
 
@@ -28,12 +28,12 @@ impl<'a> Lines<'a> {
         Self::below(text, 0)
     }
 
-    /// True if all lines were given.
+    /// Returns true when there are no more lines.
     pub(crate) fn is_at_end(&self) -> bool {
         self.at >= self.text.len()
     }
 
-    /// The lines of a part of a file that has so many lines `above`.
+    /// Returns the lines of a part of a file with `above` lines above it.
     pub(crate) fn below(text: &'a [u8], above: usize) -> Self {
         Self { text, at: 0, number: above }
     }
@@ -51,21 +51,21 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
-/// The words of a text that blanks separate.
+/// Returns the words of a text, separated by blanks.
 pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
 }
 
-/// The field of a line between two columns, trimmed; empty where the line is shorter.
+/// Returns the field of a line in these columns, trimmed; empty if the line is shorter.
 pub(crate) fn field(line: &[u8], columns: std::ops::Range<usize>) -> &[u8] {
     line.get(columns.start..columns.end.min(line.len())).unwrap_or_default().trim_ascii()
 }
 
-/// The words of a text on all of its lines.
+/// Iterator over the words of a text on all its lines.
 #[derive(Debug, Clone)]
 pub(crate) struct Words<'a> {
     text: &'a [u8],
-    /// Where the text begins that was not given yet.
+    /// Start of the text that has not been read.
     pub at: usize,
 }
 
@@ -74,12 +74,12 @@ impl<'a> Words<'a> {
         Self { text, at: 0 }
     }
 
-    /// The text that was not given yet.
+    /// Returns the text that has not been read.
     pub(crate) fn rest(&self) -> &'a [u8] {
         &self.text[self.at..]
     }
 
-    /// The rest of the line, with its end.
+    /// Returns the rest of the line, with its end, and moves behind it.
     pub(crate) fn line(&mut self) -> &'a [u8] {
         let rest = self.rest();
         let end = memchr::memchr(b'\n', rest).map_or(rest.len(), |end| end + 1);
@@ -87,7 +87,7 @@ impl<'a> Words<'a> {
         &rest[..end]
     }
 
-    /// Number of the line, from 1, in which the text that was not given begins.
+    /// Returns the number of the line, from 1, at which the unread text begins.
     pub(crate) fn line_number(&self) -> usize {
         1 + memchr::memchr_iter(b'\n', &self.text[..self.at]).count()
     }
@@ -105,7 +105,7 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-/// The diagnostic about text that is not what was expected.
+/// Returns the diagnostic about unexpected text.
 pub(crate) fn expected(code: Code, what: &str, found: &[u8]) -> Diagnostic {
     Diagnostic::new(code, format!("expected {what}, found `{}`", excerpt(found)))
 }

@@ -13,13 +13,13 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
-/// The reader of SciPy's archives.
+/// Reader of SciPy's archives.
 pub(super) struct ScipyNpz;
 
 const HELP: &str = "write it again: scipy.sparse.save_npz(file, A.tocsc())";
 const MEMORY_HELP: &str = "use a larger machine";
 
-/// Bytes of an array that are unpacked before its header is known to be one: no header of NumPy is longer.
+/// Number of bytes of an array that are unpacked before its header is parsed: no header of NumPy is longer.
 const HEAD_BYTES: u64 = 1 << 17;
 
 const BOTH_TRIANGLES: &str = "save both triangles: A + scipy.sparse.tril(A, -1).T";
@@ -33,7 +33,7 @@ impl Reader for ScipyNpz {
         &["npz"]
     }
 
-    /// An archive whose first member is an array.
+    /// Recognises an archive whose first member is an array.
     fn recognises(&self, head: &[u8]) -> bool {
         let length = head.get(26..28).map_or(0, |b| usize::from(u16::from_le_bytes([b[0], b[1]])));
         head.starts_with(b"PK\x03\x04")
@@ -53,7 +53,7 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
     let &[rows, columns] = shape.as_slice() else {
         return Err(Diagnostic::new(Code::MatrixKind, "`shape` is not two whole numbers").with_help(HELP));
     };
-    // Before anything of that size is unpacked.
+    // The sizes are checked before anything is unpacked.
     let entries = archive.count("data")?;
     let n = check_size(rows.max(0) as u64, columns.max(0) as u64, entries)?;
     refuse_beyond_memory(entries)?;
@@ -92,8 +92,8 @@ fn read(source: &MatrixSource<'_>) -> std::result::Result<RawMatrix, Diagnostic>
     Ok(RawMatrix { digits: raw.digits.min(data.digits), ..raw })
 }
 
-/// A matrix in blocks of equal size: `data` (blocks x r x c), the block column of each in `indices`, where each
-/// block row begins in `indptr`.
+/// Reads a matrix in blocks of equal size: `data` (blocks x r x c), the block column of each block in `indices`, and
+/// the start of each block row in `indptr`.
 fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Result<RawMatrix, Diagnostic> {
     let wrong = |code, message: String| Err(Diagnostic::new(code, message).with_help(HELP));
     let npy::Blocks { count, rows, columns, values, digits } = npy::read_blocks(&archive.member("data")?)?;
@@ -126,7 +126,7 @@ fn blocks(archive: &mut Archive<'_>, n: usize, path: &Path) -> std::result::Resu
         for block in pair[0] as usize..pair[1] as usize {
             let own = &values[block * rows * columns..(block + 1) * rows * columns];
             for (k, &value) in own.iter().enumerate() {
-                // Zeros fill the blocks up: they are no entries, and an index outside of the matrix is one all the same.
+                // Zeros pad the blocks: they are no entries, but their indices must still lie within the matrix.
                 let row = (block_row * rows + k / columns) as i64;
                 let column =
                     indices[block].saturating_mul(columns as i64).saturating_add((k % columns) as i64);
@@ -161,7 +161,7 @@ fn coordinates(
     }
 }
 
-/// Refuses indices that are not as many as there are values, before they are unpacked.
+/// Refuses a number of indices that differs from the number of values, before they are unpacked.
 fn same_count(entries: u64, indices: u64, name: &str) -> std::result::Result<(), Diagnostic> {
     if entries == indices {
         return Ok(());
@@ -200,7 +200,7 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// The bytes of the array `name`, checked by its checksum.
+    /// Returns the bytes of the array `name`, verified by its checksum.
     fn member(&mut self, name: &str) -> std::result::Result<Vec<u8>, Diagnostic> {
         let mut member = self.open_member(name)?;
         let mut bytes = Vec::new();
@@ -209,7 +209,8 @@ impl<'a> Archive<'a> {
             member.by_ref().take(more).read_to_end(bytes).map_err(|error| damaged(&error)).map(|_| ())
         };
         take(&mut bytes, HEAD_BYTES)?;
-        // What is no array is refused by its begin; of an array no more is unpacked than its header announces.
+        // A member that is no array is refused by its beginning; of an array no more is unpacked than its header
+        // announces.
         if let Some(announced) = npy::announced_bytes(&bytes) {
             let refused =
                 refuse_beyond(left(), announced as f64, &format!("the array `{name}`"), MEMORY_HELP);
@@ -223,7 +224,7 @@ impl<'a> Archive<'a> {
         self.0.index_for_name(&format!("{name}.npy")).is_some()
     }
 
-    /// Number of values that the header of the array `name` announces.
+    /// Returns the number of values that the header of the array `name` announces.
     fn count(&mut self, name: &str) -> std::result::Result<u64, Diagnostic> {
         let mut member = self.open_member(name)?;
         let mut bytes = Vec::new();

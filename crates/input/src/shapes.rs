@@ -1,5 +1,5 @@
-//! Arrays of shapes or loads, one for each column (or row): NumPy, HDF5 or Matrix Market, told apart by
-//! content. Shapes come also by nodes, as FE programs write modes.
+//! Arrays of shapes or loads, one for each column (or row), in NumPy, HDF5 or Matrix Market files, recognised by
+//! content. Shapes may also come by nodes, as FE programs write modes.
 
 use super::array::Array;
 use super::hdf5::Hdf5;
@@ -16,20 +16,20 @@ use flexbody_base::text::Compression;
 use flexbody_base::text::InputFile;
 use flexbody_model::{RawModes, RawShapes};
 
-/// Shapes as a file has them.
+/// Shapes as read from a file.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ImportedColumns {
-    /// By matrix rows.
+    /// Shapes by matrix rows.
     Rows(RawShapes),
-    /// By nodes, with eigenvalues.
+    /// Modes by nodes, with eigenvalues.
     Modes(RawModes),
 }
 
-/// Reads shapes by rows, of which there may be as many as one of `counts`, or by nodes. `role` names the file in
-/// the provenance.
+/// Reads shapes by rows, whose number must be one of `counts`, or by nodes. `role` is the role of the file in the
+/// provenance.
 ///
 /// # Errors
-/// Those of [`read_shapes`]; FB128 and FB306 for files of modes.
+/// The errors of [`read_shapes`]; FB128 and FB306 for files of modes.
 pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<ImportedColumns> {
     let file = InputFile::open_unread(&location.path)?;
     match read_modes(&file, role).filter(|_| location.group.is_none()) {
@@ -38,11 +38,11 @@ pub fn read_imported(location: &MatrixLocation, counts: &[usize], role: &str) ->
     }
 }
 
-/// Reads shapes or loads: an array n x k, or k x n, where n is one of `counts` (the numbers of rows that the files
-/// of a model have) and k is none. `role` names the file in the provenance.
+/// Reads shapes or loads: an array n x k, or k x n, where n is one of `counts` (the numbers of rows of the files of a
+/// model) and k is none of them. `role` is the role of the file in the provenance.
 ///
 /// # Errors
-/// FB101 to FB106 and FB301 to FB313 for what the file is not, FB320 when it has no extent n.
+/// FB101 to FB106 and FB301 to FB313 for files that cannot be read, FB320 if the array has no extent n.
 pub fn read_shapes(location: &MatrixLocation, counts: &[usize], role: &str) -> Result<RawShapes> {
     let file = InputFile::open_unread(&location.path)?;
     let path = file.path();
@@ -84,7 +84,7 @@ fn read(file: &InputFile, dataset: Option<&str>) -> std::result::Result<Array, V
     )])
 }
 
-/// The array with one shape in each column, and its digits.
+/// Returns the array with one shape per column, and its number of digits.
 fn oriented(array: Array, counts: &[usize]) -> std::result::Result<(Mat<f64>, u8), Diagnostic> {
     let Array { rows, cols, row_major, values, digits } = array;
     let upright = match (counts.contains(&rows), counts.contains(&cols)) {
@@ -102,7 +102,7 @@ fn oriented(array: Array, counts: &[usize]) -> std::result::Result<(Mat<f64>, u8
         }
     };
     let (n, k) = if upright { (rows, cols) } else { (cols, rows) };
-    // Shapes follow each other: row by row in an array of rows, column by column in one of columns.
+    // Shapes are contiguous: rows of a row-major array of rows, or columns of a column-major array of columns.
     let one_by_one = row_major != upright;
     let at = |i: usize, j: usize| if one_by_one { j * n + i } else { i * k + j };
     Ok((Mat::from_fn(n, k, |i, j| values[at(i, j)]), digits))

@@ -12,7 +12,7 @@ const fn column(name: &'static str, required: bool) -> Column {
     Column { name, required }
 }
 
-/// Reads `node,x,y,z` (`dimension` 2: `node,x,y`, with z = 0 where there is a column z).
+/// Reads `node,x,y,z`; for `dimension` 2 `node,x,y`, where a column z must be zero.
 pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
     let plane = dimension == 2;
     let columns = [column("node", true), column("x", true), column("y", true), column("z", !plane)];
@@ -40,7 +40,7 @@ pub(super) fn read_nodes(file: &InputFile, dimension: u8) -> Found<Nodes> {
     Ok(Nodes { ids: rows.iter().map(|r| r.0).collect(), positions: rows.iter().map(|r| r.2).collect() })
 }
 
-/// Reads `node,dir` or `row,node,dir`; the labels come in the order of the matrix rows.
+/// Reads `node,dir` or `row,node,dir`. Returns the labels in the order of the matrix rows.
 pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
     let columns = [column("node", true), column("dir", true), column("row", false)];
     let table = Table::open(file, &columns)
@@ -71,11 +71,12 @@ pub(super) fn read_dofs(file: &InputFile) -> Found<Vec<DofLabel>> {
     if numbered { by_row(file, &rows) } else { Ok(rows.into_iter().map(|r| r.2).collect()) }
 }
 
-/// Puts labels into the order of their row numbers, which must be 0 to n - 1, each once.
+/// Sorts labels by their row numbers, which must be 0 to n - 1, each once.
 fn by_row(file: &InputFile, rows: &[(i64, usize, DofLabel)]) -> Found<Vec<DofLabel>> {
     let n = rows.len();
     let mut at: Vec<Option<usize>> = vec![None; n];
     let mut bad = BadRows::new(file.path());
+    // Rows that are numbered from 1 get a specific help.
     let from_one = rows.iter().all(|r| r.0 >= 1) && rows.iter().any(|r| r.0 == n as i64);
     for (k, &(row, line, _)) in rows.iter().enumerate() {
         let slot = usize::try_from(row).ok().and_then(|row| at.get_mut(row));

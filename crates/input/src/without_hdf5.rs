@@ -1,4 +1,4 @@
-//! HDF5 files where the library was built without HDF5: recognised, and refused by name.
+//! HDF5 files in a build without HDF5: recognised, and refused by name.
 
 use super::array::Array;
 use super::reader::{MatrixSource, Reader};
@@ -7,7 +7,7 @@ use flexbody_base::error::{Error, Result};
 use flexbody_base::text::input_file::{InputFile, is_hdf5};
 use flexbody_model::{Elements, Nodes, RawMatrix};
 
-/// In the place of the HDF5 reader.
+/// Substitute of the HDF5 reader, which refuses every file.
 pub(super) struct Hdf5;
 
 impl Reader for Hdf5 {
@@ -28,15 +28,15 @@ impl Reader for Hdf5 {
     }
 }
 
-/// In the place of reading an array of shapes.
+/// Refuses an array of shapes.
 pub(super) fn read_array(_: &InputFile, _: Option<&str>) -> std::result::Result<Array, Vec<Diagnostic>> {
     Err(vec![left_out()])
 }
 
-/// Sets of node numbers by name.
+/// Node numbers of sets by name.
 type NamedSets = Vec<(String, Vec<i64>)>;
 
-/// In the place of reading the nodes of an Exodus file.
+/// Refuses an Exodus file.
 pub(super) fn read_exodus(
     _: &InputFile,
 ) -> std::result::Result<(Nodes, NamedSets, Elements), Vec<Diagnostic>> {

@@ -1,4 +1,4 @@
-//! Point masses on nodes that turn: what a rigid region or a mass on an arm is, without matrices of rotations.
+//! Point masses on nodes that rotate: rigid regions, or masses on rigid arms, without matrices of rotations.
 
 use super::equations::State;
 use super::random::Random;
@@ -6,25 +6,26 @@ use super::turning::{dense, sparse};
 use flexbody_model::{DofLabel, Nodes, RawModel};
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
-/// A point at x + t + exp(theta~) r of a node with the displacement t and, where it has some, the rotation vector
-/// theta.
+/// Point at x + t + exp(theta~) r of a node with the displacement t and the rotation vector theta; nodes without
+/// rotations have theta = 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Attached {
     pub node: usize,
     pub arm: Vector3<f64>,
 }
 
-/// Points that nodes carry, with a mass between them that is the same along every axis.
+/// Points carried by nodes, with a mass matrix between the points that is the same along every axis.
 pub struct Carriers {
     pub positions: Vec<[f64; 3]>,
-    /// First row of the rotations of every node; displacements of node i are rows 3 i.
+    /// First row of the rotations of every node; `None` without rotations. Displacements of node i have the rows from 3
+    /// i on.
     pub turning: Vec<Option<usize>>,
     pub points: Vec<Attached>,
-    /// Mass between the points.
+    /// Mass matrix between the points (p x p).
     pub mass: DMatrix<f64>,
 }
 
-/// A motion: velocities and accelerations of the frame along its axes, u and its rates.
+/// Motion at an instant: velocities and accelerations of the frame along its axes, displacements u and their rates.
 pub struct Path<'a> {
     pub velocity: Vector3<f64>,
     pub omega: Vector3<f64>,
@@ -36,7 +37,7 @@ pub struct Path<'a> {
 }
 
 impl Carriers {
-    /// Nodes in the order of `positions`, those of `turning` with three rotations after all displacements.
+    /// Creates nodes at `positions`. The nodes `turning` have three rotations each, in rows after all displacements.
     pub fn new(
         positions: Vec<[f64; 3]>,
         turning: &[usize],
@@ -56,7 +57,7 @@ impl Carriers {
         x.fixed_rows::<3>(row).into_owned()
     }
 
-    /// Places of the points in the frame at the displacements u, about `origin`.
+    /// Returns the positions of the points relative to `origin`, in the frame, at the displacements u.
     pub fn places(&self, origin: &Vector3<f64>, u: &DVector<f64>) -> Vec<Vector3<f64>> {
         let place = |point: &Attached| {
             let turn = self.turning[point.node].map_or_else(Vector3::zeros, |row| Self::vector(u, row));
@@ -66,7 +67,7 @@ impl Carriers {
         self.points.iter().map(place).collect()
     }
 
-    /// d(places)/du along a direction, by differences of sixth order.
+    /// Returns the derivative of the positions along a direction, by differences of sixth order.
     fn derivative(&self, u: &DVector<f64>, along: &DVector<f64>, step: f64) -> Vec<Vector3<f64>> {
         let at = |h: f64| self.places(&Vector3::zeros(), &(u + along * (h * step)));
         let pairs = [1.0, 2.0, 3.0].map(|k| (at(k), at(-k)));
@@ -77,7 +78,8 @@ impl Carriers {
         (0..self.points.len()).map(of_point).collect()
     }
 
-    /// The second derivative along the path u + u' t + u'' t^2 / 2, by differences of sixth order.
+    /// Returns the second derivative of the positions along the path u + u' t + u'' t^2 / 2, by differences of sixth
+    /// order.
     fn second_derivative(&self, path: &Path<'_>, step: f64) -> Vec<Vector3<f64>> {
         let at = |k: f64| {
             let t = k * step;
@@ -91,19 +93,19 @@ impl Carriers {
         (0..self.points.len()).map(of_point).collect()
     }
 
-    /// Velocities of the points along the axes of the frame.
+    /// Returns the velocities of the points along the axes of the frame.
     fn velocities(&self, origin: &Vector3<f64>, path: &Path<'_>, step: f64) -> Vec<Vector3<f64>> {
         let places = self.places(origin, path.u);
         let relative = self.derivative(path.u, path.ud, step);
         places.iter().zip(relative).map(|(y, yd)| path.velocity + path.omega.cross(y) + yd).collect()
     }
 
-    /// Products of the mass with vectors of the points.
+    /// Returns the products of the mass matrix with vectors of the points.
     fn weighted(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         (0..x.len()).map(|i| (0..x.len()).map(|j| x[j] * self.mass[(i, j)]).sum()).collect()
     }
 
-    /// Kinetic energy, linear momentum and angular momentum about the origin of the frame.
+    /// Returns kinetic energy, linear momentum and angular momentum about the origin of the frame.
     pub fn momenta(
         &self,
         origin: &Vector3<f64>,
@@ -118,7 +120,8 @@ impl Carriers {
         (energy, momentum.iter().sum(), angular)
     }
 
-    /// The forces of d'Alembert: of the frame, of its torque about the origin, and of all rows.
+    /// Returns the inertia forces of d'Alembert: force and torque on the frame about its origin, and forces on all
+    /// rows.
     pub fn inertia_forces(
         &self,
         origin: &Vector3<f64>,
@@ -127,6 +130,7 @@ impl Carriers {
     ) -> (Vector3<f64>, Vector3<f64>, DVector<f64>) {
         let (places, yd) = (self.places(origin, path.u), self.derivative(path.u, path.ud, step));
         let (w, ydd) = (path.omega, self.second_derivative(path, step));
+        // Acceleration in a moving frame: of the origin, Euler, centripetal, Coriolis and relative.
         let accelerations: Vec<Vector3<f64>> = (0..places.len())
             .map(|i| {
                 path.linear
@@ -143,7 +147,7 @@ impl Carriers {
         (forces.iter().sum(), torque, rows)
     }
 
-    /// Forces at the points on the rows: their power on every unit rate.
+    /// Returns the forces on the rows that forces at the points cause: their power on every unit rate.
     pub fn onto_rows(&self, u: &DVector<f64>, forces: &[Vector3<f64>], step: f64) -> DVector<f64> {
         DVector::from_fn(self.rows(), |row, _| {
             let unit = DVector::from_fn(self.rows(), |i, _| f64::from(u8::from(i == row)));
@@ -151,12 +155,12 @@ impl Carriers {
         })
     }
 
-    /// Forces of a uniform acceleration `b` on the points.
+    /// Returns the forces of a uniform acceleration `b` on the points.
     pub fn weights(&self, b: &Vector3<f64>) -> Vec<Vector3<f64>> {
         self.weighted(&vec![*b; self.points.len()])
     }
 
-    /// Displacements of all points for those of all rows, to first order (3 p x N).
+    /// Returns the linear map from the displacements of all rows to those of all points (3 p x N).
     pub fn linear_map(&self) -> DMatrix<f64> {
         let mut map = DMatrix::zeros(3 * self.points.len(), self.rows());
         for (i, point) in self.points.iter().enumerate() {
@@ -171,7 +175,7 @@ impl Carriers {
         map
     }
 
-    /// The model with the stiffness `k` of its rows, and the mass of the points on them.
+    /// Returns the model with the stiffness `k` of its rows, and the mass of the points.
     pub fn model(&self, name: &str, k: &DMatrix<f64>) -> RawModel {
         let map = self.linear_map();
         let mass = map.transpose() * self.mass.kronecker(&DMatrix::<f64>::identity(3, 3)) * &map;
@@ -191,13 +195,13 @@ impl Carriers {
     }
 }
 
-/// The symmetric part of a matrix: products round differently on both sides of the diagonal.
+/// Returns the symmetric part of a matrix: products round differently on both sides of the diagonal.
 fn symmetric(a: &DMatrix<f64>) -> DMatrix<f64> {
     (a + a.transpose()) * 0.5
 }
 
-/// A rigid region: the nodes of `region` of a solid with the stiffness `k` (3n) and the mass `mass` (n) go with a
-/// new last node at `reference`.
+/// Returns a solid with a rigid region: the nodes of `region` of a solid with the stiffness `k` (3n) and the mass
+/// `mass` (n) follow a new last node at `reference`.
 pub fn rigid_region(
     positions: &[[f64; 3]],
     region: &[usize],
@@ -220,13 +224,13 @@ pub fn rigid_region(
     (carriers, stiffness)
 }
 
-/// Beams without rotational mass, each of whose nodes carries three masses on stiff arms in any direction instead of
-/// its own.
+/// Returns beams without rotational mass, in which each node carries three masses on rigid arms in arbitrary directions
+/// instead of the mass of the beams.
 pub fn masses_on_beams(beams: &RawModel, seed: u64) -> (Carriers, RawModel) {
     let mut random = Random(seed);
     let positions = beams.nodes.positions.clone();
     let n = positions.len();
-    // Rows of beams are node by node.
+    // The rows of the beams are node by node; displacements come first here.
     let k = dense(&beams.stiffness.matrix);
     let row = |i: usize| match i.checked_sub(3 * n) {
         None => 6 * (i / 3) + i % 3,
@@ -242,7 +246,7 @@ pub fn masses_on_beams(beams: &RawModel, seed: u64) -> (Carriers, RawModel) {
     (carriers, model)
 }
 
-/// A state of the oracle along the axes of the frame, with accelerations.
+/// Returns the motion of a state of the oracle along the axes of the frame, with accelerations.
 pub fn path<'a>(
     state: &State,
     (u, ud, udd): (&'a DVector<f64>, &'a DVector<f64>, &'a DVector<f64>),

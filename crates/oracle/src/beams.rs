@@ -5,21 +5,21 @@ use flexbody_linalg::CscMatrix;
 use flexbody_model::{DofLabel, Nodes, RawModel};
 use nalgebra::{Matrix3, Vector3};
 
-/// How the mass of a frame is distributed.
+/// Distribution of the mass of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BeamMass {
-    /// Cubic deflections, linear extension and twist.
+    /// Consistent mass of cubic deflections, linear extension and twist.
     Consistent,
-    /// The same with the rotary inertia of the sections.
+    /// Consistent mass with the rotary inertia of the sections.
     Rotary,
-    /// Half of every beam at each of its nodes, nothing on the rotations.
+    /// Lumped mass: half of every beam at each of its nodes, nothing on the rotations.
     Lumped,
 }
 
 /// Young's modulus of [`shaft`], whose density is 1.
 pub const SHAFT_YOUNGS: f64 = 4.0;
 
-/// Beams of one square section; Euler's and Bernoulli's assumptions.
+/// Square section of Euler-Bernoulli beams.
 struct Section {
     width: f64,
     youngs: f64,
@@ -27,7 +27,7 @@ struct Section {
     density: f64,
 }
 
-/// A star of six stubby rubber beams that join in one node: three nodes at either end along x.
+/// Returns a star of six short rubber beams that meet in one node, with three nodes at either end along x.
 pub fn star(mass: BeamMass) -> RawModel {
     let positions: [[f64; 3]; 7] = [
         [0.0, 0.0, 0.0],
@@ -43,9 +43,10 @@ pub fn star(mass: BeamMass) -> RawModel {
     frame("star of beams", &positions, &beams, &section, mass)
 }
 
-/// A tube of unit radius around z: rings of `around` beams at a distance of a half, and beams along between them, of
-/// consistent mass. Beside it the eigenvalue of its rings in their planes with two waves around, where the beams along
-/// are moved without being deformed (Blevins, Formulas for Natural Frequency and Mode Shape, table 9-2).
+/// Returns a tube of unit radius around z, with consistent mass: rings of `around` beams at distances of 0.5, and axial
+/// beams between them. Returns also the eigenvalue of its rings in their planes with two waves around the
+/// circumference, in which the axial beams move without deformation (Blevins, Formulas for Natural Frequency and Mode
+/// Shape, table 9-2).
 pub fn tube(around: usize, rings: usize, width: f64) -> (RawModel, f64) {
     const APART: f64 = 0.5;
     let angle = |i: usize| std::f64::consts::TAU * i as f64 / around as f64;
@@ -63,7 +64,7 @@ pub fn tube(around: usize, rings: usize, width: f64) -> (RawModel, f64) {
     (frame("tube of beams", &positions, &beams, &section, BeamMass::Consistent), first)
 }
 
-/// An elbow of two legs that lie along no axis, of `parts` consistent beams each.
+/// Returns an elbow of two legs along no axis, each of `parts` consistent beams.
 pub fn elbow(parts: usize) -> RawModel {
     let corners = [Vector3::new(0.1, -0.2, 0.3), Vector3::new(0.9, 0.5, 0.1), Vector3::new(1.1, 0.2, 0.9)];
     let along =
@@ -73,14 +74,15 @@ pub fn elbow(parts: usize) -> RawModel {
     chain("elbow of beams", &positions)
 }
 
-/// Consistent beams of rubber from each place to the next.
+/// Returns a chain of consistent rubber beams through `positions`.
 pub fn chain(name: &str, positions: &[[f64; 3]]) -> RawModel {
     let beams: Vec<_> = (1..positions.len()).map(|i| (i - 1, i)).collect();
     let section = Section { width: 0.05, youngs: 4.0, shear: 1.5, density: 1.0 };
     frame(name, positions, &beams, &section, BeamMass::Consistent)
 }
 
-/// A straight shaft of unit length along x, of `parts` beams with rotary inertia, whose square section has this width.
+/// Returns a straight shaft of unit length along x, of `parts` beams with rotary inertia and a square section of this
+/// width.
 pub fn shaft(parts: usize, width: f64) -> RawModel {
     let positions: Vec<[f64; 3]> = (0..=parts).map(|i| [i as f64 / parts as f64, 0.0, 0.0]).collect();
     let beams: Vec<_> = (0..parts).map(|i| (i, i + 1)).collect();
@@ -88,7 +90,7 @@ pub fn shaft(parts: usize, width: f64) -> RawModel {
     frame("shaft", &positions, &beams, &section, BeamMass::Rotary)
 }
 
-/// Beams of one section between nodes.
+/// Returns the model of beams of one section between nodes.
 fn frame(
     name: &str,
     positions: &[[f64; 3]],
@@ -117,7 +119,7 @@ fn frame(
 }
 
 impl Section {
-    /// Stiffness and mass (12 x 12) in the axes of the model.
+    /// Returns stiffness and mass (12 x 12) of a beam in the axes of the model.
     fn beam(&self, ends: [Vector3<f64>; 2], mass: BeamMass) -> (Mat<f64>, Mat<f64>) {
         let along = ends[1] - ends[0];
         let length = along.norm();
@@ -149,7 +151,7 @@ impl Section {
         k
     }
 
-    /// Rotary inertia of the sections across the beam, with cubic deflections.
+    /// Returns the rotary inertia of the sections about their transverse axes, with cubic deflections.
     fn rotary(&self, l: f64) -> Mat<f64> {
         let area = self.width * self.width;
         let mut m = Mat::zeros(12, 12);
@@ -170,7 +172,7 @@ impl Section {
     }
 }
 
-/// Adds a bar along one direction: `diagonal` of each end, and what couples them.
+/// Adds a bar along one direction, with the entries `diagonal` of each end and `coupling` between the ends.
 fn add_bar(a: &mut Mat<f64>, at: usize, scale: f64, [diagonal, coupling]: [f64; 2]) {
     for (i, j, value) in [(0, 0, diagonal), (6, 6, diagonal), (0, 6, coupling), (6, 0, coupling)] {
         a[(at + i, at + j)] += scale * value;
@@ -179,7 +181,7 @@ fn add_bar(a: &mut Mat<f64>, at: usize, scale: f64, [diagonal, coupling]: [f64; 
 
 /// Adds bending in both planes; `upper` holds the rows of the upper triangle for (v, l v') of either end.
 fn add_bending(a: &mut Mat<f64>, l: f64, scale: f64, upper: [f64; 10]) {
-    // The deflection along z falls where the section turns about y.
+    // A positive rotation about y lowers the deflection along z.
     for (rows, slope) in [([1, 5, 7, 11], l), ([2, 4, 8, 10], -l)] {
         let factor = [1.0, slope, 1.0, slope];
         let mut values = upper.iter();

@@ -1,4 +1,5 @@
-//! Small bodies with interfaces: a bracket of hexahedra and a plane strip held at two ends, and a soft block on a foot.
+//! Small bodies with interfaces: a bracket of hexahedra and a plane strip held at two ends, and a soft block with one
+//! interface.
 
 use crate::elements::{ElementKind, MassRule, Material};
 use crate::mesh::{Mesh, grid};
@@ -8,7 +9,8 @@ use flexbody_model::{Coupling, NodeSet, RawModel, Reference};
 
 const CELL: f64 = 0.05;
 
-/// A bracket with its two ends as interfaces, the second about a point far from its nodes, turned and moved.
+/// Returns a rotated and shifted bracket with its two ends as interfaces; the reference point of the second is far from
+/// its nodes.
 pub fn bracket(couplings: [Coupling; 2]) -> RawModel {
     let mesh = Mesh::bracket(ElementKind::Hex8, 4, 2, CELL);
     let end = |axis: usize| -> Vec<i64> {
@@ -34,7 +36,7 @@ pub fn bracket(couplings: [Coupling; 2]) -> RawModel {
     raw
 }
 
-/// A plane strip held at its ends.
+/// Returns a plane strip held at its ends.
 pub fn strip(couplings: [Coupling; 2]) -> RawModel {
     let mut raw = rectangle(8, 3, 0.4, [0.3, -0.1]);
     let last = raw.nodes.len() as i64;
@@ -48,7 +50,7 @@ pub fn strip(couplings: [Coupling; 2]) -> RawModel {
     raw
 }
 
-/// A rubber-like block without any symmetry, turned and far from the model's origin, with an interface.
+/// Returns a rubber-like block without symmetry, rotated and far from the origin of the model, with an interface.
 pub fn footed_block() -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([4, 2, 2]), |[x, y, z]| {

@@ -1,4 +1,4 @@
-//! The cases of `fixtures/cases/`: a command, its files told as changes of files that are sound, and its report.
+//! The cases of `fixtures/cases/`: a command, its files as changes of valid files, and its report.
 
 use crate::{fixtures, members};
 use serde::Deserialize;
@@ -6,20 +6,20 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The contents of files by their names.
+/// Contents of files by file name.
 pub type Files = BTreeMap<String, Vec<u8>>;
 
-/// The content of the file of a case; `fixtures/cases/README.md` describes it.
+/// Content of the file of a case, as `fixtures/cases/README.md` describes it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Case {
     pub what: String,
     pub command: String,
-    /// The report of the program.
+    /// Expected report of the program.
     #[serde(default)]
     pub expected: String,
     pub body: Option<String>,
-    /// Models of further bodies by the names of their files.
+    /// Models of further bodies by file name.
     #[serde(default)]
     pub bodies: BTreeMap<String, String>,
     base: Option<PathBuf>,
@@ -53,12 +53,12 @@ impl Case {
         Case { file: file.to_owned(), ..case }
     }
 
-    /// Returns the name, which begins with the code.
+    /// Returns the name of the case, which begins with the code.
     pub fn name(&self) -> String {
         self.file.file_stem().expect("a name").to_string_lossy().into_owned()
     }
 
-    /// Returns the code that the case is about.
+    /// Returns the code that the case tests.
     pub fn code(&self) -> String {
         self.name().split('-').next().expect("a first part").to_owned()
     }
@@ -66,7 +66,7 @@ impl Case {
     /// Writes `report` as the expected one into the file of the case.
     ///
     /// # Panics
-    /// For a report with three apostrophes, which would end the text.
+    /// If the report contains three apostrophes, which would end the text.
     pub fn bless(&self, report: &str) {
         const BEGIN: &str = "expected = '''\n";
         const END: &str = "'''\n";
@@ -77,7 +77,7 @@ impl Case {
                 let (_, after) = rest.split_once(END).expect("the report ends");
                 format!("{before}{BEGIN}{report}{END}{after}")
             }
-            // A new case: before its tables.
+            // A new case gets the report before its tables.
             None => {
                 let tables = ["\n[bodies]", "\n[take]", "\n[files]", "\n[append]"];
                 let at = tables.iter().filter_map(|table| text.find(table)).min().unwrap_or(text.len());
@@ -88,7 +88,7 @@ impl Case {
         fs::write(&self.file, written).expect("a writable case");
     }
 
-    /// The files that the command finds, but for the body.
+    /// Returns the files that the command finds, without the body.
     pub fn files(&self) -> Files {
         let mut files = self.base.as_ref().map(|base| contents(&fixtures().join(base))).unwrap_or_default();
         let taken = self.take.iter().map(|(name, path)| (name.clone(), content(&fixtures().join(path))));
@@ -109,7 +109,7 @@ impl Case {
         files
     }
 
-    /// The files of `fixtures/cases/files` that belong to the case: binary and long ones.
+    /// Returns the files of `fixtures/cases/files` for the case: binary and long files.
     pub fn own_files(&self) -> Files {
         let folder = fixtures().join("cases").join("files").join(self.name());
         if folder.is_dir() { contents(&folder) } else { Files::new() }
@@ -126,7 +126,7 @@ impl Case {
     }
 }
 
-/// The files of a folder.
+/// Returns the files of a folder.
 pub fn contents(folder: &Path) -> Files {
     let entries = fs::read_dir(folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
     let paths = entries.map(|entry| entry.expect("an entry").path());

@@ -1,4 +1,4 @@
-//! Craig-Bampton bodies as tests make them and look at them.
+//! Craig-Bampton bodies for tests.
 
 use flexbody_base::error::Result;
 use flexbody_body::basis::{Basis, BasisChoice, CraigBampton, ModalBasis, ModeSettings, Task};
@@ -9,12 +9,12 @@ use flexbody_eigen::Wanted;
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel};
 
-/// Checks a model that is sound.
+/// Checks a valid model.
 pub fn model(raw: RawModel) -> FeModel {
     FeModel::from_raw(raw).expect("a sound model").model
 }
 
-/// Settings for the lowest `count` modes.
+/// Returns settings for the lowest `count` modes.
 pub fn lowest(count: usize) -> ModeSettings {
     ModeSettings { wanted: Wanted::Lowest(count), ..ModeSettings::default() }
 }
@@ -51,7 +51,7 @@ pub fn body(model: &FeModel, count: usize) -> FlexBody {
     converted(model, BasisChoice::CraigBampton(CraigBampton), count, BodyFrame::Principal).body
 }
 
-/// Eigenvalues of the fixed-interface modes of a basis.
+/// Returns the eigenvalues of the fixed-interface modes of a basis.
 pub fn fixed(basis: &ModalBasis) -> Vec<f64> {
     let coordinates = &basis.coordinates.as_ref().expect("a Craig-Bampton basis").coordinates;
     let all = coordinates.names.iter().enumerate();
@@ -60,12 +60,12 @@ pub fn fixed(basis: &ModalBasis) -> Vec<f64> {
         .collect()
 }
 
-/// The record that a Craig-Bampton body has of its fixed-interface modes.
+/// Returns the record of the fixed-interface modes in a Craig-Bampton body.
 pub fn record(body: &FlexBody) -> &FixedInterface {
     body.certificate().fixed_interface.as_ref().expect("a Craig-Bampton body")
 }
 
-/// Fails if `found` differs from `expected` by more than a part `tolerance` of it.
+/// Fails if `found` differs from `expected` by more than the relative tolerance.
 pub fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
     assert!((found - expected).abs() <= tolerance * expected.abs(), "{what}: {found}, expected {expected}");
 }

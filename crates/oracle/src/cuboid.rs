@@ -1,9 +1,9 @@
-//! Homogeneous cuboids of trilinear hexahedra: the consistent mass is a tensor product of the mass matrices
-//! of linear bars, written down here without any element code.
+//! Homogeneous cuboids of trilinear hexahedra. The consistent mass is a tensor product of the mass matrices of linear
+//! bars, written here without any element code.
 
 use flexbody_linalg::{CscMatrix, SymmetricMatrix};
 
-/// A grid of nx x ny x nz elements over the box `low` .. `low` + `size`.
+/// Grid of nx x ny x nz elements over the box from `low` to `low` + `size`.
 pub struct Cuboid {
     pub cells: [usize; 3],
     pub low: [f64; 3],
@@ -11,7 +11,7 @@ pub struct Cuboid {
     pub density: f64,
 }
 
-/// Mass matrix of n linear bar elements over a length, by row: (column, value).
+/// Returns the mass matrix of n linear bar elements over a length, by row: (column, value).
 fn bar(n: usize, length: f64) -> Vec<Vec<(usize, f64)>> {
     let h = length / n as f64;
     (0..=n)
@@ -48,7 +48,7 @@ impl Cuboid {
         self.nodes().map(|i| [at(i[0], 0), at(i[1], 1), at(i[2], 2)]).collect()
     }
 
-    /// Ms: M = Ms kron I3.
+    /// Returns the scalar mass matrix Ms, with M = Ms kron I3.
     pub fn scalar_mass(&self) -> SymmetricMatrix {
         let bars: [_; 3] = std::array::from_fn(|k| bar(self.cells[k], self.size[k]));
         let (mut col_ptr, mut row_idx, mut values) = (vec![0], Vec::new(), Vec::new());

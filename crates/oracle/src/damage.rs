@@ -1,8 +1,8 @@
-//! Random damages of files.
+//! Random damage to files.
 
 use proptest::prelude::*;
 
-/// One change of the bytes, at a place given as a fraction of the length.
+/// Change of the bytes at a position, which is given as a fraction of the length.
 #[derive(Debug, Clone)]
 pub enum Damage {
     Flip(f64, u8),
@@ -13,7 +13,7 @@ pub enum Damage {
     CutOff(f64),
 }
 
-/// A random damage: single bits and bytes, pieces inserted, removed, repeated, the end cut off.
+/// Returns random damage: changed bits and bytes, inserted, removed and repeated pieces, a removed end.
 pub fn damage() -> impl Strategy<Value = Damage> {
     let at = 0.0..1.0f64;
     prop_oneof![

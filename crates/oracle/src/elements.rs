@@ -1,5 +1,4 @@
-//! Isoparametric solid elements: shape functions, quadrature, stiffness and scalar mass matrix of one
-//! element.
+//! Isoparametric solid elements: shape functions, quadrature, stiffness and scalar mass matrix of one element.
 
 /// Isotropic linear elastic material.
 #[derive(Debug, Clone, Copy)]
@@ -12,19 +11,19 @@ pub struct Material {
 impl Material {
     pub const STEEL: Material = Material { youngs: 210e9, poisson: 0.3, density: 7850.0 };
 
-    /// Lame's first parameter and the shear modulus.
+    /// Returns Lame's first parameter and the shear modulus.
     pub fn lame(&self) -> (f64, f64) {
         let (e, nu) = (self.youngs, self.poisson);
         (e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), e / (2.0 * (1.0 + nu)))
     }
 }
 
-/// How the mass matrix is integrated.
+/// Quadrature of the mass matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MassRule {
-    /// Exact for elements with straight edges and parallel faces.
+    /// Exact quadrature for elements with straight edges and parallel faces.
     Consistent,
-    /// Too few points, as some programs do: hex8 one point, tet10 four. The mass matrix comes out singular.
+    /// Too few points, as in some programs: one for hex8, four for tet10. The mass matrix is then singular.
     Reduced,
 }
 
@@ -36,14 +35,14 @@ pub enum ElementKind {
     Hex20,
 }
 
-/// Corner pairs of the mid-edge nodes 4..10 of a tet10.
+/// Pairs of corners whose mid-edge nodes are the nodes 4..10 of a tet10.
 pub const TET_EDGES: [(usize, usize); 6] = [(0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3)];
 
-/// A quadrature point: reference coordinates and weight.
+/// Quadrature point: reference coordinates and weight.
 type Point = ([f64; 3], f64);
 
 impl ElementKind {
-    /// Reference coordinates -1, 0, 1 of a hexahedron's nodes: corners first, then mid-edge nodes.
+    /// Returns the reference coordinates -1, 0, 1 of the nodes of a hexahedron: corners first, then mid-edge nodes.
     pub fn hex_signs(self) -> Vec<[i32; 3]> {
         let all = (0..27).map(|i| [i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1]);
         let with_zeros =
@@ -55,7 +54,7 @@ impl ElementKind {
         }
     }
 
-    /// Shape functions and their gradients in reference coordinates.
+    /// Returns the shape functions and their gradients in reference coordinates.
     pub fn shape(self, xi: [f64; 3]) -> (Vec<f64>, Vec<[f64; 3]>) {
         match self {
             ElementKind::Tet4 | ElementKind::Tet10 => {
@@ -78,10 +77,10 @@ impl ElementKind {
         }
     }
 
-    /// One shape function of a hexahedron, of the node with reference coordinates `sign`.
+    /// Returns the shape function, with its gradient, of the node of a hexahedron at the reference coordinates `sign`.
     fn hex_shape(self, sign: [i32; 3], xi: [f64; 3]) -> (f64, [f64; 3]) {
         let s = sign.map(f64::from);
-        // One factor per axis and its derivative; the serendipity corner has the factor `sum` besides.
+        // One factor per axis with its derivative; corners of the serendipity element have the additional factor `sum`.
         let f: [(f64, f64); 3] = std::array::from_fn(|k| match sign[k] {
             0 => (1.0 - xi[k] * xi[k], -2.0 * xi[k]),
             _ => (0.5 * (1.0 + s[k] * xi[k]), 0.5 * s[k]),
@@ -96,7 +95,7 @@ impl ElementKind {
         }
     }
 
-    /// Points of the stiffness matrix.
+    /// Returns the quadrature points of the stiffness matrix.
     fn stiffness_rule(self) -> Vec<Point> {
         match self {
             ElementKind::Tet4 => tet_rule(1),
@@ -106,7 +105,7 @@ impl ElementKind {
         }
     }
 
-    /// Points of the mass matrix.
+    /// Returns the quadrature points of the mass matrix.
     fn mass_rule(self, rule: MassRule) -> Vec<Point> {
         match (self, rule) {
             (ElementKind::Tet4, MassRule::Consistent) => tet_rule(3),
@@ -123,12 +122,14 @@ impl ElementKind {
         }
     }
 
-    /// Stiffness (3m x 3m, row-major, node-major x, y, z) and scalar mass (m x m) of an element with `nodes`.
+    /// Returns the stiffness (3m x 3m, row-major, node-major x, y, z) and the scalar mass (m x m) of an element with
+    /// `nodes`.
     ///
     /// Both are exactly symmetric: one triangle is computed and mirrored.
     pub fn matrices(self, nodes: &[[f64; 3]], material: &Material, rule: MassRule) -> (Vec<f64>, Vec<f64>) {
         let m = nodes.len();
         let (lambda, mu) = material.lame();
+        // Upper triangle of the integral of lambda div u div v + 2 mu eps(u):eps(v).
         let mut stiffness = vec![0.0; 9 * m * m];
         for (xi, weight) in self.stiffness_rule() {
             let (_, reference) = self.shape(xi);
@@ -148,6 +149,7 @@ impl ElementKind {
                 }
             }
         }
+        // Upper triangle of the integral of rho N_a N_b.
         let mut mass = vec![0.0; m * m];
         for (xi, weight) in self.mass_rule(rule) {
             let (shape, reference) = self.shape(xi);
@@ -165,8 +167,9 @@ impl ElementKind {
 }
 
 impl ElementKind {
-    /// Scalar geometric stiffness (m x m, row-major): sum over the points of grad N_a' sigma grad N_b, with
-    /// the stress that the displacements `moved` of the nodes cause. The element's K_geo is that kron I3.
+    /// Returns the scalar geometric stiffness (m x m, row-major): the integral of grad N_a' sigma grad N_b with the
+    /// stress that the displacements `moved` of the nodes cause. The geometric stiffness of the element is its
+    /// Kronecker product with I3.
     pub fn geometric_stiffness(
         self,
         nodes: &[[f64; 3]],
@@ -207,7 +210,7 @@ fn mirror(matrix: &mut [f64], n: usize) {
     }
 }
 
-/// Gradients in physical coordinates and the determinant of the Jacobian.
+/// Returns the gradients in physical coordinates and the determinant of the Jacobian.
 fn physical_gradients(nodes: &[[f64; 3]], reference: &[[f64; 3]]) -> (Vec<[f64; 3]>, f64) {
     let mut jacobian = nalgebra::Matrix3::zeros();
     for (x, g) in nodes.iter().zip(reference) {
@@ -220,7 +223,7 @@ fn physical_gradients(nodes: &[[f64; 3]], reference: &[[f64; 3]]) -> (Vec<[f64; 
     (physical.collect(), det)
 }
 
-/// Gauss-Legendre points on [-1, 1].
+/// Returns the Gauss-Legendre points and weights on [-1, 1].
 fn gauss(n: usize) -> Vec<(f64, f64)> {
     match n {
         1 => vec![(0.0, 2.0)],
@@ -250,7 +253,8 @@ fn hex_rule(n: usize) -> Vec<Point> {
     points
 }
 
-/// Gauss-Legendre points in collapsed coordinates: exact up to total degree 2 n - 3 on the unit tetrahedron.
+/// Returns Gauss-Legendre points in collapsed coordinates, exact up to the total degree 2 n - 3 on the unit
+/// tetrahedron.
 fn tet_rule(n: usize) -> Vec<Point> {
     if n == 1 {
         return vec![([0.25; 3], 1.0 / 6.0)];

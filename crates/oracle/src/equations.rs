@@ -1,29 +1,29 @@
-//! The reduced equations of motion written out as docs/theory.md section 3 prints them, for tests: the oracle
-//! is the nodal model, so nothing here is optimised and nothing is shared with the library.
+//! The reduced equations of motion as docs/theory.md section 3 prints them. They are not optimised and share no code
+//! with the library; their oracle is the nodal model.
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-/// The invariants of a body about its frame origin, component-blocked.
+/// Invariants of a body about the origin of its frame, in blocks by component.
 pub struct ReducedBody {
     pub mass: f64,
     pub first_moment: Vector3<f64>,
     pub inertia: Matrix3<f64>,
-    /// 3 x nf.
+    /// Matrix C1 (3 x nf).
     pub c1: DMatrix<f64>,
-    /// 3 x nf.
+    /// Matrix C2 (3 x nf).
     pub c2: DMatrix<f64>,
-    /// 3 x 3nf.
+    /// Matrix W1 (3 x 3nf).
     pub w1: DMatrix<f64>,
-    /// 3nf x 3nf.
+    /// Matrix W2 (3nf x 3nf).
     pub w2: DMatrix<f64>,
-    /// 3nf x nf.
+    /// Matrix W3 (3nf x nf).
     pub w3: DMatrix<f64>,
     pub modal_mass: DMatrix<f64>,
     pub modal_stiffness: DMatrix<f64>,
 }
 
-/// Position and velocity: R and A (body to world), velocity of the origin (world), omega (body), q and its
-/// rate.
+/// Position and velocity of a body: R and A (body to world), velocity of the origin (world axes), omega (body axes), q
+/// and its rate.
 #[derive(Clone)]
 pub struct State {
     pub origin: Vector3<f64>,
@@ -34,7 +34,7 @@ pub struct State {
     pub qd: DVector<f64>,
 }
 
-/// How the flexible part of the angular velocity terms is written.
+/// Form of the terms of the modal rates in the angular velocity equation.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Coriolis {
     /// W1 Qd + Q'W2 Qd + Qd'W2 Q, with the W3 term.
@@ -60,28 +60,28 @@ impl ReducedBody {
         self.c1.ncols()
     }
 
-    /// Q = I3 kron q.
+    /// Returns Q = I3 kron q.
     fn kron(&self, q: &DVector<f64>) -> DMatrix<f64> {
         DMatrix::<f64>::identity(3, 3).kronecker(q)
     }
 
-    /// s = c + C1 q.
+    /// Returns s = c + C1 q.
     pub fn first_moment_at(&self, q: &DVector<f64>) -> Vector3<f64> {
         self.first_moment + vector(&(&self.c1 * q))
     }
 
-    /// I(q) = I0 + W1 Q + Q'W2 Q.
+    /// Returns I(q) = I0 + W1 Q + Q'W2 Q.
     pub fn inertia_at(&self, q: &DVector<f64>) -> Matrix3<f64> {
         let kron = self.kron(q);
         self.inertia + fixed(&(&self.w1 * &kron + kron.transpose() * &self.w2 * &kron))
     }
 
-    /// C(q) = C2 + Q'W3.
+    /// Returns C(q) = C2 + Q'W3.
     pub fn coupling_at(&self, q: &DVector<f64>) -> DMatrix<f64> {
         &self.c2 + self.kron(q).transpose() * &self.w3
     }
 
-    /// Mass matrix of (R'' world, alpha body, q'').
+    /// Returns the mass matrix for (R'' world, alpha body, q'').
     pub fn mass_matrix(&self, state: &State) -> DMatrix<f64> {
         let nf = self.n_modes();
         let translation_rotation = -state.axes * skew(&self.first_moment_at(&state.q));
@@ -100,7 +100,7 @@ impl ReducedBody {
         matrix
     }
 
-    /// (h_R, h_T, h_f): the inertia forces that velocities alone make.
+    /// Returns (h_R, h_T, h_f): the inertia forces of the velocities.
     pub fn velocity_terms(&self, state: &State, coriolis: Coriolis) -> DVector<f64> {
         let nf = self.n_modes();
         let (w, skew_w) = (&state.omega, skew(&state.omega));
@@ -117,7 +117,7 @@ impl ReducedBody {
             + (fixed(&(&self.w1 * &kron_rate)) + quadratic) * w
             + skew_w * vector(&(self.coupling_at(&state.q) * &state.qd));
 
-        // [w1 I, w2 I, w3 I] (nf x 3nf).
+        // Matrix [w1 I, w2 I, w3 I] (nf x 3nf).
         let spin = w.transpose().kronecker(&DMatrix::<f64>::identity(nf, nf));
         let centrifugal = spin * (self.w1.transpose() * 0.5 + &self.w2 * &kron) * w;
         let h_f = -centrifugal + 2.0 * self.w3.transpose() * kron_rate * w;
@@ -129,12 +129,12 @@ impl ReducedBody {
         h
     }
 
-    /// Inertia forces: mass matrix times accelerations (R'', alpha, q'') plus the velocity terms.
+    /// Returns the inertia forces: mass matrix times accelerations (R'', alpha, q''), plus the velocity terms.
     pub fn inertia_forces(&self, state: &State, accelerations: &DVector<f64>) -> DVector<f64> {
         self.mass_matrix(state) * accelerations + self.velocity_terms(state, Coriolis::Correct)
     }
 
-    /// Accelerations (R'', alpha, q'') of the free undamped body.
+    /// Returns the accelerations (R'', alpha, q'') of the free undamped body.
     pub fn free_accelerations(&self, state: &State, coriolis: Coriolis) -> DVector<f64> {
         let mut forces = -self.velocity_terms(state, coriolis);
         let mut modal = forces.rows_mut(6, self.n_modes());
@@ -142,30 +142,30 @@ impl ReducedBody {
         self.mass_matrix(state).lu().solve(&forces).expect("the mass matrix is positive definite")
     }
 
-    /// Generalised velocities (R', omega, q').
+    /// Returns the generalised velocities (R', omega, q').
     pub fn velocities(state: &State) -> DVector<f64> {
         let parts = state.velocity.iter().chain(state.omega.iter()).chain(state.qd.iter());
         DVector::from_iterator(6 + state.qd.len(), parts.copied())
     }
 
-    /// Kinetic energy.
+    /// Returns the kinetic energy.
     pub fn kinetic_energy(&self, state: &State) -> f64 {
         let v = Self::velocities(state);
         0.5 * v.dot(&(self.mass_matrix(state) * &v))
     }
 
-    /// Kinetic and strain energy.
+    /// Returns the sum of kinetic and strain energy.
     pub fn energy(&self, state: &State) -> f64 {
         self.kinetic_energy(state) + 0.5 * state.q.dot(&(&self.modal_stiffness * &state.q))
     }
 
-    /// Linear momentum, world axes: m R' + A (omega x s + C1 q').
+    /// Returns the linear momentum in world axes: m R' + A (omega x s + C1 q').
     pub fn linear_momentum(&self, state: &State) -> Vector3<f64> {
         let s = self.first_moment_at(&state.q);
         self.mass * state.velocity + state.axes * (state.omega.cross(&s) + vector(&(&self.c1 * &state.qd)))
     }
 
-    /// Angular momentum about the world origin, world axes: A (I omega + C q' + s x A'R') + R x p.
+    /// Returns the angular momentum about the world origin in world axes: A (I omega + C q' + s x A'R') + R x p.
     pub fn angular_momentum(&self, state: &State) -> Vector3<f64> {
         let about_frame = self.inertia_at(&state.q) * state.omega
             + vector(&(self.coupling_at(&state.q) * &state.qd))

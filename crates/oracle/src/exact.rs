@@ -1,15 +1,15 @@
-//! Exact rational arithmetic: the oracle.
+//! Exact rational arithmetic as an oracle.
 
 use num_rational::BigRational;
 use num_traits::Zero;
 
-/// The number that an f64 stands for.
+/// Returns the exact value of an f64.
 pub fn exact(value: f64) -> BigRational {
     BigRational::from_float(value).expect("finite")
 }
 
-/// Eigenvalues of the pencil (K, M) below `sigma`: negative eigenvalues of K - sigma M, by exact elimination
-/// with pivots of one or two rows (Sylvester's law of inertia).
+/// Returns the number of eigenvalues of the pencil (K, M) below `sigma`: the negative eigenvalues of K - sigma M, by
+/// exact elimination with pivots of one or two rows (Sylvester's law of inertia).
 pub fn count_below(k: &[Vec<f64>], m: &[Vec<f64>], sigma: f64) -> usize {
     let n = k.len();
     let sigma = exact(sigma);
@@ -21,7 +21,7 @@ pub fn count_below(k: &[Vec<f64>], m: &[Vec<f64>], sigma: f64) -> usize {
     while !left.is_empty() {
         let one = left.iter().position(|&i| a[i][i] != zero);
         if one.is_none() {
-            // Only off-diagonal entries are left: add a row and column to another, which is a congruence.
+            // Only off-diagonal entries are left: adding a row and its column to another is a congruence.
             let pair =
                 left.iter().flat_map(|&i| left.iter().map(move |&j| (i, j))).find(|&(i, j)| a[i][j] != zero);
             let Some((i, j)) = pair else { break };
@@ -35,6 +35,7 @@ pub fn count_below(k: &[Vec<f64>], m: &[Vec<f64>], sigma: f64) -> usize {
             }
             continue;
         }
+        // Elimination by a pivot of one row, whose sign counts.
         let p = left.swap_remove(one.expect("just tested"));
         let pivot = a[p][p].clone();
         negative += usize::from(pivot < zero);

@@ -1,6 +1,6 @@
-//! Bodies of every kind for the tests of exports: all fixture models, with free modes and with those of their
-//! interfaces, damped, in the plane, general, partial.
-#![allow(dead_code)] // every test file uses a part of it
+//! Bodies of every kind for the tests of exports: all fixture models, with free-surface modes and with interface modes,
+//! damped, plane, with general mass matrices, and with some groups of the kinetic energy only.
+#![allow(dead_code)] // every test file uses a part of this module
 
 use super::flexible::soft_block;
 use super::general::raw_fixture;
@@ -18,7 +18,7 @@ use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, Damping, FeModel, RawModel};
 use std::sync::OnceLock;
 
-/// Names of all fixture models.
+/// Returns the names of all fixture models.
 pub fn models() -> Vec<String> {
     let folders = std::fs::read_dir(fixtures().join("models")).expect("fixtures");
     let mut names: Vec<String> =
@@ -27,7 +27,7 @@ pub fn models() -> Vec<String> {
     names
 }
 
-/// What flexbody makes of a model with seven modes.
+/// Converts a model with seven modes.
 pub fn body_of(raw: RawModel, basis: BasisChoice, frame: BodyFrame) -> FlexBody {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let mut settings = ConvertSettings { basis, frame: frame.into(), ..ConvertSettings::default() };
@@ -35,7 +35,7 @@ pub fn body_of(raw: RawModel, basis: BasisChoice, frame: BodyFrame) -> FlexBody 
     convert(&model, &settings, &Context::QUIET).expect("converts").body
 }
 
-/// A fixture model with its interfaces coupled to reference points and Craig-Bampton modes.
+/// Converts a fixture model with Craig-Bampton modes and its interfaces coupled to reference points.
 pub fn jointed(
     name: &str,
     coupling: Coupling,
@@ -49,7 +49,7 @@ pub fn jointed(
 /// Fixture models with interfaces.
 pub const JOINTED: [&str; 4] = ["robot_link", "bracket_hex20", "satellite", "car_frame"];
 
-/// Bodies with K and M in the motions of frames.
+/// Returns Craig-Bampton bodies, which have K and M of interface coordinates.
 pub fn jointed_bodies() -> &'static [(String, FlexBody)] {
     static BODIES: OnceLock<Vec<(String, FlexBody)>> = OnceLock::new();
     BODIES.get_or_init(|| {
@@ -70,7 +70,7 @@ pub fn jointed_bodies() -> &'static [(String, FlexBody)] {
     })
 }
 
-/// All bodies, by what they are.
+/// Returns all bodies with their descriptions.
 pub fn bodies() -> &'static [(String, FlexBody)] {
     static BODIES: OnceLock<Vec<(String, FlexBody)>> = OnceLock::new();
     BODIES.get_or_init(|| {
@@ -98,7 +98,8 @@ pub fn bodies() -> &'static [(String, FlexBody)] {
     })
 }
 
-/// Bodies whose frame stands on an interface: of solids, and of beams and shells with rotations, with damping.
+/// Returns bodies whose frame is carried by an interface: of solids, and of beams and shells with rotations, with
+/// damping.
 pub fn on_interfaces() -> Vec<(String, FlexBody)> {
     let made = |name: &str| {
         let mut raw =
@@ -115,7 +116,7 @@ pub fn on_interfaces() -> Vec<(String, FlexBody)> {
     ["bracket_hex20", "robot_link", "satellite", "car_frame"].map(made).to_vec()
 }
 
-/// What an export writes, told or not.
+/// Returns the output of an export, which may have losses.
 pub fn exported(
     body: &FlexBody,
     format: &str,
@@ -125,14 +126,14 @@ pub fn exported(
     export(body, find_format(format).expect("a format"), &options, true).map(|(exported, _)| exported)
 }
 
-/// The single file of an export.
+/// Returns the single file of an export.
 pub fn file(body: &FlexBody, format: &str, dialect: Option<&str>) -> Vec<u8> {
     let Exported { file, beside } = exported(body, format, dialect).expect("writes");
     assert!(beside.is_empty());
     file
 }
 
-/// What a format cannot hold of a body.
+/// Returns the properties of a body that a format cannot hold.
 pub fn losses(body: &FlexBody, format: &str) -> Vec<String> {
     find_format(format).expect("a format").checklist(body, &ExportOptions::default()).losses()
 }

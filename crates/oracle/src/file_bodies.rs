@@ -1,5 +1,5 @@
-//! Random flexible bodies for the tests of the file: not mechanically meaningful, but valid parts.
-#![allow(dead_code)] // every test file uses a part of it
+//! Random flexible bodies for the tests of the file: valid parts without mechanical meaning.
+#![allow(dead_code)] // every test file uses a part of this module
 
 use faer::Mat;
 use flexbody_base::provenance::{SourceFile, sha256_hex};
@@ -18,7 +18,7 @@ use hdf5_metno as hdf5;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use std::collections::BTreeMap;
 
-/// SplitMix64: small, seeded, the same everywhere.
+/// SplitMix64: a small seeded generator with the same numbers on every machine.
 pub struct Random {
     state: u64,
     wild: bool,
@@ -40,7 +40,8 @@ impl Random {
         (self.bits() % n as u64) as usize
     }
 
-    /// Within -1 .. 1; of wild generators sometimes zero, negative zero, subnormal, tiny or huge.
+    /// Returns a number between -1 and 1. A wild generator also returns zero, negative zero, subnormal, tiny and huge
+    /// numbers.
     pub fn value(&mut self) -> f64 {
         let unit = (self.bits() >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0;
         if !self.wild {
@@ -103,7 +104,7 @@ impl Random {
         (rows > 0).then(|| InternalRows { dofs, shape: self.matrix(rows, nf) })
     }
 
-    /// A surface of triangles, of edges or of both, on the last of `n` nodes and others; none of few nodes.
+    /// Returns a surface of triangles, edges or both on the last of `n` nodes and others; `None` for few nodes.
     fn mesh(&mut self, n: usize) -> Option<SurfaceMesh> {
         let (triangles, edges) = (self.below(4), self.below(4));
         let mut other = |last: u32, apart: u32| {
@@ -128,7 +129,7 @@ fn guarantee(r: &mut Random, eigenvalue: &[f64]) -> Guarantee {
     }
 }
 
-/// One of every kind, as many as there are interfaces.
+/// Returns up to `count` loads, each of a different kind.
 fn geometric_stiffness(r: &mut Random, nf: usize, count: usize) -> Vec<GeometricStiffness<Mat<f64>>> {
     let kinds = [
         LoadKind::Force(r.name()),
@@ -158,7 +159,7 @@ fn coordinates(r: &mut Random, size: usize, nf: usize) -> InterfaceCoordinates {
     }
 }
 
-/// Moments of nodes, some of which have none.
+/// Returns moments of nodes, some of which are zero.
 fn moments(r: &mut Random, n: usize) -> Vec<NodeMoments> {
     let of_node = |r: &mut Random| match r.below(3) {
         0 => NodeMoments { first: Vector3::zeros(), second: Matrix3::zeros() },
@@ -170,8 +171,8 @@ fn moments(r: &mut Random, n: usize) -> Vec<NodeMoments> {
     (0..n).map(|_| of_node(r)).collect()
 }
 
-/// A valid body with `n` nodes, `nf` modes (certified when both are odd), `schemes` lumping schemes and
-/// `interfaces` interfaces.
+/// Returns the parts of a valid body with `n` nodes, `nf` modes (certified if both are odd), `schemes` lumping schemes
+/// and `interfaces` interfaces.
 pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usize) -> Parts {
     let mut eigenvalue: Vec<f64> = (0..nf).map(|_| r.positive()).collect();
     eigenvalue.sort_by(f64::total_cmp);
@@ -282,25 +283,25 @@ pub fn parts(mut r: Random, n: usize, nf: usize, schemes: usize, interfaces: usi
         mesh: r.mesh(n),
         storage: Storage::F64,
     };
-    // Products of wild numbers overflow.
+    // Products of wild numbers would overflow.
     if let Some(rotation) = parts.modes.rotation.as_ref().filter(|_| !wild && r.below(2) == 1) {
         parts.inertia_stiffness = Some(InertiaStiffness::new(moments(&mut r, n), rotation.as_ref(), 3));
     }
     parts
 }
 
-/// A body of moderate numbers.
+/// Returns a body of moderate numbers.
 pub fn body(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> FlexBody {
     FlexBody::new(parts(Random::new(seed), n, nf, schemes, interfaces)).expect("random parts are valid")
 }
 
-/// A body with every kind of finite number.
+/// Returns a body with every kind of finite number.
 pub fn wild_body(seed: u64, n: usize, nf: usize, schemes: usize, interfaces: usize) -> FlexBody {
     let random = Random { state: seed, wild: true };
     FlexBody::new(parts(random, n, nf, schemes, interfaces)).expect("random parts are valid")
 }
 
-/// Every number of a body, bit for bit, and every text.
+/// Returns every number of a body, bit for bit, and every text.
 pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     let p = body.parts();
     let mut bits: Vec<u64> = Vec::new();
@@ -359,7 +360,7 @@ pub fn fingerprint(body: &FlexBody) -> (Vec<u64>, String) {
     (bits, texts)
 }
 
-/// States the digests of a file anew, as `docs/format.md` says.
+/// Recomputes the digests of a file, as `docs/format.md` describes them.
 pub fn seal(file: &hdf5::File) {
     let mut found = BTreeMap::new();
     digest_group(&file.as_group().unwrap(), "", &mut found);
@@ -394,7 +395,7 @@ fn attribute_records(place: &hdf5::Location, is_root: bool) -> Vec<u8> {
     names.iter().flat_map(|name| record(name, &place.attr(name).unwrap())).collect()
 }
 
-/// `LENGTH NAME TYPE SHAPE BYTES`, a line feed, and the content.
+/// Returns the record `LENGTH NAME TYPE SHAPE BYTES`, a line feed, and the content.
 fn record(name: &str, place: &hdf5::Container) -> Vec<u8> {
     use hdf5::types::{FloatSize, IntSize, TypeDescriptor};
     let (kind, content): (&str, Vec<u8>) = match place.dtype().unwrap().to_descriptor().unwrap() {

@@ -1,4 +1,4 @@
-//! The same model in other orders and numberings, and models as files.
+//! A model in other row orders and node numberings, and models as files.
 
 use super::mesh::entries;
 use super::random::Random;
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 pub enum DofOrder {
     NodeMajor,
     ComponentMajor,
-    /// Any order, from a seed.
+    /// Random order from a seed.
     Shuffled(u64),
 }
 
@@ -21,11 +21,11 @@ pub enum DofOrder {
 pub enum Numbering {
     /// 1, 2, 3, ...
     Consecutive,
-    /// Large numbers with gaps, in any order, from a seed.
+    /// Large numbers with gaps in random order, from a seed.
     Gaps(u64),
 }
 
-/// Which entries of a symmetric matrix a file holds.
+/// Entries of a symmetric matrix that a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Triangle {
     Lower,
@@ -34,10 +34,11 @@ pub enum Triangle {
     General,
 }
 
-/// The same body with its matrix rows and node table in another order; `raw` must be in the default order.
+/// Returns a model with its matrix rows and node table in another order; `raw` must be in the default order.
 pub fn reordered(raw: &RawModel, order: DofOrder, numbering: Numbering) -> RawModel {
     assert!(raw.dofs.is_none(), "already labelled");
     let n = raw.nodes.len();
+    // Old row of every new row; numbers of the nodes, and old node of every row of the table.
     let rows: Vec<usize> = match order {
         DofOrder::NodeMajor => (0..3 * n).collect(),
         DofOrder::ComponentMajor => (0..3 * n).map(|r| 3 * (r % n) + r / n).collect(),
@@ -75,7 +76,7 @@ pub fn reordered(raw: &RawModel, order: DofOrder, numbering: Numbering) -> RawMo
     }
 }
 
-/// Writes `K.mtx`, `M.mtx`, `nodes.csv`, `dofs.csv` (when rows are labelled) and `model.toml`; gives the
+/// Writes `K.mtx`, `M.mtx`, `nodes.csv`, `dofs.csv` (if rows are labelled) and `model.toml`. Returns the path of the
 /// manifest.
 pub fn write_model(folder: &Path, raw: &RawModel, triangle: Triangle) -> PathBuf {
     let save = |name: &str, text: String| std::fs::write(folder.join(name), text).expect("test folder");
@@ -105,7 +106,7 @@ pub fn write_model(folder: &Path, raw: &RawModel, triangle: Triangle) -> PathBuf
     folder.join("model.toml")
 }
 
-/// A matrix as Matrix Market text, numbers that read back bit by bit.
+/// Returns a matrix as Matrix Market text, with numbers that are read back bit by bit.
 pub fn matrix_market(matrix: &CscMatrix, triangle: Triangle) -> String {
     let kept: Vec<_> = entries(matrix)
         .filter(|(r, c, _)| match triangle {

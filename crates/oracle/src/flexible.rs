@@ -1,4 +1,4 @@
-//! Flexible bodies for tests of their equations of motion, and the oracles that belong to them.
+//! Flexible bodies for tests of their equations of motion, with their oracles.
 
 use super::elements::{ElementKind, MassRule, Material};
 use super::equations::{ReducedBody, State};
@@ -21,7 +21,7 @@ use flexbody_model::{FeModel, GeometricStiffness, LoadKind, Nodes, RawModel, Uni
 use flexbody_motion::dynamics::{EquationsOfMotion, Evaluation};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-/// What flexbody makes of a model.
+/// Converts a model with its lowest modes.
 pub fn body_of(raw: RawModel, modes: usize, frame: BodyFrame) -> FlexBody {
     let model = FeModel::from_raw(raw).expect("a body").model;
     let modes = ModeSettings { wanted: Wanted::Lowest(modes), ..ModeSettings::default() };
@@ -29,14 +29,14 @@ pub fn body_of(raw: RawModel, modes: usize, frame: BodyFrame) -> FlexBody {
     convert(&model, &settings, &Context::QUIET).expect("converts").body
 }
 
-/// What flexbody makes of a model of the fixtures.
+/// Converts a model of the fixtures.
 pub fn fixture(name: &str, modes: usize, frame: BodyFrame) -> FlexBody {
     let folder = crate::fixtures().join("models").join(name);
     let raw = read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable");
     body_of(raw, modes, frame)
 }
 
-/// A rubber-like block without any symmetry: W1, W2 and W3 all count.
+/// Returns a rubber-like block without symmetry, in which W1, W2 and W3 all matter.
 pub fn soft_block(modes: usize) -> FlexBody {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(ElementKind::Hex8, &grid([6, 4, 2]), |[x, y, z]| {
@@ -45,18 +45,19 @@ pub fn soft_block(modes: usize) -> FlexBody {
     body_of(mesh.assemble(&rubber, MassRule::Consistent).raw_model(), modes, BodyFrame::Principal)
 }
 
-/// The oracle that has the body's invariants.
+/// Returns the oracle with the invariants of the body.
 pub fn oracle(body: &FlexBody) -> GeneralBody {
     let own = body.invariants();
     GeneralBody { reduced: reduced(own), w0: dense(&own.w0()) }
 }
 
-/// The primary data of given invariants; `solid` where M = Ms kron I3.
+/// Returns the primary data of given invariants; `solid` if M = Ms kron I3.
 pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
     let GeneralBody { reduced, w0 } = body;
     let ReducedBody { c1, c2, w1, w2, w3, .. } = reduced;
     let nf = c1.ncols();
     let faer = |a: &DMatrix<f64>| Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)]);
+    // Diagonal entries follow from the trace of W1, off-diagonal ones from W1 and the skew part C2.
     let ibar = |k: usize, l: usize, j: usize| {
         if k == l {
             let trace: f64 = (0..3).map(|b| w1[(b, b * nf + j)]).sum();
@@ -65,6 +66,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
         let skew = if (k + 1) % 3 == l { c2[(3 - k - l, j)] } else { -c2[(3 - k - l, j)] };
         0.5 * (skew - w1[(k, l * nf + j)])
     };
+    // S follows from W2 alike.
     let s = |k: usize, l: usize, i: usize, j: usize| {
         if k == l {
             let trace: f64 = (0..3).map(|b| w2[(b * nf + i, b * nf + j)]).sum();
@@ -90,7 +92,7 @@ pub fn invariants_of(body: &GeneralBody, solid: bool) -> Invariants {
     })
 }
 
-/// A body with these invariants, some nodes and damping.
+/// Returns a body with these invariants, some nodes and damping.
 pub fn made_of(
     invariants: Invariants,
     positions: Vec<[f64; 3]>,
@@ -151,14 +153,14 @@ pub fn made_of(
     .expect("valid parts")
 }
 
-/// `body` without the terms of second order that its turning nodes make: what oracles of first order describe.
+/// Returns `body` without the second-order terms of its rotating nodes, as oracles of first order describe it.
 pub fn to_first_order(body: FlexBody) -> FlexBody {
     let mut parts = body.into_parts();
     parts.inertia_stiffness = None;
     FlexBody::new(parts).expect("valid parts")
 }
 
-/// `body` with random geometric stiffness for all loads of the given kinds, entries up to `size`.
+/// Returns `body` with random geometric stiffness for all loads of the given kinds, with entries up to `size`.
 pub fn stressed(body: FlexBody, kinds: &[LoadKind], size: f64, random: &mut Random) -> FlexBody {
     let (nf, dimension) = (body.n_modes(), body.dimension());
     let mut parts = body.into_parts();
@@ -173,12 +175,12 @@ pub fn stressed(body: FlexBody, kinds: &[LoadKind], size: f64, random: &mut Rand
     FlexBody::new(parts).expect("valid parts")
 }
 
-/// Puts an evaluation to the state of an oracle.
+/// Sets an evaluation to the state of an oracle.
 pub fn set(evaluation: &mut Evaluation<'_>, state: &State) {
     evaluation.set(state.q.as_slice(), quasi_velocities(state).as_slice());
 }
 
-/// (R'' world, alpha body, q'') under forces that `load` adds.
+/// Returns the accelerations (R'' world, alpha body, q'') under the forces that `load` adds.
 pub fn accelerations(
     equations: &EquationsOfMotion,
     state: &State,
@@ -196,8 +198,7 @@ pub fn accelerations(
     found
 }
 
-/// A state whose rates and deformation suit a body: spin and modes of one time scale, so that no force hides
-/// the others.
+/// Returns a state with spin and modal rates on one time scale, so that no force hides the others.
 pub fn lively_state(random: &mut Random, body: &FlexBody) -> State {
     let (nf, inertia) = (body.n_modes(), body.invariants().inertia());
     let size = inertia.norm().sqrt();

@@ -1,5 +1,5 @@
-//! Bodies with any symmetric mass matrix (docs/theory.md section 6): the unreduced nodal body and its
-//! equations in constant invariants. Dense, written as the theory prints it, nothing shared with the library.
+//! Bodies with any symmetric mass matrix (docs/theory.md section 6): the unreduced nodal body, and its equations in
+//! constant invariants. Dense, as the theory prints it, without code of the library.
 
 use super::equations::{ReducedBody, State, skew};
 use super::random::Random;
@@ -9,7 +9,7 @@ use flexbody_model::RawModel;
 use nalgebra::{DMatrix, DVector, Matrix3, Quaternion, UnitQuaternion, Vector3};
 use std::collections::HashMap;
 
-/// Fixture models with rotations of nodes, rows without a place or masses that do not commute with rotations.
+/// Fixture models with rotations of nodes, rows without a position, or masses that do not commute with rotations.
 pub const FIXTURES: [&str; 8] = [
     "frame_beams",
     "frame_lumped",
@@ -21,36 +21,36 @@ pub const FIXTURES: [&str; 8] = [
     "spring_ends",
 ];
 
-/// A model of `fixtures/models`, not yet checked.
+/// Reads a model of `fixtures/models` without checks.
 pub fn raw_fixture(name: &str) -> RawModel {
     let folder = crate::fixtures().join("models").join(name);
     read_model(&read_manifest(folder.join("model.toml")).expect("manifest")).expect("readable")
 }
 
-/// What a matrix row moves.
+/// Kind of the quantity in a matrix row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum RowKind {
-    /// A displacement of a node.
+    /// Displacement of a node.
     Displacement,
-    /// A rotation of a node.
+    /// Rotation of a node.
     Rotation,
-    /// A vector without a place that vanishes in rigid motion and turns with the body.
+    /// Vector without a position that vanishes in rigid motion and rotates with the body.
     Internal,
-    /// Director `node` % 3 of node `node` / 3: a vector e_a that turns with the rotation of its node.
+    /// Director `node` % 3 of node `node` / 3: a vector e_a that rotates with its node.
     Director,
 }
 
-/// One matrix row: a component of a vector of the given kind.
+/// Matrix row: a component of a vector of the given kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Row {
     pub kind: RowKind,
-    /// Index into the positions; of an internal vector any number.
+    /// Index of the node in the positions; for an internal vector any unique number.
     pub node: usize,
-    /// 0, 1, 2.
+    /// Component: 0, 1 or 2.
     pub axis: usize,
 }
 
-/// Rows of a model with labels: nodes without coordinates carry internal vectors.
+/// Returns the rows of a model with labels: nodes without coordinates carry internal vectors.
 pub fn rows(raw: &RawModel) -> Vec<Row> {
     let index: HashMap<i64, usize> = raw.nodes.ids.iter().enumerate().map(|(i, &id)| (id, i)).collect();
     let row = |label: &flexbody_model::DofLabel| {
@@ -64,19 +64,19 @@ pub fn rows(raw: &RawModel) -> Vec<Row> {
     raw.dofs.as_ref().expect("labels").iter().map(row).collect()
 }
 
-/// A faer matrix as one of nalgebra.
+/// Converts a faer matrix to nalgebra.
 pub fn dense(a: &Mat<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// Phi_t and Bx (N x 6): velocities of the rows for unit velocities and unit rotations about the origin.
+/// Returns Phi_t and Bx (N x 6): velocities of the rows for unit velocities and unit rotations about the origin.
 pub fn rigid_velocities(rows: &[Row], positions: &[[f64; 3]]) -> DMatrix<f64> {
     let mut rigid = DMatrix::zeros(rows.len(), 6);
     for (i, row) in rows.iter().enumerate() {
         match row.kind {
             RowKind::Displacement => {
                 rigid[(i, row.axis)] = 1.0;
-                // -x~: row k of it is (e_1 x r)_k, (e_2 x r)_k, (e_3 x r)_k.
+                // Row k of -x~ is (e_1 x r)_k, (e_2 x r)_k, (e_3 x r)_k.
                 let arm = -skew(&Vector3::from(positions[row.node]));
                 (0..3).for_each(|a| rigid[(i, 3 + a)] = arm[(row.axis, a)]);
             }
@@ -91,7 +91,7 @@ pub fn rigid_velocities(rows: &[Row], positions: &[[f64; 3]]) -> DMatrix<f64> {
     rigid
 }
 
-/// e_a x v for every vector of the rows, rotations included; components that no row holds are zero.
+/// Returns e_a x v for every vector of the rows, rotations included; components without a row count as zero.
 pub fn turned(rows: &[Row], a: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
     let place: HashMap<Row, usize> = rows.iter().enumerate().map(|(i, &row)| (row, i)).collect();
     let mut product = DMatrix::zeros(x.nrows(), x.ncols());
@@ -108,26 +108,27 @@ pub fn turned(rows: &[Row], a: usize, x: &DMatrix<f64>) -> DMatrix<f64> {
     product
 }
 
-/// Nodal velocities vbar = B(q) nu with nu = (V, omega, qd) in body axes. Where rotations carry mass, the rows of
-/// the mass are points, directors and rotations (docs/theory.md section 6, to first order in q);
-/// `couples_by_moment` then puts s(q) = c + C1 q into the coupling of V and omega.
+/// Unreduced body with the nodal velocities vbar = B(q) nu for nu = (V, omega, qd) in body axes. If rotations carry
+/// mass, the rows of the mass matrix are points, directors and rotations (docs/theory.md section 6, to first order in
+/// q), and `couples_by_moment` puts s(q) = c + C1 q into the coupling of V and omega.
 pub struct NodalBody {
     rows: Vec<Row>,
     stiffness: DMatrix<f64>,
     mass: DMatrix<f64>,
     couples_by_moment: bool,
-    /// Psi in the rows of K.
+    /// Modes Psi in the rows of K.
     own_shapes: DMatrix<f64>,
-    /// Phi_t, Bx (N x 6).
+    /// Matrices Phi_t and Bx (N x 6).
     rigid: DMatrix<f64>,
-    /// Psi (N x nf).
+    /// Modes Psi (N x nf) in the rows of M.
     shapes: DMatrix<f64>,
-    /// Column j of the a-th matrix is B_j e_a.
+    /// Matrices whose column j is B_j e_a, for a = 1, 2, 3.
     modal: [DMatrix<f64>; 3],
 }
 
 impl NodalBody {
-    /// K and M (N x N), what their rows are, node positions in the body frame, Psi (N x nf).
+    /// Creates the body from K and M (N x N), the kinds of their rows, node positions in the body frame and Psi (N x
+    /// nf).
     pub fn new(
         stiffness: &Mat<f64>,
         mass: &Mat<f64>,
@@ -161,12 +162,12 @@ impl NodalBody {
         }
     }
 
-    /// C1 (3 x nf).
+    /// Returns C1 (3 x nf).
     fn modal_momentum(&self) -> DMatrix<f64> {
         self.rigid.columns(0, 3).transpose() * (&self.mass * &self.shapes)
     }
 
-    /// The velocities that the nodal products are formed with: V is left out where the coupling is by s(q).
+    /// Returns the velocities that enter the nodal products: without V if s(q) makes the coupling.
     fn seen_by_nodes(&self, nu: &DVector<f64>) -> DVector<f64> {
         let mut seen = nu.clone();
         if self.couples_by_moment {
@@ -175,7 +176,7 @@ impl NodalBody {
         seen
     }
 
-    /// What the coupling by s(q) adds to dMc/dt nu and to dT/dq.
+    /// Returns the parts of dMc/dt nu and of dT/dq that the coupling by s(q) adds.
     fn of_flight(&self, state: &State) -> (DVector<f64>, DVector<f64>) {
         let nf = self.n_modes();
         let (mut rate, mut slope) = (DVector::zeros(6 + nf), DVector::zeros(nf));
@@ -194,12 +195,12 @@ impl NodalBody {
         self.shapes.ncols()
     }
 
-    /// Columns of rotation that belong to modal coordinates q: sum_j q_j B_j (N x 3).
+    /// Returns the change of the rotation columns with the modal coordinates: sum_j q_j B_j (N x 3).
     fn modal_rotation(&self, q: &DVector<f64>) -> DMatrix<f64> {
         DMatrix::from_columns(&[0, 1, 2].map(|a| &self.modal[a] * q))
     }
 
-    /// B(q) (N x (6 + nf)).
+    /// Returns B(q) (N x (6 + nf)).
     pub fn velocity_map(&self, q: &DVector<f64>) -> DMatrix<f64> {
         let mut map = DMatrix::zeros(self.mass.nrows(), 6 + self.n_modes());
         map.columns_mut(0, 6).copy_from(&self.rigid);
@@ -209,7 +210,7 @@ impl NodalBody {
         map
     }
 
-    /// Mc(q) = B'M B.
+    /// Returns Mc(q) = B'M B.
     pub fn mass_matrix(&self, q: &DVector<f64>) -> DMatrix<f64> {
         let map = self.velocity_map(q);
         let mut matrix = map.transpose() * &self.mass * map;
@@ -223,8 +224,8 @@ impl NodalBody {
         matrix
     }
 
-    /// (R'' world, alpha body, q'') of the free undamped body: (p, h, pi) = B'M vbar, each term from nodal
-    /// products.
+    /// Returns the accelerations (R'' world, alpha body, q'') of the free undamped body from (p, h, pi) = B'M vbar,
+    /// each term as nodal products.
     pub fn accelerations(&self, state: &State) -> DVector<f64> {
         let map = self.velocity_map(&state.q);
         let map_rate = self.modal_rotation(&state.qd);
@@ -247,8 +248,8 @@ impl NodalBody {
         solve(state, matrix, &momenta, &rate, &energy_slope, &elastic)
     }
 
-    /// The same by the nodal formula of [ZG19], which lets the rotation of the body pass through M: B'M
-    /// (vbar' + omega~ vbar). Wrong where M is not rotation invariant.
+    /// Returns the accelerations by the nodal formula of [ZG19], which moves the rotation of the body through M: B'M
+    /// (vbar' + omega~ vbar). The formula is wrong if M is not rotation invariant.
     pub fn accelerations_for_rotation_invariant_mass(&self, state: &State) -> DVector<f64> {
         let map = self.velocity_map(&state.q);
         let velocity = DMatrix::from_columns(&[&map * quasi_velocities(state)]);
@@ -264,7 +265,7 @@ impl NodalBody {
         in_world(state, (map.transpose() * weighted_map).lu().solve(&forces).expect("mass"))
     }
 
-    /// The constant coefficients of Mc(q).
+    /// Returns the constant coefficients of Mc(q).
     pub fn invariants(&self) -> GeneralBody {
         let nf = self.n_modes();
         let product = |a: &DMatrix<f64>, b: &DMatrix<f64>| a.transpose() * (&self.mass * b);
@@ -310,31 +311,31 @@ impl NodalBody {
         }
     }
 
-    /// (p, h, pi) = B'M vbar, body axes, about the frame origin.
+    /// Returns (p, h, pi) = B'M vbar in body axes, about the origin of the frame.
     fn momenta(&self, state: &State) -> DVector<f64> {
         self.mass_matrix(&state.q) * quasi_velocities(state)
     }
 
-    /// Kinetic energy and strain energy.
+    /// Returns the sum of kinetic and strain energy.
     pub fn energy(&self, state: &State) -> f64 {
         let displacement = &self.own_shapes * &state.q;
         0.5 * quasi_velocities(state).dot(&self.momenta(state))
             + 0.5 * displacement.dot(&(&self.stiffness * &displacement))
     }
 
-    /// Linear momentum, world axes.
+    /// Returns the linear momentum in world axes.
     pub fn linear_momentum(&self, state: &State) -> Vector3<f64> {
         state.axes * self.momenta(state).fixed_rows::<3>(0)
     }
 
-    /// Angular momentum about the world origin, world axes.
+    /// Returns the angular momentum about the world origin, in world axes.
     pub fn angular_momentum(&self, state: &State) -> Vector3<f64> {
         state.axes * self.momenta(state).fixed_rows::<3>(3) + state.origin.cross(&self.linear_momentum(state))
     }
 }
 
-/// Rows, shapes and mass with directors, dense and written from the blocks M_tr = -h~ + N, M_rr = tr(P) I - P'. Of
-/// a plane body h = (M_y, -M_x), P = M_rr / 2 I.
+/// Returns rows, shapes and mass with directors, dense and from the blocks M_tr = -h~ + N, M_rr = tr(P) I - P'. A plane
+/// body has h = (M_y, -M_x), P = M_rr / 2 I.
 fn on_directors(
     rows: &[Row],
     shapes: &DMatrix<f64>,
@@ -343,6 +344,7 @@ fn on_directors(
     let place: HashMap<Row, usize> = rows.iter().enumerate().map(|(i, &row)| (row, i)).collect();
     let plane = rows.iter().all(|row| (row.kind == RowKind::Rotation) == (row.axis == 2));
     let axes = if plane { 2 } else { 3 };
+    // Nodes with rotations, and the vectors of the other rows.
     let mut nodes: Vec<usize> =
         rows.iter().filter(|row| row.kind == RowKind::Rotation).map(|row| row.node).collect();
     nodes.sort_unstable();
@@ -352,6 +354,7 @@ fn on_directors(
     vectors.sort_unstable_by_key(|(kind, node)| (*kind == RowKind::Internal, *node));
     vectors.dedup();
 
+    // Extended rows: points and internal vectors, directors, rotations.
     let mut all: Vec<Row> = vectors
         .iter()
         .flat_map(|&(kind, node)| (0..axes).map(move |axis| Row { kind, node, axis }))
@@ -367,6 +370,7 @@ fn on_directors(
     let director =
         |node: usize, a: usize, axis: usize| at[&Row { kind: RowKind::Director, node: 3 * node + a, axis }];
 
+    // Blocks M of the given mass between two vectors; missing rows count as zero.
     let entry = |a: Row, b: Row| match (place.get(&a), place.get(&b)) {
         (Some(&i), Some(&j)) => mass[(i, j)],
         _ => 0.0,
@@ -379,6 +383,7 @@ fn on_directors(
     let mut e = DMatrix::zeros(all.len(), all.len());
     for &(kind, node) in &vectors {
         for &(other, second) in &vectors {
+            // M_tt between points is kept.
             let own = block((kind, node), (other, second));
             for (k, l) in (0..axes).flat_map(|k| (0..axes).map(move |l| (k, l))) {
                 e[(at[&Row { kind, node, axis: k }], at[&Row { kind: other, node: second, axis: l }])] =
@@ -386,6 +391,7 @@ fn on_directors(
             }
         }
         for &second in &nodes {
+            // M_tr = -h~ + N: h couples the point to the directors, N to the rotations.
             let own = block((kind, node), (RowKind::Rotation, second));
             let (moment, symmetric) = match plane {
                 true => (Vector3::new(own[(1, 2)], -own[(0, 2)], 0.0), Matrix3::zeros()),
@@ -412,6 +418,7 @@ fn on_directors(
         }
     }
     for (&node, &second) in nodes.iter().flat_map(|node| nodes.iter().map(move |second| (node, second))) {
+        // P = tr(M_rr) / 2 I - M_rr' couples the directors.
         let own = block((RowKind::Rotation, node), (RowKind::Rotation, second));
         let p = match plane {
             true => Matrix3::identity() * (0.5 * own[(2, 2)]),
@@ -424,6 +431,7 @@ fn on_directors(
         }
     }
 
+    // Shapes in the extended rows: a director moves by theta x e_a.
     let mut extended = DMatrix::zeros(all.len(), shapes.ncols());
     for (i, row) in all.iter().enumerate() {
         for j in 0..shapes.ncols() {
@@ -441,21 +449,21 @@ fn on_directors(
     (all, extended, e)
 }
 
-/// The invariants of a body with any mass matrix: those of the file, and W0 (3 x 3nf), column b nf + j:
-/// Phi_t'M B_j e_b, which is e_b x C1_j where M is rotation invariant.
+/// Invariants of a body with any mass matrix: those of the file, and W0 (3 x 3nf) with the columns Phi_t'M B_j e_b at b
+/// nf + j, which are e_b x C1_j if M is rotation invariant.
 pub struct GeneralBody {
     pub reduced: ReducedBody,
     pub w0: DMatrix<f64>,
 }
 
 impl GeneralBody {
-    /// [W Q]_kb = sum_j W_k,(b nf + j) q_j.
+    /// Returns [W Q]_kb = sum_j W_k,(b nf + j) q_j.
     fn contracted(&self, w: &DMatrix<f64>, q: &DVector<f64>) -> Matrix3<f64> {
         let nf = q.len();
         Matrix3::from_fn(|k, b| w.view((k, b * nf), (1, nf)).transpose().dot(q))
     }
 
-    /// Mc(q) of (V, omega, qd), all in body axes.
+    /// Returns Mc(q) for (V, omega, qd), all in body axes.
     pub fn mass_matrix(&self, q: &DVector<f64>) -> DMatrix<f64> {
         let body = &self.reduced;
         let nf = q.len();
@@ -474,7 +482,7 @@ impl GeneralBody {
         matrix
     }
 
-    /// (R'' world, alpha body, q'') of the free undamped body.
+    /// Returns the accelerations (R'' world, alpha body, q'') of the free undamped body.
     pub fn accelerations(&self, state: &State) -> DVector<f64> {
         let body = &self.reduced;
         let nf = state.q.len();
@@ -483,7 +491,7 @@ impl GeneralBody {
         let matrix = self.mass_matrix(&state.q);
         let momenta = &matrix * &nu;
 
-        // dMc/dt nu.
+        // Term dMc/dt nu.
         let kron = |q: &DVector<f64>| DMatrix::<f64>::identity(3, 3).kronecker(q);
         let (q, qd) = (kron(&state.q), kron(&state.qd));
         let mixed = q.transpose() * &body.w2 * &qd;
@@ -497,7 +505,7 @@ impl GeneralBody {
         rate.rows_mut(3, 3).copy_from(&(of_rotation + &coupling_rate * &state.qd));
         rate.rows_mut(6, nf).copy_from(&(coupling_rate.transpose() * w));
 
-        // dT/dq_j = omega' (B_j'M Phi_t V + B_j'M Bx omega + sum_i q_i B_j'M B_i omega + B_j'M Psi qd).
+        // Term dT/dq_j = omega' (B_j'M Phi_t V + B_j'M Bx omega + sum_i q_i B_j'M B_i omega + B_j'M Psi qd).
         let spin = w.transpose().kronecker(&DMatrix::<f64>::identity(nf, nf));
         let energy_slope = spin
             * (self.w0.transpose() * velocity
@@ -512,31 +520,31 @@ impl GeneralBody {
         self.mass_matrix(&state.q) * quasi_velocities(state)
     }
 
-    /// Kinetic and strain energy.
+    /// Returns the sum of kinetic and strain energy.
     pub fn energy(&self, state: &State) -> f64 {
         0.5 * quasi_velocities(state).dot(&self.momenta(state))
             + 0.5 * state.q.dot(&(&self.reduced.modal_stiffness * &state.q))
     }
 
-    /// Linear momentum, world axes.
+    /// Returns the linear momentum in world axes.
     pub fn linear_momentum(&self, state: &State) -> Vector3<f64> {
         state.axes * self.momenta(state).fixed_rows::<3>(0)
     }
 
-    /// Angular momentum about the world origin, world axes.
+    /// Returns the angular momentum about the world origin, in world axes.
     pub fn angular_momentum(&self, state: &State) -> Vector3<f64> {
         state.axes * self.momenta(state).fixed_rows::<3>(3) + state.origin.cross(&self.linear_momentum(state))
     }
 }
 
-/// nu = (V, omega, qd), V the velocity of the origin in body axes.
+/// Returns nu = (V, omega, qd) with the velocity V of the origin in body axes.
 pub fn quasi_velocities(state: &State) -> DVector<f64> {
     let velocity = state.axes.transpose() * state.velocity;
     let parts = velocity.iter().chain(state.omega.iter()).chain(state.qd.iter());
     DVector::from_iterator(6 + state.qd.len(), parts.copied())
 }
 
-/// Mc nu' from pd + w x p = 0; hd + w x h + V x p = 0; d/dt pi - dT/dq + K q = 0, where `rate` is dMc/dt nu.
+/// Solves Mc nu' from p' + w x p = 0, h' + w x h + V x p = 0, d/dt pi - dT/dq + K q = 0, where `rate` is dMc/dt nu.
 fn solve(
     state: &State,
     mut matrix: DMatrix<f64>,
@@ -554,12 +562,12 @@ fn solve(
     rotation -= state.omega.cross(&h) + velocity.cross(&p);
     let mut modal = forces.rows_mut(6, elastic.len());
     modal += energy_slope - elastic;
-    // Motions that a plane body does not have: no force, unit mass.
+    // Motions that a plane body does not have get no force and unit mass.
     (0..6).filter(|&k| matrix[(k, k)] == 0.0).collect::<Vec<_>>().iter().for_each(|&k| matrix[(k, k)] = 1.0);
     in_world(state, matrix.lu().solve(&forces).expect("the mass matrix is positive definite"))
 }
 
-/// R'' = A (V' + omega x V) in place of V'.
+/// Replaces V' by R'' = A (V' + omega x V).
 fn in_world(state: &State, mut rates: DVector<f64>) -> DVector<f64> {
     let velocity = state.axes.transpose() * state.velocity;
     let own = rates.fixed_rows::<3>(0).into_owned();
@@ -567,7 +575,7 @@ fn in_world(state: &State, mut rates: DVector<f64>) -> DVector<f64> {
     rates
 }
 
-/// y = (R, Euler parameters, R', omega, q, qd) for time integration.
+/// Packs a state into y = (R, Euler parameters, R', omega, q, qd) for time integration.
 pub fn pack(state: &State) -> DVector<f64> {
     let turn = UnitQuaternion::from_matrix(&state.axes);
     let mut y = state.origin.iter().copied().collect::<Vec<f64>>();
@@ -576,7 +584,7 @@ pub fn pack(state: &State) -> DVector<f64> {
     DVector::from_vec(y)
 }
 
-/// The state that [`pack`] has written.
+/// Returns the state that [`pack`] has packed.
 pub fn unpack(y: &DVector<f64>) -> State {
     let nf = (y.len() - 13) / 2;
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(y[3], y[4], y[5], y[6]));
@@ -590,7 +598,7 @@ pub fn unpack(y: &DVector<f64>) -> State {
     }
 }
 
-/// y' from the accelerations (R'' world, alpha body, q'').
+/// Returns y' from the accelerations (R'' world, alpha body, q'').
 pub fn rates(y: &DVector<f64>, accelerations: impl Fn(&State) -> DVector<f64>) -> DVector<f64> {
     let state = unpack(y);
     let nf = state.q.len();
@@ -605,29 +613,29 @@ pub fn rates(y: &DVector<f64>, accelerations: impl Fn(&State) -> DVector<f64>) -
     rate
 }
 
-/// y' of the unreduced body.
+/// Returns y' of the unreduced body.
 pub fn nodal_rates(body: &NodalBody, y: &DVector<f64>) -> DVector<f64> {
     rates(y, |state| body.accelerations(state))
 }
 
-/// y' by the invariants.
+/// Returns y' by the invariants.
 pub fn reduced_rates(body: &GeneralBody, y: &DVector<f64>) -> DVector<f64> {
     rates(y, |state| body.accelerations(state))
 }
 
-/// Random entries.
+/// Returns a matrix of random entries between -1 and 1.
 pub fn random_matrix(random: &mut Random, rows: usize, columns: usize) -> DMatrix<f64> {
     DMatrix::from_fn(rows, columns, |_, _| random.signed())
 }
 
-/// An nalgebra matrix as one of faer.
+/// Converts an nalgebra matrix to faer.
 pub fn to_faer(a: &DMatrix<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// Five nodes, three of them with rotations, two inner vectors, all rows in some order; four random shapes. M is the
-/// mass of points and directors, a positive definite number for every pair of them, and a twentieth of it that differs
-/// by direction and is zero on rigid motion.
+/// Returns a random body: five nodes, three of them with rotations, two internal vectors, all rows in random order, and
+/// four random shapes. M is the mass of points and directors: a random positive definite matrix between them, and a
+/// twentieth of it that depends on the direction and vanishes in rigid motion.
 pub fn random_body(seed: u64) -> NodalBody {
     let mut random = Random(seed);
     let positions: Vec<[f64; 3]> = (0..5).map(|_| random.vector::<3>()).collect();
@@ -643,7 +651,7 @@ pub fn random_body(seed: u64) -> NodalBody {
         let a = random_matrix(random, n, n);
         &a * a.transpose() / n as f64
     };
-    // Points 0 to 4, inner vectors 5 and 6, directors 7 + 3 node + a.
+    // Points 0 to 4, internal vectors 5 and 6, directors 7 + 3 node + a.
     let of_vectors = square(&mut random, 7 + 9).kronecker(&DMatrix::<f64>::identity(3, 3));
     let mut lift = DMatrix::zeros(of_vectors.nrows(), n);
     for (i, row) in rows.iter().enumerate() {

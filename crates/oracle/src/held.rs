@@ -1,13 +1,13 @@
-//! A model of solid elements that is held at an interface, as dense matrices of what can still move.
+//! A model of solid elements that is held at an interface, as dense matrices of its free motions.
 
 use crate::reference::dense;
 use flexbody_linalg::CscMatrix;
 use flexbody_model::RawModel;
 use nalgebra::{DMatrix, Vector3};
 
-/// K and M of what is left when the mean motion of some nodes is held, and the motions that are left.
+/// K and M of a model whose mean motion of some nodes is held, and the remaining motions.
 pub struct HeldModel {
-    /// N x (N - 6).
+    /// Basis of the remaining motions (N x (N - 6)).
     pub motions: DMatrix<f64>,
     pub stiffness: DMatrix<f64>,
     pub mass: DMatrix<f64>,
@@ -20,7 +20,7 @@ impl HeldModel {
         let nodes: Vec<usize> = nodes.iter().map(|id| *id as usize - 1).collect();
         let at = |i: usize| Vector3::from(raw.nodes.positions[i]);
         let centre = nodes.iter().map(|&i| at(i)).sum::<Vector3<f64>>() / nodes.len() as f64;
-        // The mean rigid motion vanishes where the displacements are orthogonal to all rigid motions of the nodes.
+        // The mean rigid motion vanishes if the displacements are orthogonal to all rigid motions of the nodes.
         let mut rigid = DMatrix::zeros(k.nrows(), 6);
         for &i in &nodes {
             for axis in 0..3 {
@@ -29,6 +29,7 @@ impl HeldModel {
                 (0..3).for_each(|c| rigid[(3 * i + c, 3 + axis)] = turn[c]);
             }
         }
+        // The null space of R R' is the space of motions that are left.
         let eigen = (&rigid * rigid.transpose()).symmetric_eigen();
         let free: Vec<usize> = (0..k.nrows()).filter(|&j| eigen.eigenvalues[j].abs() < 1e-9).collect();
         assert_eq!(free.len(), k.nrows() - 6);
@@ -37,7 +38,7 @@ impl HeldModel {
         Self { motions, stiffness, mass }
     }
 
-    /// Eigenvalues of K and M, ascending.
+    /// Returns the eigenvalues of K and M, ascending.
     pub fn eigenvalues(&self) -> Vec<f64> {
         let lower = self.mass.clone().cholesky().expect("mass").l();
         let half = lower.solve_lower_triangular(&self.stiffness).expect("regular");
@@ -48,7 +49,7 @@ impl HeldModel {
     }
 }
 
-/// A sparse matrix with all its entries.
+/// Returns a sparse matrix as a dense one.
 pub fn dense_matrix(a: &CscMatrix) -> DMatrix<f64> {
     let a = dense(a);
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])

@@ -1,12 +1,12 @@
-//! Time integration by extrapolation of Gragg's midpoint rule: order 12, fixed step, error far below what
-//! tests ask.
+//! Time integration by extrapolation of Gragg's midpoint rule: order 12, fixed step, with errors far below the
+//! tolerances of the tests.
 
 use nalgebra::DVector;
 
 /// Numbers of substeps of the extrapolated solutions.
 const SUBSTEPS: [usize; 6] = [2, 4, 6, 8, 10, 12];
 
-/// One step of y' = f(y).
+/// Performs one step of y' = f(y).
 pub fn step(y: &DVector<f64>, length: f64, f: &impl Fn(&DVector<f64>) -> DVector<f64>) -> DVector<f64> {
     let start = f(y);
     let mut table: Vec<DVector<f64>> = Vec::new();
@@ -17,7 +17,7 @@ pub fn step(y: &DVector<f64>, length: f64, f: &impl Fn(&DVector<f64>) -> DVector
             let next = before + f(&now) * (2.0 * h);
             (before, now) = (now, next);
         }
-        // Aitken and Neville, in powers of h^2.
+        // Extrapolation by Aitken and Neville, in powers of h^2.
         let mut value = (&now + &before + f(&now) * h) * 0.5;
         for column in 0..row {
             let ratio = (n as f64 / SUBSTEPS[row - 1 - column] as f64).powi(2);

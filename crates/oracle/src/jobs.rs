@@ -1,4 +1,4 @@
-//! Jobs of FE programs among the fixtures, and the block of steel that most of them are.
+//! Jobs of FE programs among the fixtures, and the block of steel that most of them model.
 
 use crate::fixtures;
 use flexbody_body::basis::ModeSettings;
@@ -10,7 +10,7 @@ use flexbody_linalg::context::Context;
 use flexbody_model::{Coupling, FeModel, RawModel, Reference};
 use std::path::{Path, PathBuf};
 
-/// A rigid interface of a node set of the job.
+/// Returns a rigid interface of a node set of the job.
 pub fn set(name: &str, set: &str) -> InterfaceSource {
     let nodes = InterfaceNodes::Set(set.to_owned());
     InterfaceSource {
@@ -27,7 +27,7 @@ pub fn job(path: &Path, interfaces: Vec<InterfaceSource>) -> RawModel {
     read_model(&files).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The deck of a job among the small fixtures.
+/// Returns the path of the deck of a job among the small fixtures.
 pub fn small(name: &str) -> PathBuf {
     fixtures().join("small").join(name).join("job.inp")
 }
@@ -44,13 +44,13 @@ pub fn body(raw: RawModel, modes: usize) -> FlexBody {
 /// Mass of the block of `fixtures/make/make_jobs.py`.
 pub const MASS: f64 = 7850.0 * 0.2 * 0.08 * 0.06;
 
-/// A part of steel of this size has these principal moments of inertia.
+/// Returns the principal moments of inertia of the block.
 fn block_inertia() -> [f64; 3] {
     let [a, b, c]: [f64; 3] = [0.2, 0.08, 0.06];
     [b * b + c * c, a * a + c * c, a * a + b * b].map(|sum| MASS * sum / 12.0)
 }
 
-/// Mass and principal moments of inertia are those of the block.
+/// Fails unless mass and principal moments of inertia are those of the block.
 pub fn assert_has_inertia_of_the_block(body: &FlexBody, tolerance: f64) {
     let invariants = body.invariants();
     assert!((invariants.mass() / MASS - 1.0).abs() < tolerance / 10.0, "{}", invariants.mass());

@@ -1,7 +1,7 @@
-//! Oracles of the tests: exact small finite element models, rational arithmetic, dense reference solutions and
-//! equations of motion written from definitions; and the fixtures. Nothing here is part of what users get.
+//! Oracles of the tests: exact small finite element models, rational arithmetic, dense reference solutions, and
+//! equations of motion written from definitions; and the fixtures. Nothing here belongs to the published crates.
 //!
-//! Each feature adds what stands on one crate more, so that the tests of a crate build nothing above it.
+//! Each feature adds the modules that need one crate more, so that the tests of a crate build no crate above it.
 
 pub mod cases;
 pub mod counted;
@@ -67,23 +67,23 @@ pub mod report_bodies;
 
 use std::path::{Path, PathBuf};
 
-/// The folder of the workspace.
+/// Returns the folder of the workspace.
 pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// The folder of shared models and sample files beside the workspace, or the one that `FLEXBODY_SHARED` names; tests that use it
-/// do without where it is missing.
+/// Returns the folder of shared models and sample files beside the workspace, or the folder in `FLEXBODY_SHARED`. Tests
+/// that use it skip it if it is missing.
 pub fn shared() -> PathBuf {
     std::env::var_os("FLEXBODY_SHARED").map_or_else(|| root().join("../shared"), PathBuf::from)
 }
 
-/// The folder of the fixtures.
+/// Returns the folder of the fixtures.
 pub fn fixtures() -> PathBuf {
     root().join("fixtures")
 }
 
-/// Names of the entries of a folder, sorted.
+/// Returns the names of the entries of a folder, sorted.
 pub fn members(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).expect("a folder");
     let mut names: Vec<_> =

@@ -1,7 +1,7 @@
 //! Meshes on an integer lattice and their assembled matrices.
 //!
-//! A mesh is a set of unit cells and a map from lattice coordinates to space. Nodes sit on the half-integer
-//! lattice, so that mid-edge nodes are shared without searching; cells that touch are connected.
+//! A mesh is a set of unit cells and a map from lattice coordinates to space. Nodes sit on the half-integer lattice, so
+//! that mid-edge nodes are shared without a search. Cells that touch are connected.
 
 use super::elements::{ElementKind, MassRule, Material, TET_EDGES};
 use flexbody_linalg::CscMatrix;
@@ -20,21 +20,21 @@ pub struct Mesh {
 #[derive(Debug, Clone)]
 pub struct Assembly {
     pub nodes: Vec<[f64; 3]>,
-    /// K (3n x 3n).
+    /// Stiffness matrix K (3n x 3n).
     pub stiffness: CscMatrix,
-    /// Ms (n x n): M = Ms kron I3.
+    /// Scalar mass matrix Ms (n x n), with M = Ms kron I3.
     pub scalar_mass: CscMatrix,
 }
 
 impl Mesh {
-    /// The unit cells with lower corners `cells`, as `kind` elements (tetrahedra: six per cell), mapped to
-    /// space.
+    /// Creates the mesh of the unit cells with lower corners `cells`, as elements `kind` (tetrahedra: six per cell),
+    /// mapped to space.
     ///
     /// Tetrahedra stay straight under any map: their mid-edge nodes lie half way between the mapped corners.
     pub fn from_cells(kind: ElementKind, cells: &[[i32; 3]], map: impl Fn([f64; 3]) -> [f64; 3]) -> Self {
         let elements: Vec<Vec<[i32; 3]>> =
             cells.iter().flat_map(|c| cell_elements(kind, c.map(|v| 2 * v))).collect();
-        // The map orders nodes by z, then y, then x: thin meshes along x keep neighbours close.
+        // Nodes are ordered by z, then y, then x: thin meshes along x keep neighbours close.
         let mut numbers: BTreeMap<[i32; 3], usize> =
             elements.iter().flatten().map(|p| ([p[2], p[1], p[0]], 0)).collect();
         numbers.values_mut().enumerate().for_each(|(i, number)| *number = i);
@@ -48,18 +48,18 @@ impl Mesh {
         Self { nodes, elements }
     }
 
-    /// A block of `cells` with one corner at the origin.
+    /// Returns a block of `cells` with one corner at the origin.
     pub fn block(kind: ElementKind, cells: [i32; 3], size: [f64; 3]) -> Self {
         let map = |p: [f64; 3]| std::array::from_fn(|k| size[k] * p[k] / f64::from(cells[k]));
         Self::from_cells(kind, &grid(cells), map)
     }
 
-    /// A ball about the origin of 2n x 2n x 2n hexahedra: the mesh has the symmetry of the cube.
+    /// Returns a ball about the origin of 2n x 2n x 2n hexahedra. The mesh has the symmetry of the cube.
     pub fn ball(kind: ElementKind, n: i32, radius: f64) -> Self {
         Self::from_cells(kind, &grid([2 * n; 3]), |p| {
             let [x, y, z] = p.map(|v| v / f64::from(n) - 1.0);
             let (xx, yy, zz) = (x * x, y * y, z * z);
-            // Maps the cube [-1, 1]^3 to the unit ball, faces to the sphere.
+            // The map takes the cube [-1, 1]^3 to the unit ball, and its faces to the sphere.
             [
                 radius * x * (1.0 - yy / 2.0 - zz / 2.0 + yy * zz / 3.0).sqrt(),
                 radius * y * (1.0 - zz / 2.0 - xx / 2.0 + zz * xx / 3.0).sqrt(),
@@ -68,8 +68,8 @@ impl Mesh {
         })
     }
 
-    /// A cylinder about the z axis, of 2n x 2n hexahedra over the section and `layers` along it; four-fold
-    /// symmetric.
+    /// Returns a cylinder about the z axis, of 2n x 2n hexahedra over the section and `layers` along it. The mesh has
+    /// four-fold symmetry.
     pub fn cylinder(kind: ElementKind, n: i32, layers: i32, radius: f64, length: f64) -> Self {
         Self::from_cells(kind, &grid([2 * n, 2 * n, layers]), |p| {
             let (x, y) = (p[0] / f64::from(n) - 1.0, p[1] / f64::from(n) - 1.0);
@@ -81,7 +81,7 @@ impl Mesh {
         })
     }
 
-    /// A ring about the z axis of `around` hexahedra, of square section with the given side.
+    /// Returns a ring about the z axis of `around` hexahedra, with a square section of the given side.
     pub fn ring(kind: ElementKind, around: i32, radius: f64, side: f64) -> Self {
         let mesh = Self::from_cells(kind, &grid([1, around, 1]), |[r, t, z]| {
             let angle = std::f64::consts::TAU * t / f64::from(around);
@@ -91,7 +91,7 @@ impl Mesh {
         mesh.welded(1e-9 * radius)
     }
 
-    /// The mesh with nodes closer than `distance` made one.
+    /// Returns the mesh with nodes closer than `distance` merged.
     pub fn welded(self, distance: f64) -> Self {
         let (mut nodes, mut numbers) = (Vec::<[f64; 3]>::new(), Vec::new());
         for x in &self.nodes {
@@ -106,34 +106,34 @@ impl Mesh {
         Self { nodes, elements }
     }
 
-    /// An L-shaped bracket of cubes: `arm` cells along x and along z, `width` along y, two cells thick.
+    /// Returns an L-shaped bracket of cubes: `arm` cells along x and along z, `width` along y, two cells thick.
     pub fn bracket(kind: ElementKind, arm: i32, width: i32, cell: f64) -> Self {
         let cells: Vec<_> = grid([arm, width, arm]).into_iter().filter(|c| c[0] < 2 || c[2] < 2).collect();
         Self::from_cells(kind, &cells, |p| p.map(|v| cell * v))
     }
 
-    /// Two blocks of n x n x n unit cells that share the nodes of one edge only: a hinge.
+    /// Returns two blocks of n x n x n unit cells that share only the nodes of one edge: a hinge.
     pub fn hinge(kind: ElementKind, n: i32) -> Self {
         let mut cells = grid([n; 3]);
         cells.extend(grid([n; 3]).iter().map(|c| [c[0] + n, c[1] + n, c[2]]));
         Self::from_cells(kind, &cells, |p| p)
     }
 
-    /// Two blocks of n x n x n unit cells with a gap between them.
+    /// Returns two blocks of n x n x n unit cells with a gap between them.
     pub fn two_bodies(kind: ElementKind, n: i32) -> Self {
         let mut cells = grid([n; 3]);
         cells.extend(grid([n; 3]).iter().map(|c| [c[0] + n + 1, c[1], c[2]]));
         Self::from_cells(kind, &cells, |p| p)
     }
 
-    /// The elements whose first node fulfils `kept`, on all nodes.
+    /// Returns the mesh of the elements whose first node fulfils `kept`, with all nodes.
     pub fn part(&self, kept: impl Fn([f64; 3]) -> bool) -> Self {
         let elements =
             self.elements.iter().filter(|(_, nodes)| kept(self.nodes[nodes[0]])).cloned().collect();
         Self { nodes: self.nodes.clone(), elements }
     }
 
-    /// The mesh at x' = R x + d.
+    /// Returns the mesh at x' = R x + d.
     pub fn moved(&self, rotation: &Matrix3<f64>, shift: [f64; 3]) -> Self {
         let place = |x: &[f64; 3]| (rotation * Vector3::from(*x) + Vector3::from(shift)).into();
         Self { nodes: self.nodes.iter().map(place).collect(), elements: self.elements.clone() }
@@ -167,7 +167,7 @@ impl Mesh {
 }
 
 impl Mesh {
-    /// K_geo (3n x 3n) of the stress that the displacements `moved` (3n) cause.
+    /// Returns the geometric stiffness (3n x 3n) of the stress that the displacements `moved` (3n) cause.
     pub fn geometric_stiffness(&self, material: &Material, moved: &[f64]) -> CscMatrix {
         let mut all = Vec::new();
         for (kind, nodes) in &self.elements {
@@ -186,7 +186,7 @@ impl Mesh {
 }
 
 impl Assembly {
-    /// The sum of two bodies on the same nodes: parts of different material.
+    /// Returns the sum of two bodies on the same nodes: a body with parts of different material.
     pub fn plus(&self, other: &Self) -> Self {
         assert_eq!(self.nodes, other.nodes, "bodies on the same nodes");
         let sum = |a: &CscMatrix, b: &CscMatrix| {
@@ -204,7 +204,7 @@ impl Assembly {
         3 * self.nodes.len()
     }
 
-    /// M = Ms kron I3 (3n x 3n).
+    /// Returns M = Ms kron I3 (3n x 3n).
     pub fn mass(&self) -> CscMatrix {
         let ms = &self.scalar_mass;
         let triplets: Vec<_> =
@@ -212,7 +212,7 @@ impl Assembly {
         CscMatrix::from_triplets(self.n_dofs(), self.n_dofs(), &triplets)
     }
 
-    /// The same body with its row-sum lumped mass.
+    /// Returns the body with row-sum lumped mass.
     pub fn with_lumped_mass(&self) -> Self {
         let mut sums = vec![0.0; self.nodes.len()];
         entries(&self.scalar_mass).for_each(|(row, _, value)| sums[row as usize] += value);
@@ -221,14 +221,14 @@ impl Assembly {
         Self { scalar_mass, ..self.clone() }
     }
 
-    /// The model with node numbers 1, 2, ... and no row labels: node-major.
+    /// Returns the model with node numbers 1, 2, ... and node-major rows without labels.
     pub fn raw_model(&self) -> RawModel {
         let nodes = Nodes { ids: (1..=self.nodes.len() as i64).collect(), positions: self.nodes.clone() };
         RawModel::in_memory("test body", self.stiffness.clone(), self.mass(), nodes)
     }
 }
 
-/// Row, column and value of every stored entry, column by column.
+/// Returns row, column and value of every stored entry, column by column.
 pub fn entries(matrix: &CscMatrix) -> impl Iterator<Item = (u32, u32, f64)> + '_ {
     (0..matrix.n_cols()).flat_map(move |j| {
         let (rows, values) = matrix.column(j);
@@ -236,7 +236,7 @@ pub fn entries(matrix: &CscMatrix) -> impl Iterator<Item = (u32, u32, f64)> + '_
     })
 }
 
-/// Lower corners of the cells of a grid.
+/// Returns the lower corners of the cells of a grid.
 pub fn grid(cells: [i32; 3]) -> Vec<[i32; 3]> {
     let mut all = Vec::new();
     for z in 0..cells[2] {
@@ -247,14 +247,14 @@ pub fn grid(cells: [i32; 3]) -> Vec<[i32; 3]> {
     all
 }
 
-/// Nodes of the elements of one cell, on the half-integer lattice (coordinates doubled).
+/// Returns the nodes of the elements of one cell, on the half-integer lattice (coordinates doubled).
 fn cell_elements(kind: ElementKind, corner: [i32; 3]) -> Vec<Vec<[i32; 3]>> {
     let at = |offset: [i32; 3]| -> [i32; 3] { std::array::from_fn(|k| corner[k] + offset[k]) };
     match kind {
         ElementKind::Hex8 | ElementKind::Hex20 => {
             vec![kind.hex_signs().iter().map(|s| at(s.map(|v| v + 1))).collect()]
         }
-        // Kuhn's six tetrahedra around the main diagonal: one per order of the axes, the same in every cell.
+        // Kuhn's six tetrahedra around the main diagonal: one per order of the axes, alike in every cell.
         ElementKind::Tet4 | ElementKind::Tet10 => {
             [[0, 1, 2], [1, 2, 0], [2, 0, 1], [0, 2, 1], [2, 1, 0], [1, 0, 2]]
                 .iter()
@@ -281,7 +281,7 @@ fn cell_elements(kind: ElementKind, corner: [i32; 3]) -> Vec<Vec<[i32; 3]>> {
     }
 }
 
-/// Moves mid-edge nodes of tet10 elements half way between their corners.
+/// Moves the mid-edge nodes of tet10 elements half way between their corners.
 fn straighten(nodes: &mut [[f64; 3]], elements: &[(ElementKind, Vec<usize>)]) {
     for (_, element) in elements {
         for (middle, &(a, b)) in element[4..].iter().zip(&TET_EDGES) {

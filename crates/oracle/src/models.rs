@@ -1,21 +1,21 @@
-//! Real finite element models from disk, by a reader of its own: compressed Matrix Market and the two tables.
+//! Real finite element models from disk, with a separate reader for compressed Matrix Market and the two tables.
 
 use flexbody_linalg::SymmetricMatrix;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// A solid body as the finite element program wrote it, in node-major order.
+/// Solid body as the finite element program wrote it, in node-major order.
 pub struct Model {
     pub name: String,
     pub positions: Vec<[f64; 3]>,
     /// Every entry of M (3n x 3n), both triangles.
     pub mass: Vec<(usize, usize, f64)>,
-    /// Ms, from the entries of the first direction.
+    /// Scalar mass matrix Ms, from the entries of the first direction.
     pub scalar_mass: SymmetricMatrix,
-    /// The reference numbers beside the matrices.
+    /// Reference numbers in the folder of the matrices.
     pub reference: serde_json::Value,
     folder: PathBuf,
-    /// Node-major place of each stored matrix row.
+    /// Node-major index of each stored matrix row.
     rows: Vec<usize>,
 }
 
@@ -24,7 +24,7 @@ impl Model {
     pub fn read(folder: &Path, reference: &str) -> Self {
         let nodes = table(&folder.join("nodes.csv"));
         let dofs = table(&folder.join("dofs.csv"));
-        // The row number in front of the label is optional.
+        // The row number before the label is optional.
         let label = |dof: &[f64]| (dof[dof.len() - 2], dof[dof.len() - 1] as usize);
         let index = |id: f64| nodes.iter().position(|row| row[0] == id).expect("every label names a node");
         let mut last = (f64::NAN, 0);
@@ -56,7 +56,7 @@ impl Model {
         }
     }
 
-    /// K (3n x 3n), in node-major order.
+    /// Returns K (3n x 3n), in node-major order.
     pub fn stiffness(&self) -> SymmetricMatrix {
         let both = assembled(&self.folder.join("K.mtx.gz"), &self.rows);
         let triplets: Vec<_> = both.iter().map(|&(i, j, value)| (i as u32, j as u32, value)).collect();
@@ -64,7 +64,7 @@ impl Model {
     }
 }
 
-/// Entries of both triangles of a stored matrix, its rows renumbered.
+/// Returns the entries of both triangles of a stored matrix, with renumbered rows.
 fn assembled(path: &Path, rows: &[usize]) -> Vec<(usize, usize, f64)> {
     let mut entries = Vec::new();
     for (i, j, value) in matrix_market(path) {
@@ -76,12 +76,12 @@ fn assembled(path: &Path, rows: &[usize]) -> Vec<(usize, usize, f64)> {
     entries
 }
 
-/// A symmetric matrix from both of its triangles.
+/// Returns a symmetric matrix from the entries of both triangles.
 pub fn symmetric(n: usize, triplets: &[(u32, u32, f64)]) -> SymmetricMatrix {
     SymmetricMatrix::new(flexbody_linalg::CscMatrix::from_triplets(n, n, triplets)).expect("symmetric")
 }
 
-/// The four bodies that belong to the project.
+/// Returns the four solid bodies of the fixtures.
 pub fn own() -> Vec<Model> {
     let folder = crate::fixtures().join("models");
     ["bar_c3d8r", "bracket_hex20", "connecting_rod", "cube_hex8"]
@@ -90,7 +90,7 @@ pub fn own() -> Vec<Model> {
         .collect()
 }
 
-/// Larger solid bodies that lie beside the project on some machines; none elsewhere.
+/// Returns larger solid bodies from the shared folder; none if the folder is missing.
 pub fn shared() -> Vec<Model> {
     let root = crate::shared();
     ["a_beam_c3d20", "b_conrod_30k", "e_bracket_near", "f_cube_c3d8", "g_two_1e6", "k_c3d8r_singularM"]
@@ -101,14 +101,14 @@ pub fn shared() -> Vec<Model> {
         .collect()
 }
 
-/// Numbers of a CSV file, without its header.
+/// Returns the numbers of a CSV file, without its header.
 fn table(path: &Path) -> Vec<Vec<f64>> {
     let text = std::fs::read_to_string(path).expect("table");
     let row = |line: &str| line.split(',').map(|field| field.trim().parse().expect("number")).collect();
     text.lines().skip(1).filter(|line| !line.trim().is_empty()).map(row).collect()
 }
 
-/// Entries (from 0) of a compressed symmetric Matrix Market file, as stored: one triangle.
+/// Returns the entries (from 0) of a compressed symmetric Matrix Market file, as stored: one triangle.
 fn matrix_market(path: &Path) -> Vec<(usize, usize, f64)> {
     let mut text = String::new();
     let file = std::fs::File::open(path).expect("matrix");

@@ -6,14 +6,14 @@ use flexbody_motion::dynamics::{
 use flexbody_motion::integration::{Explicit, Failure, Gauss, Method, System, integrate};
 use nalgebra::{DVector, Matrix3, Vector3};
 
-/// What free motion keeps: energy, and momenta along world axes.
+/// Quantities that free motion conserves: energy, and momenta along world axes.
 pub struct Kept {
     pub energy: f64,
     pub linear: Vector3<f64>,
     pub angular: Vector3<f64>,
 }
 
-/// Largest relative changes of what is kept, and how lively the motion was.
+/// Largest relative changes of the conserved quantities, and measures of the motion.
 #[derive(Debug, Default)]
 pub struct Drift {
     pub energy: f64,
@@ -24,8 +24,8 @@ pub struct Drift {
 }
 
 impl Drift {
-    /// Adds a state: what it keeps of the first, |q| beside the size of the body, radians turned since the
-    /// last.
+    /// Adds a state: the changes of its conserved quantities since the first state, |q| relative to the size of the
+    /// body, and the angle in radians turned since the last state.
     pub fn add(&mut self, first: &Kept, now: &Kept, deformation: f64, turned: f64) {
         self.energy = self.energy.max((now.energy / first.energy - 1.0).abs());
         self.linear = self.linear.max((now.linear - first.linear).norm() / first.linear.norm());
@@ -34,13 +34,13 @@ impl Drift {
         self.turns += turned / std::f64::consts::TAU;
     }
 
-    /// The worst of what should be kept.
+    /// Returns the largest relative change of a conserved quantity.
     pub fn worst(&self) -> f64 {
         self.energy.max(self.linear).max(self.angular)
     }
 }
 
-/// The states at the instants, the first of which is the start, with their balances.
+/// Returns the states at the instants, the first of which is the start, with their balances.
 pub fn run(
     equations: &EquationsOfMotion,
     surroundings: &dyn Surroundings,
@@ -62,18 +62,17 @@ pub fn run(
     (places, balances)
 }
 
-/// The method with error control.
+/// Returns the method with error control.
 pub fn adaptive(tolerance: f64) -> impl Fn(usize) -> Method {
     move |n| Method::Explicit(Explicit::new(n, tolerance, f64::MAX))
 }
 
-/// The method that conserves.
+/// Returns the conserving method.
 pub fn conserving(order: usize, step: f64) -> impl Fn(usize) -> Method {
     move |n| Method::Gauss { method: Gauss::new(n, order), step }
 }
 
-/// y' of y = (R, Euler parameters, q, V, omega, qd), V in body axes; forces are added by `load`, which knows
-/// A.
+/// Returns y' of y = (R, Euler parameters, q, V, omega, qd), V in body axes. `load` adds the forces; it receives A.
 pub fn velocity_rates(
     equations: &EquationsOfMotion,
     y: &DVector<f64>,
@@ -94,7 +93,7 @@ pub fn velocity_rates(
     DVector::from_iterator(y.len(), parts)
 }
 
-/// The Euler parameters, of unit length but for the error of the integration.
+/// Returns the Euler parameters, normalised to remove the error of the integration.
 pub fn orientation(y: &DVector<f64>) -> EulerParameters {
     EulerParameters(y.fixed_rows::<4>(3).normalize().into())
 }

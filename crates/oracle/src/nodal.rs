@@ -7,7 +7,7 @@ use flexbody_body::invariants::{Invariants, PrimaryData, TermGroups};
 use flexbody_linalg::SymmetricMatrix;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
-/// Entries of M = Ms kron I3.
+/// Returns the entries of M = Ms kron I3.
 pub fn expand(scalar: &SymmetricMatrix) -> Vec<(usize, usize, f64)> {
     let mut entries = Vec::new();
     for i in 0..scalar.n() {
@@ -19,7 +19,7 @@ pub fn expand(scalar: &SymmetricMatrix) -> Vec<(usize, usize, f64)> {
     entries
 }
 
-/// A sum of products with its rounding errors carried along: twice the digits.
+/// Sum of products with compensated rounding errors: twice the digits.
 #[derive(Clone, Copy, Default)]
 struct Sum(f64, f64);
 
@@ -42,7 +42,7 @@ impl Sum {
     }
 }
 
-/// a' M b with twice the digits, for 3n-vectors.
+/// Returns a' M b with twice the digits, for 3n-vectors.
 fn weighted(mass: &[(usize, usize, f64)], a: &[f64], b: &[f64]) -> f64 {
     let mut product = vec![Sum::default(); a.len()];
     for &(i, j, value) in mass {
@@ -56,8 +56,8 @@ fn weighted(mass: &[(usize, usize, f64)], a: &[f64], b: &[f64]) -> f64 {
     sum.value()
 }
 
-/// The primary data by their definitions as products of 3n-vectors with M, with twice the digits: rigid
-/// fields e_a and x_k e_a, and fields of one component of a mode moved to one direction.
+/// Returns the primary data from their definitions as products of 3n-vectors with M, with twice the digits. The vectors
+/// are the rigid fields e_a and x_k e_a, and fields of one component of a mode moved to one direction.
 pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes: &Mat<f64>) -> Invariants {
     let (n, nf) = (positions.len(), shapes.ncols());
     let field = |direction: usize, f: &dyn Fn(usize) -> f64| -> Vec<f64> {
@@ -68,7 +68,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
     let psi = |k: usize, p: usize, a: usize| field(a, &|i| shapes[(3 * i + k, p)]);
     let mode = |p: usize| -> Vec<f64> { (0..3 * n).map(|row| shapes[(row, p)]).collect() };
     let w = |a: &[f64], b: &[f64]| weighted(mass, a, b);
-    // Different directions for different quantities: all three must do.
+    // The quantities use different directions: each direction must give the right value.
     Invariants::new(PrimaryData {
         mass: w(&one(1), &one(1)),
         first_moment: Vector3::from_fn(|k, _| w(&one(2), &x(k, 2))),
@@ -86,8 +86,7 @@ pub fn brute_force(mass: &[(usize, usize, f64)], positions: &[[f64; 3]], shapes:
     })
 }
 
-/// Forces on (R world, rotation about the origin body, modes) that M times the nodal accelerations sum to,
-/// and the size of the summed terms in each group.
+/// Returns the forces on (R world, rotation about the origin body, modes): the sums of M times the nodal accelerations.
 pub fn inertia_forces(
     mass: &[(usize, usize, f64)],
     positions: &[[f64; 3]],
@@ -133,7 +132,7 @@ pub fn inertia_forces(
     result
 }
 
-/// The library's invariants in the form of the equations.
+/// Returns the library's invariants in the form of the equations.
 pub fn reduced(body: &Invariants) -> ReducedBody {
     let dense = |a: Mat<f64>| DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)]);
     ReducedBody {
@@ -150,7 +149,8 @@ pub fn reduced(body: &Invariants) -> ReducedBody {
     }
 }
 
-/// A random motion: displacements and modal rates of size `displacement`, rates of rotation of a few radians.
+/// Returns a random motion with modal coordinates and rates up to `displacement`, and rates of rotation of a few
+/// radians.
 pub fn random_state(random: &mut Random, modes: usize, displacement: f64) -> (State, DVector<f64>) {
     let mut numbers = |n: usize, scale: f64| DVector::from_fn(n, |_, _| scale * random.signed());
     let (q, qd) = (numbers(modes, displacement), numbers(modes, displacement));
@@ -167,7 +167,7 @@ pub fn random_state(random: &mut Random, modes: usize, displacement: f64) -> (St
     (state, accelerations)
 }
 
-/// Largest relative deviation over the groups translation, rotation, modes.
+/// Returns the largest relative deviation over the groups translation, rotation and modes.
 pub fn deviation(nodal: &DVector<f64>, reduced: &DVector<f64>) -> f64 {
     let nf = nodal.len() - 6;
     [(0, 3), (3, 3), (6, nf)]

@@ -1,13 +1,13 @@
-//! Bodies that lack groups of the kinetic energy.
+//! Bodies without some groups of the kinetic energy.
 
 use flexbody_body::flex_body::{FlexBody, TermDecision, TermGroup, TermGroups};
 
-/// Every combination of groups.
+/// Returns every combination of groups.
 pub fn combinations() -> impl Iterator<Item = TermGroups> {
     (0..8).map(|bits| TermGroups { w1: bits & 1 != 0, w2: bits & 2 != 0, w3: bits & 4 != 0 })
 }
 
-/// Decisions that say so.
+/// Returns the decisions that lead to these groups.
 pub fn decisions(groups: TermGroups) -> Vec<TermDecision> {
     let decision = |group: TermGroup| TermDecision {
         group,
@@ -20,7 +20,7 @@ pub fn decisions(groups: TermGroups) -> Vec<TermDecision> {
     TermGroup::ALL.map(decision).to_vec()
 }
 
-/// The body with these groups only.
+/// Returns the body with only these groups.
 pub fn with_groups(body: &FlexBody, groups: TermGroups) -> FlexBody {
     let all: Vec<usize> = (0..body.n_modes()).collect();
     body.reduced(&all, groups, decisions(groups)).expect("a body")

@@ -1,4 +1,4 @@
-//! The way from matrices to modes and invariants, as tests take it.
+//! The way from matrices to modes and invariants, for tests.
 
 use super::mesh::Assembly;
 use faer::Mat;
@@ -9,13 +9,13 @@ use flexbody_eigen::{Accuracy, Method, Proof, Wanted};
 use flexbody_linalg::context::Context;
 use flexbody_model::{FeModel, RawModel, check};
 
-/// A checked model and its lowest flexible modes, in model axes.
+/// Checked model and its lowest flexible modes, in model axes.
 pub struct Body {
     pub model: FeModel,
     pub modes: ModalBasis,
 }
 
-/// A body in its own frame.
+/// Body in its frame.
 pub struct Condensed {
     pub frame: Frame,
     pub positions: Vec<[f64; 3]>,
@@ -24,7 +24,7 @@ pub struct Condensed {
 }
 
 impl Body {
-    /// Frequencies in cycles per time unit.
+    /// Returns the frequencies in cycles per unit of time.
     pub fn frequencies(&self) -> Vec<f64> {
         self.eigenvalues().iter().map(|l| l.sqrt() / std::f64::consts::TAU).collect()
     }
@@ -33,12 +33,12 @@ impl Body {
         &self.modes.solution.eigenvalues
     }
 
-    /// Shapes in model axes.
+    /// Returns the shapes in model axes.
     pub fn shapes(&self) -> &Mat<f64> {
         &self.modes.solution.vectors
     }
 
-    /// Exact invariants about the chosen frame.
+    /// Returns the exact invariants about the chosen frame.
     pub fn condensed(&self, choice: BodyFrame) -> Condensed {
         let mass = self.model.scalar_mass().expect("a solid");
         let (frame, _) = choose_frame(mass, &self.model.nodes().positions, choice).expect("a body with mass");
@@ -55,14 +55,14 @@ impl Body {
     }
 }
 
-/// The flexible modes that `settings` ask for.
+/// Computes the flexible modes that `settings` request.
 pub fn solve(raw: RawModel, settings: &ModeSettings) -> Result<Body> {
     let model = check(raw)?.model;
     let modes = free_surface(&model, settings, &Context::QUIET)?;
     Ok(Body { model, modes })
 }
 
-/// The lowest `count` flexible modes at certified accuracy by `method`.
+/// Computes the lowest `count` flexible modes at certified accuracy by `method`.
 pub fn try_modes(raw: RawModel, count: usize, method: Method) -> Result<Body> {
     solve(
         raw,
@@ -75,13 +75,13 @@ pub fn try_modes(raw: RawModel, count: usize, method: Method) -> Result<Body> {
     )
 }
 
-/// The lowest `count` flexible modes of a sound body, with their completeness proved: the inertia count says
-/// that none is missed.
+/// Computes the lowest `count` flexible modes of a valid body. The inertia count must prove that none is missing.
 pub fn modes(body: &Assembly, count: usize) -> Body {
     proved(body.raw_model(), count, Method::Auto)
 }
 
-/// As [`modes`], of any raw model and by a given method.
+/// Computes the lowest `count` flexible modes of any raw model by a given method. The inertia count must prove that
+/// none is missing.
 pub fn proved(raw: RawModel, count: usize, method: Method) -> Body {
     let body = try_modes(raw, count, method).expect("a sound body");
     let completeness = &body.modes.solution.completeness;

@@ -10,8 +10,8 @@ pub const YOUNGS: f64 = 70e9;
 pub const POISSON: f64 = 0.3;
 pub const DENSITY: f64 = 2700.0;
 
-/// A rectangle of unit thickness from bilinear elements in plane stress, turned by `angle` about the origin
-/// and moved.
+/// Returns a rectangle of unit thickness of bilinear elements in plane stress, rotated by `angle` about the origin and
+/// moved.
 pub fn rectangle(columns: usize, rows: usize, angle: f64, origin: [f64; 2]) -> RawModel {
     let (a, b) = (LENGTH / columns as f64, HEIGHT / rows as f64);
     let node = |i: usize, j: usize| (j * (columns + 1) + i) as u32;
@@ -73,7 +73,7 @@ pub fn rectangle(columns: usize, rows: usize, angle: f64, origin: [f64; 2]) -> R
     let count = (columns + 1) * (rows + 1);
     let matrix = |entries: &[(u32, u32, f64)]| {
         let a = CscMatrix::from_triplets(2 * count, 2 * count, entries);
-        // Exactly symmetric, as FE programs write it.
+        // The matrix is made exactly symmetric, as FE programs write it.
         let b: Vec<(u32, u32, f64)> = (0..2 * count as u32)
             .flat_map(|j| {
                 let a = &a;

@@ -12,7 +12,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [-1, 1).
+    /// Returns a number uniform in [-1, 1).
     pub fn signed(&mut self) -> f64 {
         (self.next_u64() >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
@@ -21,7 +21,7 @@ impl Random {
         std::array::from_fn(|_| self.signed())
     }
 
-    /// A random order of 0..n.
+    /// Returns a random order of 0..n.
     pub fn permutation(&mut self, n: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..n).collect();
         for i in (1..n).rev() {
@@ -30,7 +30,7 @@ impl Random {
         order
     }
 
-    /// A proper rotation, rows as arrays.
+    /// Returns a random proper rotation.
     pub fn rotation(&mut self) -> nalgebra::Matrix3<f64> {
         let q = nalgebra::Quaternion::from(self.vector::<4>());
         nalgebra::UnitQuaternion::from_quaternion(q).to_rotation_matrix().into_inner()

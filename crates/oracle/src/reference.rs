@@ -1,6 +1,6 @@
 //! Independent oracle: the dense generalised eigenproblem, and mass properties summed from their definitions.
 //!
-//! Nothing of the library's eigen-solver or condensation is used, only its matrix type.
+//! Only the matrix type of the library is used, nothing of its eigen-solver or condensation.
 
 use super::mesh::{Assembly, entries};
 use faer::{Mat, MatRef, Par, Side};
@@ -11,7 +11,7 @@ use nalgebra::{Matrix3, Vector3};
 pub struct DenseModes {
     /// Number of zero-energy modes.
     pub zero: usize,
-    /// Flexible eigenvalues, ascending: all finite ones.
+    /// Finite flexible eigenvalues, ascending.
     pub eigenvalues: Vec<f64>,
     /// Number of infinite eigenvalues: the rank deficiency of M.
     pub infinite: usize,
@@ -19,13 +19,13 @@ pub struct DenseModes {
     pub shapes: Mat<f64>,
 }
 
-/// All modes of an assembly of solid elements.
+/// Computes all modes of an assembly of solid elements.
 pub fn dense_modes(assembly: &Assembly) -> DenseModes {
     modes_of(&dense(&assembly.stiffness), &dense(&assembly.mass()))
 }
 
-/// Solves K psi = lambda M psi in full, through theta = 1 / (lambda - sigma) with sigma near -lambda_7, so
-/// that low eigenvalues keep all their digits and a singular M needs no care.
+/// Solves K psi = lambda M psi in full, through theta = 1 / (lambda - sigma) with sigma near -lambda_7. Low eigenvalues
+/// keep all their digits, and a singular M needs no special treatment.
 pub fn modes_of(k: &Mat<f64>, m: &Mat<f64>) -> DenseModes {
     let n = k.nrows();
     let trace = |a: &Mat<f64>| (0..n).map(|i| a[(i, i)]).sum::<f64>();
@@ -48,7 +48,7 @@ pub fn modes_of(k: &Mat<f64>, m: &Mat<f64>) -> DenseModes {
     DenseModes { zero, eigenvalues, infinite, shapes }
 }
 
-/// Eigenvalues (ascending) of M x = theta (K - sigma M) x and vectors with x'(K - sigma M) x = 1.
+/// Returns the eigenvalues theta (ascending) of M x = theta (K - sigma M) x, and vectors with x'(K - sigma M) x = 1.
 fn shifted(k: MatRef<f64>, m: MatRef<f64>, sigma: f64) -> (Vec<f64>, Mat<f64>) {
     let shifted = k - faer::Scale(sigma) * m;
     let l = shifted.llt(Side::Lower).expect("K - sigma M is positive definite").L().to_owned();
@@ -65,8 +65,8 @@ fn shifted(k: MatRef<f64>, m: MatRef<f64>, sigma: f64) -> (Vec<f64>, Mat<f64>) {
     (theta, vectors)
 }
 
-/// Eigenvalues (ascending) and orthonormal eigenvectors of the symmetric part of `a`, by another library than
-/// the one under test uses.
+/// Returns the eigenvalues (ascending) and orthonormal eigenvectors of the symmetric part of `a`, by a library that the
+/// tested code does not use.
 pub fn symmetric_eigen(a: MatRef<f64>) -> (Vec<f64>, Mat<f64>) {
     let n = a.nrows();
     let eigen = nalgebra::DMatrix::from_fn(n, n, |i, j| 0.5 * (a[(i, j)] + a[(j, i)])).symmetric_eigen();
@@ -84,7 +84,7 @@ pub fn dense(matrix: &CscMatrix) -> Mat<f64> {
     full
 }
 
-/// Mass, centre of mass, and inertia tensor about the centre of mass, from M by their definitions.
+/// Returns mass, centre of mass, and inertia tensor about the centre of mass, from M by their definitions.
 pub fn rigid_data(nodes: &[[f64; 3]], scalar_mass: &CscMatrix) -> (f64, Vector3<f64>, Matrix3<f64>) {
     let mut mass = 0.0;
     let mut moment = Vector3::zeros();
@@ -102,9 +102,8 @@ pub fn rigid_data(nodes: &[[f64; 3]], scalar_mass: &CscMatrix) -> (f64, Vector3<
     (mass, com, inertia)
 }
 
-/// The 18 flexible eigenvalues, ascending, of a free unit cube of unit density that is one trilinear element
-/// with consistent mass: the products of coordinates that span its displacements are orthogonal in both K and
-/// M.
+/// Returns the 18 flexible eigenvalues, ascending, of a free unit cube of unit density that is one trilinear element
+/// with consistent mass. The products of coordinates that span its displacements are orthogonal in both K and M.
 pub fn unit_cube_eigenvalues(lambda: f64, mu: f64) -> Vec<f64> {
     let mut values = vec![12.0 * (3.0 * lambda + 2.0 * mu), 48.0 * mu];
     values.extend([12.0 * mu; 2]);

@@ -1,5 +1,4 @@
-//! Two small bodies: one of typed numbers, whose report is the same on every machine, and one condensed from
-//! a mesh.
+//! Two small bodies: one of literal numbers, whose report is the same on every machine, and one condensed from a mesh.
 
 #![allow(dead_code)]
 
@@ -20,12 +19,12 @@ use flexbody_model::{Coupling, Nodes};
 use flexbody_report::{Phase, RunData, SearchAttempt};
 use nalgebra::{Matrix3, Vector3};
 
-/// lambda of a frequency in hertz.
+/// Returns the eigenvalue lambda of a frequency in hertz.
 fn eigenvalue(hz: f64) -> f64 {
     (std::f64::consts::TAU * hz) * (std::f64::consts::TAU * hz)
 }
 
-/// Eight modes, two of them repeated; every number typed.
+/// Returns a body of literal numbers with eight modes, two of which are repeated.
 pub fn engine_mount() -> FlexBody {
     let hz = [812.5, 812.5, 1204.0, 1890.25, 2411.0, 3020.0, 3999.0, 4412.5];
     let nf = hz.len();
@@ -138,7 +137,7 @@ pub fn engine_mount() -> FlexBody {
     .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// A run of it.
+/// Returns the run data of [`engine_mount`].
 pub fn run_data() -> RunData {
     let phase = |name: &str, wall_seconds: f64, cpu_seconds: f64| Phase {
         name: name.to_owned(),
@@ -175,17 +174,17 @@ fn attempt(way: &str, failure: Option<&str>) -> SearchAttempt {
     SearchAttempt { way: way.to_owned(), bytes: 412_000_000, failure: failure.map(str::to_owned) }
 }
 
-/// A cuboid 3 x 2 x 1 of mass 6 with its corner at the origin: trilinear hexahedra, consistent mass.
+/// Returns a cuboid 3 x 2 x 1 of mass 6 with its corner at the origin: trilinear hexahedra, consistent mass.
 pub fn mesh(cells: [usize; 3]) -> (SymmetricMatrix, Vec<[f64; 3]>) {
     let cuboid = Cuboid { cells, low: [0.0; 3], size: [3.0, 2.0, 1.0], density: 1.0 };
     (cuboid.scalar_mass(), cuboid.positions())
 }
 
-/// Squares of the circular frequencies of [`block`]: two pairs are repeated, one to rounding.
+/// Squares of the circular frequencies of [`block`]: two pairs are repeated, one of them up to rounding.
 pub const EIGENVALUES: [f64; 6] = [100.0, 100.0 * (1.0 + 1e-13), 250.0, 400.0, 400.0, 900.0];
 
-/// Mass-normalised free-surface shapes on the cuboid: polynomials, M-orthonormal to rigid motion and each
-/// other.
+/// Returns mass-normalised free-surface shapes of the cuboid: polynomials, M-orthonormal to each other and M-orthogonal
+/// to rigid motion.
 pub fn shapes(mass: &SymmetricMatrix, positions: &[[f64; 3]]) -> Mat<f64> {
     let fields: [fn([f64; 3]) -> [f64; 3]; 12] = [
         |_| [1.0, 0.0, 0.0],
@@ -217,7 +216,7 @@ pub fn shapes(mass: &SymmetricMatrix, positions: &[[f64; 3]]) -> Mat<f64> {
     for field in fields {
         let centred = |x: &[f64; 3]| field([x[0] - 1.5, x[1] - 1.0, x[2] - 0.5]);
         let mut v: Vec<f64> = positions.iter().flat_map(centred).collect();
-        // Twice is enough.
+        // Two passes are enough.
         for _ in 0..2 {
             for b in &basis {
                 let along = dot(b, &times(&v));
@@ -230,7 +229,7 @@ pub fn shapes(mass: &SymmetricMatrix, positions: &[[f64; 3]]) -> Mat<f64> {
     Mat::from_fn(3 * n, 6, |i, j| basis[6 + j][i])
 }
 
-/// A body of any mesh, with any shapes in model axes, in any frame.
+/// Returns a body of any mesh, with any shapes in model axes, in any frame.
 pub fn condensed(
     mass: &SymmetricMatrix,
     ids: Vec<i64>,
@@ -294,7 +293,7 @@ pub fn condensed(
     .unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The cuboid of 3 x 3 x 2 elements in a frame.
+/// Returns the cuboid of 3 x 3 x 2 elements in a frame.
 pub fn block(frame: BodyFrame) -> FlexBody {
     let (mass, positions) = mesh([3, 3, 2]);
     let (frame, _) = choose_frame(&mass, &positions, frame).unwrap();

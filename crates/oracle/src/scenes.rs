@@ -1,5 +1,5 @@
-//! Random scenes for a body, unit-free: rates are relative to the first frequency of the body, times to its
-//! first period.
+//! Random scenes for a body without units: rates are relative to the first frequency of the body, times to its first
+//! period.
 
 use super::flexible::{body_of, fixture, soft_block};
 use super::plane::rectangle;
@@ -15,7 +15,7 @@ use proptest::test_runner::RngSeed;
 use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
-/// A free body for so long, from rest, with nothing that acts on it or is demanded.
+/// Returns the scene of a free body at rest, without loads or requirements, for this duration.
 pub fn nothing_happens(name: &str, duration: f64, tolerance: f64) -> Scene {
     Scene {
         name: name.to_owned(),
@@ -40,7 +40,7 @@ pub fn nothing_happens(name: &str, duration: f64, tolerance: f64) -> Scene {
     }
 }
 
-/// Solids, soft and stiff, and a plane body.
+/// Returns solid bodies, soft and stiff, and a plane body.
 pub fn bodies() -> &'static [FlexBody] {
     static BODIES: OnceLock<Vec<FlexBody>> = OnceLock::new();
     BODIES.get_or_init(|| {
@@ -53,7 +53,7 @@ pub fn bodies() -> &'static [FlexBody] {
     })
 }
 
-/// The same cases every time: a quarter of them, all with `FLEXBODY_SLOW=1`.
+/// Returns a configuration with fixed cases: a quarter of `cases`, or all with `FLEXBODY_SLOW=1`.
 pub fn seeded(cases: u32, seed: u64) -> ProptestConfig {
     let share = if std::env::var_os("FLEXBODY_SLOW").is_some() { 1 } else { 4 };
     ProptestConfig {
@@ -64,20 +64,20 @@ pub fn seeded(cases: u32, seed: u64) -> ProptestConfig {
     }
 }
 
-/// A function of time with values from -1 to 1.
+/// Function of time with values from -1 to 1.
 #[derive(Debug, Clone)]
 pub enum Shape {
     Constant(f64),
-    /// Straight lines: parts of the duration, short ones among them, and values.
+    /// Polyline: parts of the duration, some of them short, and values.
     Lines(Vec<(f64, f64)>),
-    /// Near the frequency of a mode, as a factor of it, and the phase.
+    /// Harmonic near the frequency of a mode: number of the mode, factor of its frequency, phase.
     Tone(usize, f64, f64),
-    /// From, to, when and how long, as parts of the duration.
+    /// Ramp: start value, end value, start time and duration, the times as parts of the duration of the scene.
     Ramp(f64, f64, f64, f64),
 }
 
 impl Shape {
-    /// The function of time, times `size`, over a duration, of a body with these circular frequencies.
+    /// Returns the function of time, times `size`, over a duration, for a body with the circular frequencies `rates`.
     pub fn history(&self, size: f64, duration: f64, rates: &[f64]) -> History {
         match self {
             Self::Constant(value) => History::Constant(size * value),
@@ -121,17 +121,17 @@ pub fn shape() -> impl Strategy<Value = Shape> {
     ]
 }
 
-/// A direction; axes of the body often.
+/// Generates directions, often along axes of the body.
 pub fn direction() -> impl Strategy<Value = [f64; 3]> {
     let any = proptest::array::uniform3(-1.0..1.0f64)
         .prop_filter("a direction", |v| v.iter().map(|x| x * x).sum::<f64>() > 1e-2);
     prop_oneof![Just([1.0, 0.0, 0.0]), Just([0.0, 1.0, 0.0]), Just([0.0, 0.0, 1.0]), any]
 }
 
-/// A force: the node as a part of all, direction, size, over time, and whether it is fixed in space.
+/// Force: node as a part of all nodes, direction, size, function of time, and true if the direction is fixed in space.
 type Push = (f64, [f64; 3], f64, Shape, bool);
 
-/// What a body does.
+/// Motion and loads of a body.
 #[derive(Debug, Clone)]
 pub struct Doing {
     pub axis: [f64; 3],
@@ -139,7 +139,7 @@ pub struct Doing {
     /// Largest rate, as a part of the first circular frequency.
     pub rate: f64,
     pub pushes: Vec<Push>,
-    /// Amplitudes and rates of modes.
+    /// Numbers of modes with their initial amplitudes and rates.
     pub start: Vec<(usize, f64, f64)>,
     pub damping: f64,
     pub periods: f64,
@@ -175,7 +175,8 @@ pub fn doing(longest: f64) -> impl Strategy<Value = Doing> {
 }
 
 impl Doing {
-    /// The scene of a body: with a given spin, or free with this angular velocity at the start.
+    /// Returns the scene of a body: with the spin prescribed, or, if `free`, with the spin as the initial angular
+    /// velocity.
     pub fn scene(&self, body: &FlexBody, free: bool) -> Scene {
         let rates: Vec<f64> = body.modes().eigenvalue.iter().map(|l| l.sqrt()).collect();
         let duration = self.periods * TAU / rates[0];
@@ -183,7 +184,7 @@ impl Doing {
         let (mass, size) = (body.invariants().mass(), body.invariants().inertia().trace().sqrt());
         let axis = if plane { Vector3::z() } else { Vector3::from(self.axis).normalize() };
         let node = |part: f64| Point::Node(body.nodes().ids[(part * body.n_nodes() as f64) as usize]);
-        // About a thousandth of the size of the body where it acts statically on the first mode.
+        // This force deforms the body statically in its first mode by about a thousandth of its size.
         let force = 1e-3 * size * mass.sqrt() * rates[0].powi(2);
         let load = |(at, along, part, over, fixed): &Push| {
             let along = Vector3::new(along[0], along[1], if plane { 0.0 } else { along[2] });
@@ -237,7 +238,7 @@ impl Doing {
             watched: self.watched.iter().map(|&part| node(part)).collect(),
             requirements: Requirements {
                 damping: (self.damping > 0.0).then_some(self.damping.into()),
-                // Bodies of some tests have it already.
+                // Bodies of some tests have damping already.
                 replaces_damping: true,
                 ..Default::default()
             },
@@ -249,7 +250,7 @@ impl Doing {
     }
 }
 
-/// The modes of a body whose bits are set, the first if none is.
+/// Returns the body with the modes whose bits are set; with the first mode if none is.
 pub fn some_modes(body: &FlexBody, bits: u8) -> FlexBody {
     let mut modes: Vec<usize> = (0..body.n_modes()).filter(|j| bits >> j & 1 != 0).collect();
     if modes.is_empty() {

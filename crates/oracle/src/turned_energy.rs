@@ -1,33 +1,33 @@
-//! The kinetic energy of nodes whose rotations carry mass, as docs/theory.md section 6 prints it: sums over blocks
-//! of M, and Lagrange's equations of it by differences. Dense, nothing shared with the library.
+//! The kinetic energy of nodes whose rotations carry mass, as docs/theory.md section 6 prints it: sums over blocks of
+//! M, and Lagrange's equations of this energy by differences. Dense, without code of the library.
 
 use super::general::{Row, RowKind};
 use faer::Mat;
 use nalgebra::{DVector, Matrix3, Rotation3, Vector3};
 use std::collections::HashMap;
 
-/// Moments in the blocks between the displacements of one node and both of another.
+/// Moments in the blocks of M between the displacements of one node and displacements and rotations of another.
 struct Block {
     nodes: [usize; 2],
-    /// M_tt = mean I + deviator.
+    /// Parts of M_tt = mean I + deviator.
     mean: f64,
     deviator: Matrix3<f64>,
-    /// M_tr = -moment~ + symmetric; of a plane body moment = (M_y, -M_x).
+    /// Parts of M_tr = -moment~ + symmetric; for a plane body moment = (M_y, -M_x).
     moment: Vector3<f64>,
     symmetric: Matrix3<f64>,
-    /// M_rr = tr(P) I - P'; of a plane body P = M_rr / 2 I.
+    /// Matrix P of M_rr = tr(P) I - P'; for a plane body P = M_rr / 2 I.
     second: Matrix3<f64>,
 }
 
-/// T of all velocities.
+/// Kinetic energy T as a function of displacements and velocities.
 pub struct TurnedEnergy {
-    /// About the origin of the frame.
+    /// Node positions relative to the origin of the frame.
     positions: Vec<Vector3<f64>>,
     /// Row of every displacement and of every rotation.
     rows: HashMap<Row, usize>,
     blocks: Vec<Block>,
     centre: Vector3<f64>,
-    /// c_R.
+    /// First moment c_R.
     first_moment: Vector3<f64>,
 }
 
@@ -49,7 +49,7 @@ impl Velocities {
     }
 }
 
-/// f' of central differences of sixth order.
+/// Returns f'(0) by central differences of sixth order.
 fn derivative<T>(step: f64, f: impl Fn(f64) -> T) -> T
 where
     T: std::ops::Sub<Output = T> + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
@@ -59,7 +59,8 @@ where
 }
 
 impl TurnedEnergy {
-    /// * `positions`: about the origin of the frame, the centre of mass at `centre`.
+    /// Creates the energy from the mass matrix, the kinds of its rows, node `positions` relative to the origin of the
+    /// frame, and the centre of mass `centre`.
     pub fn new(mass: &Mat<f64>, rows: &[Row], positions: &[[f64; 3]], centre: Vector3<f64>) -> Self {
         let index: HashMap<Row, usize> = rows.iter().enumerate().map(|(i, &row)| (row, i)).collect();
         let n = positions.len();
@@ -102,7 +103,7 @@ impl TurnedEnergy {
             });
             moved.sum::<Vector3<f64>>()
         };
-        // w x c of unit rotations.
+        // Products w x c for unit rotations w.
         let columns = [Vector3::x(), Vector3::y(), Vector3::z()].map(lever);
         energy.first_moment = if plane {
             Vector3::new(columns[2].y, -columns[2].x, 0.0)
@@ -116,7 +117,7 @@ impl TurnedEnergy {
         Vector3::from_fn(|axis, _| self.rows.get(&Row { kind, node, axis }).map_or(0.0, |&row| x[row]))
     }
 
-    /// C1_R x.
+    /// Returns C1_R x.
     fn rest_momentum(&self, x: &DVector<f64>) -> Vector3<f64> {
         let of_block = |block: &Block| {
             let [_, q] = block.nodes;
@@ -126,10 +127,11 @@ impl TurnedEnergy {
         self.blocks.iter().map(of_block).sum()
     }
 
-    /// T at the displacements u.
+    /// Returns T at the displacements u.
     pub fn kinetic(&self, u: &DVector<f64>, v: &Velocities) -> f64 {
         let n = self.positions.len();
         let (w, skew) = (v.omega, v.omega.cross_matrix());
+        // Rates of the directors: omega x e_a and their rate relative to the frame.
         let directors: Vec<Matrix3<f64>> = (0..n)
             .map(|i| {
                 let (theta, rate) =
@@ -140,12 +142,14 @@ impl TurnedEnergy {
                 skew * turn(0.0) + own
             })
             .collect();
+        // Velocities of the nodes relative to the centre of mass.
         let relative: Vec<Vector3<f64>> = (0..n)
             .map(|i| {
                 let place = self.positions[i] - self.centre + self.vector(u, RowKind::Displacement, i);
                 w.cross(&place) + self.vector(&v.ud, RowKind::Displacement, i)
             })
             .collect();
+        // Velocity of the centre of mass of the undeformed body.
         let flight = v.linear + w.cross(&self.centre);
         let of_block = |block: &Block| {
             let [p, q] = block.nodes;
@@ -161,12 +165,13 @@ impl TurnedEnergy {
         self.blocks.iter().map(of_block).sum::<f64>() + flight.dot(&rest)
     }
 
-    /// dT along a change of the velocities, `size` of which is about as large as they are: T is quadratic in them.
+    /// Returns the derivative of T along a change of the velocities. `size` makes the change as large as the
+    /// velocities: T is quadratic in them, so that the difference is exact.
     fn momentum(&self, u: &DVector<f64>, v: &Velocities, change: &Velocities, size: f64) -> f64 {
         0.5 * (self.kinetic(u, &v.plus(size, change)) - self.kinetic(u, &v.plus(-size, change))) / size
     }
 
-    /// dT/dV and dT/domega.
+    /// Returns dT/dV and dT/domega.
     pub fn momenta(&self, u: &DVector<f64>, v: &Velocities) -> (Vector3<f64>, Vector3<f64>) {
         let zero = || DVector::zeros(u.len());
         let along = |linear: Vector3<f64>, omega: Vector3<f64>, size: f64| {
@@ -179,8 +184,8 @@ impl TurnedEnergy {
         )
     }
 
-    /// p' + omega x p, h' + omega x h + V x p and d/dt dT/du' - dT/du along `shapes` (N x k), where the velocities
-    /// change with `rates`.
+    /// Returns p' + omega x p, h' + omega x h + V x p, and d/dt dT/du' - dT/du along `shapes` (N x k), where `rates`
+    /// are the rates of the velocities.
     pub fn inertia_forces(
         &self,
         u: &DVector<f64>,

@@ -1,4 +1,4 @@
-//! Models whose nodes turn and carry mass: a rigid region of a solid, a disc on a shaft, a mass on a rigid arm.
+//! Models with rotating nodes that carry mass: a rigid region of a solid, a disc on a shaft, a mass on a rigid arm.
 
 use super::elements::{ElementKind, MassRule, Material};
 use super::mesh::{Mesh, grid};
@@ -7,13 +7,13 @@ use flexbody_linalg::CscMatrix;
 use flexbody_model::{DofLabel, Nodes, RawModel};
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
-/// A sparse matrix as a dense one.
+/// Returns a sparse matrix as a dense one.
 pub fn dense(a: &CscMatrix) -> DMatrix<f64> {
     let a = reference::dense(a);
     DMatrix::from_fn(a.nrows(), a.ncols(), |i, j| a[(i, j)])
 }
 
-/// A dense matrix without its zeros.
+/// Returns a dense matrix as a sparse one without zeros.
 pub fn sparse(a: &DMatrix<f64>) -> CscMatrix {
     let mut entries = Vec::new();
     for (j, column) in a.column_iter().enumerate() {
@@ -24,20 +24,20 @@ pub fn sparse(a: &DMatrix<f64>) -> CscMatrix {
     CscMatrix::from_triplets(a.nrows(), a.ncols(), &entries)
 }
 
-/// A skewed block of solid elements whose end at x = 0 is rigid: its nodes follow a reference point beside them.
+/// Skewed block of solid elements whose end at x = 0 is rigid: its nodes follow a reference point beside them.
 pub struct Block {
-    /// All nodes, those of the rigid region last.
+    /// Positions of all nodes; the nodes of the rigid region are the last ones.
     pub positions: Vec<[f64; 3]>,
-    /// Nodal masses between all nodes, Ms.
+    /// Scalar mass matrix Ms between all nodes.
     pub mass: DMatrix<f64>,
     /// Nodes of the rigid region.
     pub rigid: Vec<usize>,
-    /// The point that they follow, the last node of the model.
+    /// Point that the rigid region follows: the last node of the model.
     pub reference: [f64; 3],
     pub raw: RawModel,
 }
 
-/// Such a block of elements of this kind.
+/// Returns a skewed block with a rigid end, of elements of this kind.
 pub fn block(kind: ElementKind) -> Block {
     let mesh = Mesh::from_cells(kind, &grid([3, 2, 2]), |[x, y, z]| {
         [0.3 * x + 0.04 * y, 0.2 * y * (1.0 - 0.1 * x), 0.15 * z * (1.0 + 0.12 * y) + 0.02 * x]
@@ -53,7 +53,7 @@ pub fn block(kind: ElementKind) -> Block {
     let free: Vec<usize> = (0..n).filter(|i| !rigid.contains(i)).collect();
     let reference = [-0.1, 0.25, 0.05];
 
-    // u = T (u of the free nodes, t, theta): u_i = t + theta x r_i in the rigid region.
+    // u = T (u of the free nodes, t, theta), with u_i = t + theta x r_i in the rigid region.
     let columns = 3 * free.len() + 6;
     let mut t = DMatrix::zeros(3 * n, columns);
     for (at, &i) in free.iter().enumerate() {
@@ -81,7 +81,7 @@ pub fn block(kind: ElementKind) -> Block {
         ids[..ids.len() - 1].iter().flat_map(|&id| own(id, 1..=3)).chain(own(last, 1..=6)).collect();
     let nodes = Nodes { ids, positions: places };
     let raw = RawModel { dofs: Some(dofs), ..RawModel::in_memory("block with a rigid end", k, m, nodes) };
-    // Free nodes first, as the model has them.
+    // Free nodes come first, as in the model.
     let order: Vec<usize> = free.iter().chain(&rigid).copied().collect();
     let positions = order.iter().map(|&i| positions[i]).collect();
     let mass = DMatrix::from_fn(n, n, |i, j| mass[(order[i], order[j])]);
@@ -89,13 +89,13 @@ pub fn block(kind: ElementKind) -> Block {
     Block { positions, mass, rigid, reference, raw }
 }
 
-/// A node of the end x = 0 of the lattice, where the map gives x = 0.04 y / 0.2 at the most.
+/// Returns true for a node of the lattice at x = 0, where the map gives x = 0.04 y / 0.2 at most.
 fn at_start(x: &[f64; 3]) -> bool {
     x[0] <= 0.2 * x[1] + 1e-9
 }
 
-/// A straight shaft of beams along x with a disc in its middle, whose moment about the shaft is `ratio` times that
-/// about a diameter.
+/// Returns a straight shaft of beams along x with a disc in its middle, whose moment of inertia about the shaft is
+/// `ratio` times that about a diameter.
 pub fn disc_on_shaft(ratio: f64) -> RawModel {
     const COUNT: usize = 5;
     let (length, section) = (0.25, Vector3::new(1e6, 2e3, 1e2));
@@ -112,7 +112,7 @@ pub fn disc_on_shaft(ratio: f64) -> RawModel {
             add(rows(a, 0), rows(b, 0), sign * extension / l, &mut k);
             add(rows(a, 3), rows(b, 3), sign * twist / l, &mut k);
         }
-        // Deflection along y with rotation about z, along z with rotation about -y.
+        // Deflection along y with rotation about z, and along z with rotation about -y.
         for (deflection, rotation, turn) in [(1, 5, 1.0), (2, 4, -1.0)] {
             let places = [rows(0, deflection), rows(0, rotation), rows(1, deflection), rows(1, rotation)];
             let signs = [1.0, turn, 1.0, turn];
@@ -143,7 +143,7 @@ pub fn disc_on_shaft(ratio: f64) -> RawModel {
     RawModel { dofs: Some(dofs), ..RawModel::in_memory("disc on a shaft", sparse(&k), sparse(&m), nodes) }
 }
 
-/// Hangs a mass on a node by a rigid arm: T = m |v + w x r|^2 / 2, M_tr = -m r~, M_rr = -m r~ r~.
+/// Attaches a mass to a node by a rigid arm: T = m |v + w x r|^2 / 2, M_tr = -m r~, M_rr = -m r~ r~.
 pub fn hang(m: &mut DMatrix<f64>, node: usize, mass: f64, arm: &Vector3<f64>) {
     let skew: Matrix3<f64> = arm.cross_matrix();
     let first = 6 * node;

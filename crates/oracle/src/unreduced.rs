@@ -14,24 +14,24 @@ use flexbody_model::{DofLabel, FeModel, RawModel};
 use flexbody_motion::dynamics::{EulerParameters, NodalConfiguration};
 use nalgebra::{DVector, Matrix3, UnitQuaternion, Vector3};
 
-/// A checked model and all its flexible modes, by the dense oracle.
+/// Checked model and all its flexible modes, by the dense oracle.
 pub struct Unreduced {
     pub model: FeModel,
-    /// About the centre of mass, axes of the model.
+    /// Frame at the centre of mass, along the axes of the model.
     pub frame: Frame,
     pub positions: Vec<[f64; 3]>,
     pub rows: Vec<Row>,
     pub stiffness: Mat<f64>,
     pub mass: Mat<f64>,
     pub eigenvalues: Vec<f64>,
-    /// N x (N - 6 - null vectors of M), rows of the model.
+    /// Modes (N x (N - 6 - null vectors of M)) in the rows of the model.
     pub shapes: Mat<f64>,
     /// Root of the mean moment of inertia.
     pub size: f64,
     pub total_mass: f64,
 }
 
-/// A matrix in full, from a block structure A kron I.
+/// Returns the dense matrix A kron I of a block structure.
 fn full(a: &SymmetricMatrix, block: usize) -> Mat<f64> {
     let mut dense = Mat::zeros(a.n() * block, a.n() * block);
     for i in 0..a.n() {
@@ -63,6 +63,7 @@ impl Unreduced {
         let rigid = model.rigid_fields([0.0; 3], 1.0);
         let block = rigid.transpose() * &mass * &rigid;
         let (total_mass, z) = (block[(0, 0)], rigid.ncols() - 1);
+        // The first moment is in the coupling of translation and rotation of R' M R.
         let com = match rigid.ncols() {
             3 => Vector3::new(block[(1, z)], -block[(0, z)], 0.0) / total_mass,
             _ => Vector3::new(block[(1, 5)], -block[(0, 5)], block[(0, 4)]) / total_mass,
@@ -84,17 +85,18 @@ impl Unreduced {
         }
     }
 
-    /// A model of `fixtures/models`.
+    /// Reads a model of `fixtures/models`.
     pub fn fixture(name: &str) -> Self {
         Self::new(raw_fixture(name))
     }
 
-    /// The oracle with `shapes` (N x nf).
+    /// Returns the oracle with `shapes` (N x nf).
     pub fn oracle(&self, shapes: &Mat<f64>) -> NodalBody {
         NodalBody::new(&self.stiffness, &self.mass, &self.rows, &self.positions, shapes)
     }
 
-    /// A state of all modes: spin, flight and modes of one time scale, so that no force hides the others.
+    /// Returns a state of all modes with spin, translation and modal rates on one time scale, so that no force hides
+    /// the others.
     pub fn lively_state(&self, seed: u64, deformation: f64) -> State {
         let mut random = Random(seed);
         let (lambda, nf) = (&self.eigenvalues, self.eigenvalues.len());
@@ -116,7 +118,7 @@ impl Unreduced {
     }
 }
 
-/// A state of the oracle with its displacements, u = `shapes` q.
+/// Returns a state of the oracle with its displacements, u = `shapes` q.
 pub fn configuration(shapes: &Mat<f64>, state: &State) -> NodalConfiguration {
     let turn = UnitQuaternion::from_matrix(&state.axes);
     let lifted = |q: &DVector<f64>| times(shapes, q).as_slice().to_vec();
@@ -130,7 +132,7 @@ pub fn configuration(shapes: &Mat<f64>, state: &State) -> NodalConfiguration {
     }
 }
 
-/// Degrees of freedom that hold a body: three of one node, two of another and one of a third, all far apart.
+/// Returns degrees of freedom that hold a body: three of one node, two of another and one of a third, all far apart.
 pub fn holding(model: &FeModel) -> Vec<DofLabel> {
     let x: Vec<Vector3<f64>> = model.nodes().positions.iter().map(|x| Vector3::from(*x)).collect();
     let farthest =
@@ -161,12 +163,12 @@ pub fn holding(model: &FeModel) -> Vec<DofLabel> {
     ]
 }
 
-/// A matrix times a vector.
+/// Returns a matrix times a vector.
 pub fn times(a: &Mat<f64>, x: &DVector<f64>) -> DVector<f64> {
     DVector::from_fn(a.nrows(), |i, _| (0..a.ncols()).map(|j| a[(i, j)] * x[j]).sum())
 }
 
-/// A rubber block without any symmetry.
+/// Returns a rubber block without symmetry.
 pub fn soft_block(kind: ElementKind, cells: [i32; 3]) -> RawModel {
     let rubber = Material { youngs: 4.0, poisson: 0.3, density: 1.0 };
     let mesh = Mesh::from_cells(kind, &grid(cells), |[x, y, z]| {
@@ -175,7 +177,7 @@ pub fn soft_block(kind: ElementKind, cells: [i32; 3]) -> RawModel {
     mesh.assemble(&rubber, MassRule::Consistent).raw_model()
 }
 
-/// A plane body of bilinear elements.
+/// Returns a plane body of bilinear elements.
 pub fn soft_plate() -> RawModel {
     rectangle(4, 2, 0.7, [1.0, 2.0])
 }

@@ -1,4 +1,4 @@
-//! What was proved about a body: the rows of `/certificate`.
+//! The rows of `/certificate`: proofs about a body.
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
@@ -14,12 +14,13 @@ pub(super) static CERTIFIED: Together =
 pub(super) static CRAIG_BAMPTON: Together =
     Together { problem: |entries| missing(entries, "a Craig-Bampton body") };
 
+/// Returns the message about the first missing entry.
 fn missing(entries: &[(String, bool)], of: &str) -> String {
     let first = entries.iter().find(|(_, there)| !there).map_or("", |(name, _)| name);
     format!("{first}: expected with the other entries of {of}, found nothing")
 }
 
-/// Both directions of an optional entry of a Craig-Bampton body, ignored in files of other bodies.
+/// Makes both directions of an optional entry of a Craig-Bampton body, which is ignored in files of other bodies.
 macro_rules! beside_fixed_interface {
     ($field:ident) => {
         both(
@@ -170,7 +171,7 @@ pub(super) const CERTIFICATE: &[Item] = &[
     .added(4),
 ];
 
-/// One attribute per invariant, in the order of [`flexbody_body::invariants::DIGITS`].
+/// Makes one attribute per invariant, in the order of [`flexbody_body::invariants::DIGITS`].
 macro_rules! digits {
     ($($index:literal $name:literal,)*) => {
         &[$(attribute(

@@ -1,4 +1,4 @@
-//! Entries of interfaces.
+//! The rows of interfaces and of interface coordinates.
 
 use super::super::item::Extent::{Coordinates, Fixed, InterfaceNodes, Modes};
 use super::super::item::Item;
@@ -109,7 +109,7 @@ static COORDINATES_TOGETHER: Together = Together {
     },
 };
 
-/// Of a Craig-Bampton basis.
+/// Entries of the coordinates of a Craig-Bampton basis.
 pub(super) const COORDINATES: &[Item] = &[
     attribute(
         "names",

@@ -1,5 +1,5 @@
-//! Invariants of a mass, exact or lumped, and what stands beside them: the rows of `/invariants`, `/lumped/<scheme>` and
-//! `/comparison/<scheme>`.
+//! The rows of `/invariants`, `/lumped/<scheme>` and `/comparison/<scheme>`: invariants of a mass, exact or lumped, and
+//! their comparison.
 
 use super::super::item::Extent::{Fixed, Modes, ThreeModes};
 use super::super::item::Item;
@@ -12,7 +12,7 @@ use super::{
 };
 use flexbody_body::flex_body::TermGroup;
 
-/// Both directions of an entry of the invariants of the group.
+/// Makes both directions of an entry of the invariants of the group.
 macro_rules! invariant {
     ($field:ident, $get:expr) => {
         both($get, put!(|d, read| d.invariants().$field = Stored::take(read)?))
@@ -72,7 +72,7 @@ pub(super) const INVARIANTS: &[Item] = &[
         .derived("S"),
 ];
 
-/// Damping has nothing to do with the mass: lumped masses have none of their own.
+/// Damping does not depend on the mass: lumped bodies have no damping entries.
 pub(super) const DAMPING: &[Item] = &[dataset(
     "modal_damping",
     Floats(&[Modes, Modes]),

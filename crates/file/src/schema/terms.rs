@@ -1,4 +1,4 @@
-//! What was decided about the groups of the kinetic energy: the rows of `/terms`.
+//! The rows of `/terms`: decisions about the groups of the kinetic energy.
 
 use super::super::item::Item;
 use super::super::item::ItemKind::{Float, Int, Text};
@@ -7,9 +7,9 @@ use super::super::value::{Stored, Value, View, text};
 use super::{ONE, attribute};
 use flexbody_body::flex_body::{TermDecision, TermGroup};
 
-/// Texts of a group that is held, and of one that is not.
+/// Text of a group that the body holds.
 pub(in super::super) const KEPT: &str = "kept";
-/// See [`KEPT`].
+/// Text of a group that the body does not hold.
 pub(in super::super) const DROPPED: &str = "dropped";
 
 fn decision<'a>(view: &View<'a>, group: TermGroup) -> Option<&'a TermDecision> {
@@ -24,7 +24,7 @@ fn number(value: f64) -> Option<Value> {
     value.is_finite().then_some(Value::Float(value))
 }
 
-/// Entries of the decision about each group: its reason and its tier, beside them bounds and limits.
+/// Sets of entries of the decision about each group: reason and tier are required, bounds and limits optional.
 static DECISIONS: [Together; 3] = [const { Together { problem: reason_and_tier } }; 3];
 
 fn reason_and_tier(entries: &[(String, bool)]) -> String {
@@ -32,7 +32,7 @@ fn reason_and_tier(entries: &[(String, bool)]) -> String {
     format!("{first}: expected with {} and {}, one of which is missing", entries[0].0, entries[1].0)
 }
 
-/// The rows of every group.
+/// Makes the rows of every group.
 macro_rules! of_groups {
     ($($index:literal $group:ident $name:literal,)*) => {
         &[

@@ -1,4 +1,4 @@
-//! Continuations that do not stand below their card: their names tell which card they go on with.
+//! Continuations that do not follow their card. Their names identify the card that they continue.
 
 use super::{Card, Line, bare, card_fields, without_comment};
 use crate::coordinates::excerpt;
@@ -8,25 +8,25 @@ use flexbody_base::text::InputFile;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// A line of a continuation.
+/// Line of a continuation.
 struct OwnLine {
     text: Vec<u8>,
     number: usize,
 }
 
-/// Continuations of one file that stand apart from their cards, and these cards while the file is read.
+/// Continuations of one file that do not follow their cards, with these cards, while the file is read.
 #[derive(Default)]
 pub(super) struct Apart {
     /// Names of these continuations, in upper case.
     names: HashSet<Vec<u8>>,
     lines: HashMap<Vec<u8>, Vec<OwnLine>>,
-    /// The continuation that was read last, and the name that a line has to have that goes on with it.
+    /// Last continuation that was read, and the name that a line must have to continue it.
     last: Option<(Vec<u8>, Vec<u8>)>,
     cards: Vec<(Card, PathBuf)>,
 }
 
 impl Apart {
-    /// Finds the names of continuations of a file that stand apart from the line that ends with their name.
+    /// Finds the names of continuations of a file that do not follow the line with their name.
     pub(super) fn of(file: &InputFile) -> Self {
         let mut names = HashSet::new();
         let mut before: &[u8] = b"";
@@ -39,7 +39,7 @@ impl Apart {
             }
             before = line;
         });
-        // Those that no line ends with go on with what stands above them.
+        // Continuations whose name no line announces belong to the card above them.
         if !names.is_empty() {
             let mut ends = HashSet::new();
             each_line(file, |line| {
@@ -58,8 +58,8 @@ impl Apart {
         !self.names.is_empty() && self.names.contains(name)
     }
 
-    /// Keeps a line of a continuation (with its name, in upper case) if it stands apart or goes on with one that
-    /// does.
+    /// Stores a line of a continuation (with its name, in upper case) if it does not follow its card, or continues one
+    /// that does not. Returns true when it stored the line.
     pub(super) fn keep(&mut self, name: &[u8], line: &[u8], number: usize) -> bool {
         let first = match &self.last {
             Some((first, next)) if name.is_empty() || name == next.as_slice() => first.clone(),
@@ -71,17 +71,17 @@ impl Apart {
         true
     }
 
-    /// Another card begins.
+    /// Ends the current continuation: another card begins.
     pub(super) fn close(&mut self) {
         self.last = None;
     }
 
-    /// Keeps a card whose continuation stands apart.
+    /// Stores a card whose continuation does not follow it.
     pub(super) fn wait(&mut self, card: Card, path: PathBuf) {
         self.cards.push((card, path));
     }
 
-    /// The cards with their continuations, at the end of the file.
+    /// Returns the cards with their continuations, at the end of the file.
     ///
     /// # Errors
     /// FB110 for lines that are no continuation, and for continuations without a card.
@@ -106,7 +106,7 @@ impl Apart {
     }
 }
 
-/// Gives the lines that are not empty, without comments.
+/// Passes the lines that are not empty, without comments, to `take`.
 fn each_line<'f>(file: &'f InputFile, mut take: impl FnMut(&'f [u8])) {
     for line in Lines::of(file.bytes()) {
         let line = without_comment(line.text);
@@ -116,12 +116,12 @@ fn each_line<'f>(file: &'f InputFile, mut take: impl FnMut(&'f [u8])) {
     }
 }
 
-/// True if a line is a continuation that may have a name: those of punch files have none.
+/// Returns true when a line is a continuation that may have a name. Continuations in punch files have none.
 fn is_named(line: &[u8]) -> bool {
     matches!(line[0], b'+' | b'*') && line.get(1).is_some_and(|b| !b.is_ascii_whitespace())
 }
 
-/// The name that the continuation of a line has to have, in upper case; empty where it gives none.
+/// Returns the name that the continuation of a line must have, in upper case; empty if the line gives none.
 fn end_of(line: &[u8]) -> Vec<u8> {
     let line = Line::of(line);
     let end = match line.is_free {

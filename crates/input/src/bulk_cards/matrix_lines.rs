@@ -1,32 +1,32 @@
-//! DMIG cards that stand one below the other in a deck, cut into parts that can be read by themselves.
+//! Consecutive DMIG cards of a deck, cut into parts that can be read independently.
 
 use super::{Line, is_begin, is_include, without_comment};
 use flexbody_base::text::InputFile;
 use std::ops::Range;
 
-/// Bytes of cards that one thread reads before it takes others.
+/// Bytes of cards that one thread reads at a time.
 const PART: usize = 1 << 20;
 
-/// The lines of these cards.
+/// Lines of consecutive DMIG cards.
 pub(crate) struct MatrixLines<'a> {
     pub file: &'a InputFile,
-    /// In the order of the file.
+    /// Parts in the order of the file.
     pub parts: Vec<Part>,
-    /// The line that the last card ends in, from 1.
+    /// Last line of the last card, from 1.
     last_line: usize,
 }
 
-/// Some whole cards: the header of a matrix, or columns.
+/// Part of whole cards: the headers of matrices, or columns.
 pub(crate) struct Part {
     pub bytes: Range<usize>,
-    /// Number of lines above them.
+    /// Number of lines above the part.
     pub above: usize,
     pub is_header: bool,
 }
 
 impl<'a> MatrixLines<'a> {
-    /// Those from a byte of the file on that begins a line with so many lines `above`; `None` where that line
-    /// begins another card.
+    /// Finds the cards from the byte `start` of the file on, where a line begins with `above` lines above it. Returns
+    /// `None` if that line begins another card.
     pub(super) fn at(file: &'a InputFile, start: usize, above: usize) -> Option<Self> {
         let bytes = file.bytes();
         let (mut parts, mut last_line): (Vec<Part>, usize) = (Vec::new(), above);
@@ -54,25 +54,25 @@ impl<'a> MatrixLines<'a> {
         (!parts.is_empty()).then_some(Self { file, parts, last_line })
     }
 
-    /// The byte after the last card, and the number of lines up to there.
+    /// Returns the byte after the last card, and the number of lines up to there.
     pub(super) fn end(&self) -> (usize, usize) {
         (self.parts.last().map_or(0, |part| part.bytes.end), self.last_line)
     }
 
-    /// Whether the last card ends the file without a line end.
+    /// Returns true when the last card ends the file without a line end.
     pub(super) fn are_cut_off(&self) -> bool {
         let (end, _) = self.end();
         end == self.file.bytes().len() && !self.file.bytes().ends_with(b"\n")
     }
 }
 
-/// Whether a line begins a DMIG card.
+/// Returns true when a line begins a DMIG card.
 fn begins_matrix(line: &[u8]) -> bool {
     line.get(..4).is_some_and(|name| name.eq_ignore_ascii_case(b"DMIG"))
         && matches!(Line::of(without_comment(line)).head()[4..], [] | [b'*'])
 }
 
-/// Whether the card of a matrix is its header: the second field is 0.
+/// Returns true when a card of a matrix is its header: the second field is 0.
 fn is_header(line: &[u8]) -> bool {
     let line = Line::of(without_comment(line));
     let field = match line.is_free {
@@ -85,7 +85,7 @@ fn is_header(line: &[u8]) -> bool {
     field.is_some_and(|field| field.trim_ascii() == b"0")
 }
 
-/// Whether a line continues a card or says nothing.
+/// Returns true when a line continues a card, is empty or is a comment.
 fn goes_on(line: &[u8]) -> bool {
     if matches!(line.first(), Some(b'*' | b'+' | b'$')) {
         return true;

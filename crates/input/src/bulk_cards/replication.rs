@@ -1,20 +1,20 @@
-//! Replication: `=` stands for the field of the card above, `*(x)` for that field and x more, `==` for all fields
-//! from there on; `=(n)` repeats the line above it n times.
+//! Replication: `=` copies the field of the card above, `*(x)` adds x to that field, `==` copies all fields from there
+//! on, and `=(n)` repeats the line above it n times.
 
 use super::{Card, Line, fixed_fields, free_fields, whole};
 use crate::coordinates::real;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// Cards that one line may stand for.
+/// Largest number of cards that one line may represent.
 const MOST_REPEATED: i64 = 1_000_000;
 
 /// Change of a field from card to card.
 #[derive(Clone)]
 enum Change {
     Same,
-    /// Adds a number.
+    /// Adds a number to the field.
     More(Vec<u8>),
-    /// Has this text.
+    /// Replaces the field by this text.
     Text(Vec<u8>),
 }
 
@@ -26,17 +26,17 @@ pub(super) struct Replication {
 
 /// Request of a line that begins with `=`.
 pub(super) enum Asked {
-    /// A card.
+    /// One card.
     One(Replication),
-    /// Cards to make, each by the replication before.
+    /// Number of cards, each made by the preceding replication.
     Repeat(i64),
 }
 
 impl Replication {
-    /// Reads a line; `None` of one that does not begin with `=`.
+    /// Reads a line of replication. Returns `None` if it does not begin with `=`.
     ///
     /// # Errors
-    /// FB110 for counts that are none, and fields beyond the line.
+    /// FB110 for invalid counts, and fields beyond the line.
     pub(super) fn asked(line: &Line<'_>) -> Result<Option<Asked>, Diagnostic> {
         let Some(rest) = line.head().strip_prefix(b"=") else { return Ok(None) };
         if !rest.is_empty() && rest != b"=" {
@@ -64,10 +64,10 @@ impl Replication {
         Ok(Some(Asked::One(Self { changes })))
     }
 
-    /// The card that follows `card`.
+    /// Returns the card that follows `card`.
     ///
     /// # Errors
-    /// FB110 if there is no card of one line to follow, or a field is no number to add to.
+    /// FB110 if there is no card of one line above, or a field is no number.
     pub(super) fn next(&self, card: &Card) -> Result<Card, Diagnostic> {
         if card.name.is_empty() || self.changes.is_empty() {
             return Err(bad("there is no card above to replicate"));
@@ -92,7 +92,7 @@ impl Replication {
     }
 }
 
-/// Two numbers added, as a field has them.
+/// Returns the sum of two numbers as the text of a field.
 fn sum(field: &[u8], more: &[u8]) -> Option<Vec<u8>> {
     let field: &[u8] = if field.is_empty() { b"0" } else { field };
     if let (Some(a), Some(b)) = (whole(field), whole(more)) {

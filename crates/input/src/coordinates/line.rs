@@ -1,29 +1,29 @@
-//! Data lines: a fast path that accepts what nearly all files hold, and a slow one that knows every dialect
-//! and says what is wrong.
+//! Data lines: a fast path for the form of nearly all files, and a slow path that reads every dialect and describes
+//! errors.
 
 use super::{COUNTED, Entry, excerpt, most_entries, written_digits};
 use crate::scanner::{expected, words};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// What the header says about every line.
+/// Limits from the header that apply to every line.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Limits {
     pub n: u32,
     pub integer: bool,
 }
 
-/// A parsed piece of the file.
+/// Parsed piece of a file.
 #[derive(Debug, Default)]
 pub(super) struct EntryLines {
     pub entries: Vec<Entry>,
     pub lines: usize,
-    /// The first few bad lines, each with its number from 1, and how many there are.
+    /// First bad lines, each with its number from 1; `bad_count` counts all of them.
     pub bad: Vec<(usize, Diagnostic)>,
     pub bad_count: usize,
-    /// First line (from 1) with a nonzero entry below, above the diagonal.
+    /// First lines (from 1) with a nonzero entry below and above the diagonal.
     pub lower: Option<usize>,
     pub upper: Option<usize>,
-    /// Largest number of significant digits of a value as written, of the first entries of the piece.
+    /// Largest number of written significant digits among the first entries of the piece.
     pub written: u8,
 }
 
@@ -70,8 +70,8 @@ impl EntryLines {
     }
 }
 
-/// `row col value` with single-line blanks, plain exponents and a line end; else `None`. Also gives the
-/// number as written and where the next line begins.
+/// Parses `row col value` with blanks, plain exponents and a line end; returns `None` for other forms. Returns also the
+/// number as written and the start of the next line.
 fn fast(text: &[u8], at: usize, limits: Limits) -> Option<(Entry, &[u8], usize)> {
     let (row, at) = fast_index(text, at, limits.n)?;
     let (col, at) = fast_index(text, at, limits.n)?;
@@ -86,7 +86,7 @@ fn fast(text: &[u8], at: usize, limits: Limits) -> Option<(Entry, &[u8], usize)>
     Some((Entry { row, col, value }, &text[at..at + length], end + 1))
 }
 
-/// An index from 1 to n with blanks after it, given from 0.
+/// Parses an index from 1 to n with blanks after it. Returns it from 0.
 fn fast_index(text: &[u8], start: usize, n: u32) -> Option<(u32, usize)> {
     let (mut index, mut at) = (0u64, start);
     while let Some(digit @ b'0'..=b'9') = text.get(at) {
@@ -107,7 +107,7 @@ fn skip_blanks(text: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// A line with content, trimmed.
+/// Parses a trimmed line with content in any dialect.
 fn slow(line: &[u8], limits: Limits) -> Result<(Entry, &[u8]), Diagnostic> {
     let content = line.split(|&b| b == b'%').next().unwrap_or(line); // a comment may follow the value
     let fields: Vec<&[u8]> = words(content).take(5).collect();
@@ -147,10 +147,9 @@ fn index(field: &[u8], which: &str, n: u32) -> Result<u32, Diagnostic> {
     }
 }
 
-/// A number in the dialects of Fortran too: `1.0D+05`, `1.0Q5`, and `1.0-105` as three-digit exponents come
-/// out.
+/// Parses a number, including the dialects of Fortran: `1.0D+05`, `1.0Q5`, and `1.0-105` of three-digit exponents.
 pub(crate) fn real(field: &[u8]) -> Option<f64> {
-    // Nothing but the digits of the exponent stands behind its letter.
+    // Only the digits of the exponent follow its letter.
     let letter = field.iter().rposition(|b| !matches!(b, b'0'..=b'9' | b'+' | b'-'));
     let letter = letter.filter(|&at| matches!(field[at], b'd' | b'D' | b'q' | b'Q'));
     if letter.is_none()

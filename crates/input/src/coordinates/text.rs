@@ -1,33 +1,33 @@
-//! Text in blocks that end at line ends, so that no more of a file than two blocks need be in memory.
+//! Text in blocks that end at line ends, so that at most two blocks of a file are in memory.
 
 use super::{Compression, Read};
 use flexbody_base::text::InputFile;
 
-/// Bytes per block. Larger blocks would be fresh pages each time.
+/// Bytes per block. Larger blocks would be newly mapped pages each time.
 const BLOCK: usize = 8 << 20;
 
-/// Bytes that the first block has at the begin: it grows with what there is, for most files are small.
+/// Bytes of the first block at the start. It grows with the text, because most files are small.
 const FIRST_BLOCK: usize = 1 << 16;
 
 /// Factor by which the first block grows. The allocator keeps the smaller blocks: doubling would leave as much as the
-/// largest once more.
+/// largest block again.
 const GROWTH: usize = 16;
 
 /// Bytes per piece that one thread parses.
 const PIECE: usize = 1 << 20;
 
-/// Gives a text block by block.
+/// Source of a text, block by block.
 pub(crate) struct Blocks<'a> {
     stream: Box<dyn Read + Send + 'a>,
-    /// Begin of the next line, which was read with the last block.
+    /// Beginning of the next line, which was read with the last block.
     carry: Vec<u8>,
-    /// Memory of a block that is not needed any more.
+    /// Memory of a block that is no longer used.
     spare: Vec<u8>,
     newline: bool,
 }
 
 impl<'a> Blocks<'a> {
-    /// The unpacked text of a file.
+    /// Returns the blocks of the unpacked text of a file.
     pub(crate) fn of(file: &'a InputFile, compression: Compression) -> Self {
         Self::new(compression.stream_of(file))
     }
@@ -36,8 +36,8 @@ impl<'a> Blocks<'a> {
         Self { stream, carry: Vec::new(), spare: Vec::new(), newline: true }
     }
 
-    /// The next block: it ends at a line end, or at the end of the file, or (a line longer than a block)
-    /// anywhere.
+    /// Returns the next block. It ends at a line end, at the end of the file, or anywhere within a line longer than a
+    /// block.
     pub(crate) fn next(&mut self) -> std::io::Result<Option<Vec<u8>>> {
         let mut block = std::mem::take(&mut self.spare);
         let (mut filled, mut ends) = (self.carry.len(), false);
@@ -60,18 +60,18 @@ impl<'a> Blocks<'a> {
         Ok(Some(block))
     }
 
-    /// Takes the memory of a block that is not needed any more.
+    /// Takes back the memory of a block that is no longer used.
     pub(crate) fn take_back(&mut self, block: Vec<u8>) {
         self.spare = block;
     }
 
-    /// Whether what was given so far ends with a line end.
+    /// Returns true when the text so far ends with a line end.
     pub(crate) fn ends_with_newline(&self) -> bool {
         self.newline
     }
 }
 
-/// Length of the whole lines of a block; all of it when it ends the file or has no line end.
+/// Returns the length of the whole lines of a block: all of it if it ends the file or has no line end.
 fn whole_lines(block: &[u8], ends_file: bool) -> usize {
     match block.iter().rposition(|&b| b == b'\n') {
         Some(at) if !ends_file => at + 1,
@@ -79,8 +79,8 @@ fn whole_lines(block: &[u8], ends_file: bool) -> usize {
     }
 }
 
-/// The most entries that a text has: one in each line, of which `1 1 1` is the shortest. Entries are held until
-/// all are there, so that they have no more room than they need.
+/// Returns an upper bound of the number of entries in a text: one per line, of which `1 1 1` is the shortest. Entries
+/// are held until all are read, so their capacity must not exceed this bound.
 pub(crate) fn most_entries(text: &[u8]) -> usize {
     (memchr::memchr_iter(b'\n', text).count() + 1).min(text.len() / 6 + 1)
 }

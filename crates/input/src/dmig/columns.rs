@@ -1,4 +1,4 @@
-//! Cards that hold columns of DMIG matrices, read without regard to the cards above them but for the headers.
+//! Cards with columns of DMIG matrices, read independently of the cards above them except for the headers.
 
 use crate::assemble::Entry;
 use crate::bulk_cards::Card;
@@ -8,27 +8,27 @@ use crate::recent::Recent;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::path::Path;
 
-/// A grid or scalar point and its component: 1 to 6, of a scalar point 0.
+/// Grid or scalar point with its component: 1 to 6, and 0 for a scalar point.
 pub(crate) type Point = (i64, u8);
 
-/// Name of each matrix whose header stands above the columns, and whether its entries are real; those of
-/// complex matrices are passed over.
+/// Name of each matrix whose header is above the columns, and true if its entries are real; complex columns are
+/// skipped.
 pub(super) type Heads = Vec<(String, bool)>;
 
-/// The entries of some columns. Rows and columns of the entries are places in `points`, where a point may
-/// stand more than once.
+/// Entries of some columns. Rows and columns of the entries are indices in `points`, where a point may occur more than
+/// once.
 pub(super) struct Columns {
     pub points: Vec<Point>,
-    /// Matrix, entries, and the largest number of their digits as written.
+    /// Index of the matrix, entries, and their largest number of written digits.
     pub runs: Vec<(usize, Vec<Entry>, u8)>,
     pub bad: Vec<Diagnostic>,
     recent: Recent<Point>,
-    /// How many entries the next run may have.
+    /// Capacity in entries of the next run.
     room: usize,
 }
 
 impl Columns {
-    /// None yet, of cards with so many bytes.
+    /// Creates an empty list for cards with this number of bytes.
     pub(super) fn of(bytes: usize) -> Self {
         /// Bytes of an entry in large fields.
         const ENTRY: usize = 56;
@@ -36,7 +36,7 @@ impl Columns {
         Self { points, runs, bad, recent: Recent::new(), room: bytes / ENTRY }
     }
 
-    /// Adds what a card holds: of one that is bad the entries above the bad one.
+    /// Adds the entries of a card; for a bad card those before the error.
     pub(super) fn card(&mut self, card: &Card, path: &Path, heads: &Heads) {
         if let Err(bad) = self.column(card, path, heads)
             && self.bad.len() < super::SHOWN
@@ -45,7 +45,7 @@ impl Columns {
         }
     }
 
-    /// With places in `place` instead of those in `points`.
+    /// Replaces indices in `points` by those in `place`.
     pub(super) fn numbered(mut self, place: &[u32]) -> Self {
         for entry in self.runs.iter_mut().flat_map(|(_, entries, _)| entries) {
             (entry.row, entry.col) = (place[entry.row as usize], place[entry.col as usize]);
@@ -92,7 +92,7 @@ impl Columns {
         Ok(())
     }
 
-    /// The place of the point that two fields name.
+    /// Returns the index of the point that two fields name.
     fn point(&mut self, card: &Card, k: usize, path: &Path) -> Result<u32, Diagnostic> {
         let component = card.integer(k + 1).filter(|component| (0..=6).contains(component));
         let id = card.integer(k).filter(|id| *id > 0);
@@ -109,12 +109,12 @@ impl Columns {
     }
 }
 
-/// A name as messages show it.
+/// Returns a name in upper case, as in messages.
 pub(super) fn upper(name: &[u8]) -> String {
     String::from_utf8_lossy(name).to_uppercase()
 }
 
-/// FB301 for a field of a card.
+/// Returns FB301 for a field of a card.
 pub(super) fn bad_card(card: &Card, field: usize, path: &Path, message: impl Into<String>) -> Diagnostic {
     Diagnostic::new(Code::MatrixSyntax, message)
         .in_file(path)

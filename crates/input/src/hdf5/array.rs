@@ -1,4 +1,4 @@
-//! A dense array in an HDF5 file: the dataset that is named, or the only one with two extents.
+//! A dense array in an HDF5 file: the named dataset, or the only one with two extents.
 
 use super::members::Members;
 use super::values::{Found, Numbers, refuse_beyond_memory};
@@ -83,7 +83,7 @@ fn root(file: &File) -> Found<Group> {
     file.group("/").map_err(|e| vec![layout(format!("root group cannot be read: {e}"))])
 }
 
-/// All datasets with two extents, breadth first: their group, its path, their name.
+/// Returns all datasets with two extents, breadth first: group, path of the group, and name.
 fn arrays(file: &File) -> Vec<(Group, String, String)> {
     let mut found = Vec::new();
     let mut level: Vec<(String, Group)> = root(file).map(|root| (String::new(), root)).into_iter().collect();

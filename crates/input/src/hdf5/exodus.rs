@@ -12,18 +12,18 @@ use hdf5_metno::Group;
 
 const HELP: &str = "give an Exodus mesh in netCDF-4, or a table with the columns node, x, y, z";
 
-/// Sets of node numbers by name.
+/// Node numbers of sets by name.
 type NamedSets = Vec<(String, Vec<i64>)>;
 
-/// Reads the nodes. They have the numbers of `node_num_map`, without it 1, 2, ....
+/// Reads nodes, node sets and elements. Nodes have the numbers of `node_num_map`, or 1, 2, ... without it.
 ///
 /// # Errors
-/// FB101 for a file that cannot be opened, FB115 for what is no such mesh.
+/// FB101 for a file that cannot be opened, FB115 for a file that is no such mesh.
 pub(crate) fn read_exodus(file: &InputFile) -> Found<(Nodes, NamedSets, Elements)> {
     let opened = opened(file)?;
     let root = opened.group("/").map_err(|e| wrong(format!("file cannot be read: {e}")))?;
     let mesh = Mesh { members: Members::of(&root), root, heaps: Heaps::of(file) };
-    // What is wrong with a dataset is said of nodes here, not of matrices.
+    // Errors of datasets are reported as errors of nodes, not of matrices.
     mesh.read().map_err(|found| found.iter().flat_map(|one| wrong(one.message().to_owned())).collect())
 }
 
@@ -84,7 +84,7 @@ impl Mesh<'_> {
         Ok((0..count).map(|node| [0, 1, 2].map(|axis| along(axis, node))).collect())
     }
 
-    /// The rows of a dataset with two extents.
+    /// Returns the rows of a dataset with two extents.
     fn rows_of(&self, name: &str) -> Found<Vec<Vec<f64>>> {
         let numbers = Numbers::open(&self.root, &self.members, "", name)?;
         let &[_, columns] = numbers.dataset.shape().as_slice() else {
@@ -96,7 +96,7 @@ impl Mesh<'_> {
         Ok(values.chunks(columns.max(1)).map(<[f64]>::to_vec).collect())
     }
 
-    /// The elements of all blocks, which list places from 1.
+    /// Returns the elements of all blocks, which list node positions from 1.
     fn elements(&self, ids: &[i64]) -> Found<Elements> {
         let mut elements = Elements::default();
         for dataset in (1..).map(|k| format!("connect{k}")).take_while(|dataset| self.has(dataset)) {
@@ -112,7 +112,7 @@ impl Mesh<'_> {
         Ok(elements)
     }
 
-    /// Node sets list places from 1. Without a name, or without names, a set is called by its number.
+    /// Returns the node sets, which list node positions from 1. A set without a name is named by its number.
     fn sets(&self, ids: &[i64]) -> Found<NamedSets> {
         let names = match self.has("ns_names") {
             true => names_of(&self.root, &self.members, "ns_names")?,
@@ -136,7 +136,7 @@ impl Mesh<'_> {
     }
 }
 
-/// Numbers of the nodes at `places`, from 1, that a dataset lists; `None` is no place.
+/// Returns the numbers of the nodes at `places` (from 1), which a dataset lists; `None` is an invalid position.
 fn nodes_at(dataset: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>>) -> Found<Vec<i64>> {
     let node = |place: Option<i64>| {
         let at = usize::try_from(place?.checked_sub(1)?).ok()?;
@@ -146,7 +146,7 @@ fn nodes_at(dataset: &str, ids: &[i64], places: impl Iterator<Item = Option<i64>
     nodes.ok_or_else(|| wrong(format!("`{dataset}` names a node that there is not")))
 }
 
-/// Adds an element of a type as Exodus names it (`HEX8`, `TETRA`, `SHELL4`); points are not drawn.
+/// Adds an element of a type with an Exodus name (`HEX8`, `TETRA`, `SHELL4`). Points are not drawn.
 fn add_element(elements: &mut Elements, kind: &str, nodes: &[i64]) {
     let name = kind.to_ascii_uppercase();
     let begins = |heads: &[&str]| heads.iter().any(|head| name.starts_with(head));

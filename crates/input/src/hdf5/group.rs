@@ -1,5 +1,5 @@
-//! One sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of
-//! scipy, anndata, MATLAB and PETSc (`docs/input.md`).
+//! A sparse matrix in an HDF5 group: compressed columns or rows, or coordinates, in the conventions of scipy, anndata,
+//! MATLAB and PETSc (`docs/input.md`).
 
 use super::super::assemble::{
     ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, assembled, check_size, push,
@@ -16,10 +16,10 @@ use flexbody_model::RawMatrix;
 use hdf5_metno::Group;
 use std::path::Path;
 
-/// Entries read at a time.
+/// Number of entries read at a time.
 const PIECE: usize = 1 << 20;
 
-/// Reads the matrix in `group`, called `name` in messages.
+/// Reads the matrix in `group`, which messages call `name`.
 pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Found<RawMatrix> {
     let MatrixSource { file, keep_in, .. } = *source;
     let reader = GroupReader { file, group, name, members: Members::of(group), keep_in };
@@ -31,6 +31,7 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
             None => return Err(vec![reader.layout("holds no sparse matrix")]),
         },
     };
+    // Declaration and entries must agree about the stored triangles.
     let sides = parsed.sides;
     let stored = match declared {
         Declared::Triangle if sides == (Sides { lower: true, upper: true }) => {
@@ -66,18 +67,18 @@ pub(super) fn read(group: &Group, name: &str, source: &MatrixSource<'_>) -> Foun
     Ok(raw)
 }
 
-/// What the attribute `symmetric` of the group says.
+/// Symmetry declared by the attribute `symmetric` of the group.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Declared {
-    /// Nothing: the matrix is stored in full.
+    /// No declaration: the matrix is stored in full.
     No,
     /// Symmetric, stored in full or by one triangle.
     Symmetric,
-    /// Stored by one triangle.
+    /// Symmetric, stored by one triangle.
     Triangle,
 }
 
-/// A parsed group.
+/// Content of a group.
 struct Parsed {
     n: usize,
     entries: Entries,
@@ -85,7 +86,7 @@ struct Parsed {
     single_precision: bool,
 }
 
-/// The entries of a matrix, in the order in which its group stores them.
+/// Entries of a matrix, in the order in which its group stores them.
 enum Entries {
     /// Sorted columns of both triangles, in files.
     Kept(CscMatrix),
@@ -93,7 +94,7 @@ enum Entries {
     Listed(Vec<Vec<Entry>>),
 }
 
-/// Row and column of entry k from its index, where entries come in the order of the columns.
+/// Returns a function that gives row and column of entry k from its index, for entries in the order of the columns.
 fn by_major(pointers: &[i64]) -> impl FnMut(usize, [i64; 1]) -> (i64, i64) {
     let mut major = 0;
     move |k, [index]| {
@@ -109,7 +110,7 @@ struct GroupReader<'a> {
     group: &'a Group,
     name: &'a str,
     members: Members,
-    /// The folder for a matrix that is not to be held in memory.
+    /// Folder for a matrix that is not held in memory.
     keep_in: Option<&'a Path>,
 }
 
@@ -153,8 +154,7 @@ impl GroupReader<'_> {
         {
             return Ok(parsed);
         }
-        // Compressed columns or rows: for the symmetric matrices that are wanted the same, so nobody needs to
-        // say.
+        // Compressed rows are read as columns: symmetric matrices have equal rows and columns.
         let mut columns = ColumnEntries::with_room(n, entries);
         let place = by_major(&pointer_values);
         let sides = self.visit(&values, &[&indices], n, place, |entry| columns.push(entry))?;
@@ -162,7 +162,7 @@ impl GroupReader<'_> {
         Ok(Parsed { n, entries: Entries::Columns(columns), sides, single_precision })
     }
 
-    /// The matrix in files of `folder`; `None` where its columns are not sorted or one triangle is missing.
+    /// Returns the matrix in files of `folder`; `None` if its columns are not sorted or one triangle is missing.
     fn kept(
         &self,
         folder: &Path,
@@ -206,8 +206,8 @@ impl GroupReader<'_> {
         Ok(Parsed { n, entries: Entries::Listed(pieces), sides, single_precision })
     }
 
-    /// Reads values and indices piece by piece; `place` gives row and column of entry k from its indices,
-    /// `keep` takes the entries that are not zero.
+    /// Reads values and indices piece by piece. `place` returns row and column of entry k from its indices; `keep`
+    /// receives the nonzero entries. Returns the sides of the diagonal on which they lie.
     fn visit<const N: usize>(
         &self,
         values: &Vector,
@@ -216,7 +216,7 @@ impl GroupReader<'_> {
         mut place: impl FnMut(usize, [i64; N]) -> (i64, i64),
         mut keep: impl FnMut(Entry),
     ) -> Found<Sides> {
-        // Whole chunks, so that none is unpacked twice.
+        // Pieces consist of whole chunks, so that no chunk is unpacked twice.
         let step = indices.iter().map(|v| v.chunk).fold(PIECE.max(values.chunk), usize::max);
         let mut sides = Sides::default();
         let mut bad = Bad { n, shown: Vec::new(), count: 0 };
@@ -251,17 +251,17 @@ impl GroupReader<'_> {
         Err(vec![Diagnostic::new(Code::MatrixCount, message).with_help(help)])
     }
 
-    /// Rows and columns, from the attribute or dataset `shape` or from MATLAB's attribute.
+    /// Returns the numbers of rows and columns, from the attribute or dataset `shape` or from MATLAB's attribute.
     fn shape(&self) -> Found<Option<(u64, u64)>> {
         let attribute = ["shape", "h5sparse_shape"].iter().find_map(|name| self.group.attr(name).ok());
         let numbers = if let Some(attribute) = attribute {
             integers_of(&attribute)
         } else if self.members.link("shape").is_some() {
             let vector = self.vector("shape")?;
-            // Only two numbers are wanted; reading one more tells that there are too many.
+            // Two numbers are expected; a third one shows that there are too many.
             Some(vector.integers(0..vector.len.min(3))?)
         } else if let Ok(rows) = self.group.attr("MATLAB_sparse") {
-            // The number of columns is that of the pointers.
+            // The number of columns follows from the pointers.
             let columns = self.members.first(POINTERS).map(|name| self.vector(name)).transpose()?;
             let columns = columns.map(|pointers| pointers.len as i64 - 1);
             integers_of(&rows).map(|rows| rows.into_iter().chain(columns).collect())
@@ -298,7 +298,7 @@ impl GroupReader<'_> {
     }
 }
 
-/// Entries that cannot be used: the first few, and how many.
+/// Invalid entries: the first few, and their number.
 struct Bad {
     n: usize,
     shown: Vec<Diagnostic>,

@@ -1,4 +1,4 @@
-//! What a group holds, and under which names a sparse matrix is kept in it.
+//! The members of a group, and the names under which it holds a sparse matrix.
 
 use hdf5_metno::{Group, LinkType};
 use std::collections::BTreeMap;
@@ -9,14 +9,14 @@ const VALUES: &[&str] = &["data", "values", "val"];
 const ROWS: &[&str] = &["row", "rows", "i"];
 const COLUMNS: &[&str] = &["col", "cols", "j"];
 
-/// The links of a group by name.
+/// Links of a group by name.
 pub(super) struct Members(BTreeMap<String, LinkType>);
 
 impl Members {
-    /// Those of `group`; none when they cannot be listed.
+    /// Returns the links of `group`; none if they cannot be listed.
     pub(super) fn of(group: &Group) -> Self {
         let mut links = BTreeMap::new();
-        // A group that cannot be listed is reported as holding no matrix.
+        // A group that cannot be listed is reported as a group without a matrix.
         let _ = group.iter_visit_default(|name, info| {
             links.insert(name.to_owned(), info.link_type);
             Ok(())
@@ -28,12 +28,12 @@ impl Members {
         self.0.get(name).copied()
     }
 
-    /// True if `name` is there by a hard link: a soft link may lead through another file.
+    /// Returns true when `name` is a hard link. A soft link may lead to another file.
     pub(super) fn is_here(&self, name: &str) -> bool {
         self.link(name) == Some(LinkType::Hard)
     }
 
-    /// True if `name` is a soft or an external link, which are not followed.
+    /// Returns true when `name` is a soft or external link. Such links are not followed.
     pub(super) fn is_elsewhere(&self, name: &str) -> bool {
         self.link(name).is_some_and(|link| link != LinkType::Hard)
     }
@@ -46,12 +46,12 @@ impl Members {
         names.iter().copied().find(|name| self.0.contains_key(*name))
     }
 
-    /// The names of values, indices and pointers.
+    /// Returns the names of values, indices and pointers; `None` if one is missing.
     pub(super) fn compressed(&self) -> Option<(&'static str, &'static str, &'static str)> {
         Some((self.first(VALUES)?, self.first(INDICES)?, self.first(POINTERS)?))
     }
 
-    /// The names of values, rows and columns.
+    /// Returns the names of values, rows and columns; `None` if one is missing.
     pub(super) fn coordinates(&self) -> Option<(&'static str, &'static str, &'static str)> {
         Some((self.first(VALUES)?, self.first(ROWS)?, self.first(COLUMNS)?))
     }

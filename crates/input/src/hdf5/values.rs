@@ -1,4 +1,4 @@
-//! Lists of numbers and small attributes, whatever type they are stored in.
+//! Lists of numbers and small attributes of any stored type.
 
 use super::members::Members;
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -12,11 +12,11 @@ use std::ops::Range;
 
 pub(super) type Found<T> = Result<T, Vec<Diagnostic>>;
 
-/// More than this many values per stored byte no filter reaches on real data (deflate: 1032): the rest of the
-/// dataset is not in the file.
+/// Number of values per stored byte above which values of a dataset must be missing from the file: no filter reaches it
+/// on real data (deflate: 1032).
 const RATIO: u64 = 1100;
 
-/// Values of a chunk that may be more than those of its dataset.
+/// Number of values up to which a chunk may be larger than its dataset.
 const SMALL_CHUNK: u64 = 1 << 20;
 
 /// Type of the numbers of a dataset.
@@ -38,7 +38,7 @@ impl NumberKind {
     }
 }
 
-/// A dataset of numbers whose values are stored in this file.
+/// Dataset of numbers whose values are stored in this file.
 pub(super) struct Numbers {
     pub dataset: Dataset,
     /// Path within the file, for messages.
@@ -50,8 +50,8 @@ impl Numbers {
     /// Opens the dataset `name` of a group.
     ///
     /// # Errors
-    /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values that
-    /// are not in this file.
+    /// FB302 for values that are no real numbers, FB304 for values that are not stored, FB310 for values outside this
+    /// file.
     pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
         let (dataset, at) = stored_here(group, members, group_name, name)?;
         let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
@@ -68,10 +68,10 @@ impl Numbers {
     }
 }
 
-/// Opens a dataset whose values are stored in this file, and gives its path for messages.
+/// Opens a dataset whose values are stored in this file. Returns also its path for messages.
 ///
 /// # Errors
-/// FB310 for values that are not in this file.
+/// FB310 for values outside this file.
 fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<(Dataset, String)> {
     let at = format!("`{}/{name}`", group_name.trim_end_matches('/'));
     let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
@@ -87,10 +87,10 @@ fn stored_here(group: &Group, members: &Members, group_name: &str, name: &str) -
     Ok((dataset, at))
 }
 
-/// The rows of a dataset of single characters, as netCDF keeps names, without what fills them up.
+/// Returns the rows of a dataset of single characters without padding, as netCDF stores names.
 ///
 /// # Errors
-/// FB302 for other datasets, FB304 for rows that are not stored, FB310 for those that are not in this file.
+/// FB302 for other datasets, FB304 for rows that are not stored, FB310 for values outside this file.
 pub(super) fn names_of(group: &Group, members: &Members, name: &str) -> Found<Vec<String>> {
     let (dataset, at) = stored_here(group, members, "", name)?;
     let refuse = |code, what: String| vec![Diagnostic::new(code, format!("dataset {at} {what}"))];
@@ -116,7 +116,7 @@ pub(super) fn names_of(group: &Group, members: &Members, name: &str) -> Found<Ve
     Ok(letters.chunks(length.max(1)).map(name).collect())
 }
 
-/// Refuses more values than the bytes in the file can stand for.
+/// Refuses more values than the bytes in the file can represent.
 fn check_stored(dataset: &Dataset) -> Result<(), String> {
     let declared =
         dataset.shape().iter().fold(1u64, |product, &extent| product.saturating_mul(extent as u64));
@@ -133,10 +133,10 @@ fn check_stored(dataset: &Dataset) -> Result<(), String> {
     Ok(())
 }
 
-/// Refuses so many values where they do not fit the memory that is left.
+/// Refuses a number of values that does not fit the memory left.
 ///
 /// # Errors
-/// FB601.
+/// FB601 if they do not fit.
 pub(super) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
     let what = format!("reading {values} values of the dataset {name}");
     let needed = values as f64 * size_of::<f64>() as f64;
@@ -144,7 +144,7 @@ pub(super) fn refuse_beyond_memory(values: usize, name: &str) -> Found<()> {
     refused.map_err(|error| error.into_diagnostics())
 }
 
-/// A list of numbers in the file.
+/// List of numbers in the file.
 pub(super) struct Vector {
     dataset: Dataset,
     /// Path within the file, for messages.
@@ -153,15 +153,15 @@ pub(super) struct Vector {
     axis: usize,
     pub len: usize,
     kind: NumberKind,
-    /// Values per chunk, 1 when not chunked.
+    /// Values per chunk; 1 if the dataset is not chunked.
     pub chunk: usize,
 }
 
 impl Vector {
-    /// Opens a dataset of numbers with one dimension (or with others of length 1).
+    /// Opens a dataset of numbers with one dimension (others must have length 1).
     ///
     /// # Errors
-    /// As [`Numbers::open`]; FB302 for other shapes.
+    /// The errors of [`Numbers::open`]; FB302 for other shapes.
     pub(super) fn open(group: &Group, members: &Members, group_name: &str, name: &str) -> Found<Self> {
         let Numbers { dataset, name, kind } = Numbers::open(group, members, group_name, name)?;
         let refuse = |what: String| vec![Diagnostic::new(Code::MatrixKind, format!("dataset {name} {what}"))];
@@ -186,12 +186,12 @@ impl Vector {
         self.read::<f64>(range)
     }
 
-    /// Whole numbers; 64-bit ones beyond i64 come out as its largest.
+    /// Returns whole numbers; 64-bit numbers beyond i64 become its largest value.
     pub(super) fn integers(&self, range: Range<usize>) -> Found<Vec<i64>> {
         if self.kind == NumberKind::Whole {
             return self.read::<i64>(range);
         }
-        // MATLAB's h5write stores indices as doubles.
+        // The function h5write of MATLAB stores indices as doubles.
         let numbers = self.read::<f64>(range)?;
         if let Some(bad) = numbers.iter().find(|v| v.fract() != 0.0) {
             let message = format!("dataset {} has {bad}, expected whole numbers", self.name);
@@ -216,7 +216,7 @@ impl Vector {
     }
 }
 
-/// The whole numbers of a small attribute.
+/// Returns the whole numbers of a small attribute; `None` for other attributes.
 pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
     let kind = NumberKind::of(&attribute.dtype().ok()?.to_descriptor().ok()?)?;
     let shape = attribute.shape();
@@ -234,7 +234,7 @@ pub(super) fn integers_of(attribute: &Attribute) -> Option<Vec<i64>> {
     }
 }
 
-/// A boolean, or a whole number that stands for one.
+/// Returns a boolean, or a whole number 0 or 1 as one; `None` for other attributes.
 pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
     if attribute.is_scalar() && attribute.dtype().ok()?.to_descriptor().ok()? == TypeDescriptor::Boolean {
         return attribute.read_scalar::<bool>().ok();
@@ -245,7 +245,7 @@ pub(super) fn truth_of(attribute: &Attribute) -> Option<bool> {
     }
 }
 
-/// The global heaps of a file, where texts of variable length lie. The HDF5 library walks damaged ones without end.
+/// Global heaps of a file, which hold texts of variable length. The HDF5 library walks damaged ones endlessly.
 pub(super) struct Heaps<'f> {
     file: &'f InputFile,
     are_sound: OnceCell<bool>,
@@ -256,14 +256,14 @@ impl<'f> Heaps<'f> {
         Self { file, are_sound: OnceCell::new() }
     }
 
-    /// True if walking the heaps comes to an end; the file is looked through at the first call.
+    /// Returns true when walking the heaps comes to an end. The first call examines the file.
     fn are_sound(&self) -> bool {
         let look = || first_broken_heap(&mut self.file.reader()).is_ok_and(|broken| broken.is_none());
         *self.are_sound.get_or_init(look)
     }
 }
 
-/// A short text, whichever of the string types of HDF5 it has; `heaps` are those of the file.
+/// Returns a short text of any string type of HDF5; `heaps` are those of the file.
 pub(super) fn text_of(attribute: &Attribute, heaps: &Heaps<'_>) -> Option<String> {
     // A null dataspace has no value.
     if !attribute.is_scalar() && attribute.shape() != [1] {

@@ -1,7 +1,6 @@
-//! Jobs of Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` and `*MATRIX OUTPUT` write `job_STIF1.mtx` and
-//! `job_MASS1.mtx` beside the deck `job.inp`, as `row column value` (FORMAT=COORDINATE) or with the node and
-//! the direction of row and column (FORMAT=MATRIX INPUT, LABELS). Instead of them the matrices may be those of a
-//! substructure.
+//! Jobs of Abaqus: `*MATRIX GENERATE, STIFFNESS, MASS` and `*MATRIX OUTPUT` write `job_STIF1.mtx` and `job_MASS1.mtx`
+//! into the folder of the deck `job.inp`, as `row column value` (FORMAT=COORDINATE) or with the node and the direction
+//! of row and column (FORMAT=MATRIX INPUT, LABELS). The matrices may instead be those of a substructure.
 
 use super::abaqus_rows::{labels, other_rows};
 use super::abaqus_substructure::{self, Substructure};
@@ -18,7 +17,7 @@ use flexbody_model::{DofLabel, Elements, GivenRows, Nodes, RawMatrix};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// The reader of Abaqus jobs.
+/// Reader of Abaqus jobs.
 pub(super) struct Abaqus;
 
 const HELP: &str =
@@ -55,7 +54,7 @@ impl JobReader for Abaqus {
             nodes: Nodes { ids, positions },
             dofs: rows.labels,
             given_rows: GivenRows::default(),
-            // Condensed matrices leave no element all of its nodes.
+            // With condensed matrices no element has all of its nodes.
             elements: if rows.condensed.is_some() { Elements::default() } else { mesh.drawn() },
             sets: mesh.sets,
             unresolved: mesh.unresolved,
@@ -65,8 +64,8 @@ impl JobReader for Abaqus {
     }
 }
 
-/// The file of the substructure that a deck names, which is read where the matrices of the whole model are not
-/// there.
+/// Returns the file of the substructure that a deck names, which is read if the matrices of the whole model are
+/// missing.
 pub(super) fn substructure_of(path: &Path) -> Option<PathBuf> {
     if !is_deck(path) || Matrices::beside(path).is_ok() {
         return None;
@@ -75,14 +74,14 @@ pub(super) fn substructure_of(path: &Path) -> Option<PathBuf> {
     abaqus_substructure::file_of(&deck, path).map(|(file, _)| file)
 }
 
-/// Matrices and what their rows stand for.
+/// Matrices with the labels of their rows.
 struct Rows {
     labels: Vec<DofLabel>,
     stiffness: RawMatrix,
     mass: RawMatrix,
-    /// The files with their roles.
+    /// Files with their roles.
     files: Vec<(&'static str, SeenFile)>,
-    /// FB119, of matrices that are condensed.
+    /// FB119, for condensed matrices.
     condensed: Option<Diagnostic>,
 }
 
@@ -99,7 +98,10 @@ impl Rows {
         Ok(Self { labels, stiffness, mass, files, condensed: None })
     }
 
-    /// FB111 for rows whose nodes are not in the deck, or stand along the axes of a `*TRANSFORM`.
+    /// Reads the matrices of a substructure.
+    ///
+    /// # Errors
+    /// FB111 for rows whose nodes are not in the deck, or along the axes of a `*TRANSFORM`.
     fn of_substructure(file: &Path, deck: &Deck, mesh: &DeckMesh) -> Found<Self> {
         let Substructure { labels, stiffness, mass, seen } = Substructure::read(file)?;
         let nodes: BTreeSet<i64> = labels.iter().map(|label| label.node).collect();
@@ -120,7 +122,7 @@ impl Rows {
     }
 }
 
-/// FB111 for retained nodes whose rows stand along axes of their own.
+/// Returns FB111 for retained nodes whose rows are along other axes.
 fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diagnostic> {
     let members = |name: &str| -> Vec<i64> {
         mesh.set(name).map_or_else(|| integer(name.as_bytes()).into_iter().collect(), <[i64]>::to_vec)
@@ -134,17 +136,17 @@ fn turned(deck: &Deck, mesh: &DeckMesh, retained: &BTreeSet<i64>) -> Option<Diag
     })
 }
 
-/// The files of the two matrices.
+/// Files of the two matrices.
 struct Matrices {
     stiffness: PathBuf,
     mass: PathBuf,
-    /// Which of several were taken.
+    /// Note about the choice among several files.
     note: Option<Diagnostic>,
 }
 
 impl Matrices {
-    /// Files whose names are that of the deck with STIF and MASS and the number of a step: those of the last step
-    /// that has both; else the last of each.
+    /// Finds the files with the name of the deck, STIF or MASS, and the number of a step: those of the last step that
+    /// has both; else the last file of each.
     fn beside(deck: &Path) -> Found<Self> {
         let mut found: [BTreeMap<u32, PathBuf>; 2] = Default::default();
         for (rest, path) in siblings(deck) {
@@ -177,7 +179,7 @@ impl Matrices {
     }
 }
 
-/// Matrices whose rows are numbered, with the labels that the deck gives them.
+/// Reads matrices with numbered rows, and assigns the labels that follow from the deck.
 fn numbered(
     mesh: &DeckMesh,
     deck: &Path,
@@ -191,7 +193,7 @@ fn numbered(
         let fits = if role == MatrixRole::Mass { file.rows() <= n } else { file.rows() == n };
         if fits { file.into_matrix(n) } else { Err(vec![other_rows(mesh, n, file.rows(), path)]) }
     };
-    // One after the other: each is read by all threads, and the entries of only one are held.
+    // The files are read one after the other: each uses all threads, and the entries of only one are in memory.
     let k = read(stiffness, MatrixRole::Stiffness);
     let (k, m) = both(k, read(mass, MatrixRole::Mass))?;
     Ok((labels, [k, m]))

@@ -1,5 +1,5 @@
-//! What the rows of matrices stand for that Abaqus writes without labels: nodes in ascending order, each with
-//! the directions that its elements give it.
+//! The labels of matrix rows that Abaqus writes without labels: nodes in ascending order, each with the directions that
+//! its elements give it.
 
 use super::Found;
 use super::deck_mesh::DeckMesh;
@@ -11,10 +11,10 @@ use std::path::Path;
 
 const HELP: &str = "write *MATRIX OUTPUT with FORMAT=MATRIX INPUT, whose lines name node and direction";
 
-/// Labels of the rows of a model with the elements of `mesh`.
+/// Returns the labels of the rows of a model with the elements of `mesh`.
 ///
 /// # Errors
-/// FB111 for elements whose directions are not known.
+/// FB111 for elements whose directions are unknown.
 pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
     let mut directions: BTreeMap<i64, u8> = BTreeMap::new();
     let mut unknown: Vec<&str> = Vec::new();
@@ -46,7 +46,7 @@ pub(super) fn labels(mesh: &DeckMesh, deck: &Path) -> Found<Vec<DofLabel>> {
     Ok(directions.iter().flat_map(label).collect())
 }
 
-/// FB112: the matrix has other rows than the deck.
+/// Returns FB112: the matrix has other rows than the deck.
 pub(super) fn other_rows(mesh: &DeckMesh, labels: usize, rows: usize, matrix: &Path) -> Diagnostic {
     let mut internal: Vec<&str> =
         mesh.elements.iter().map(|own| own.kind.as_str()).filter(|kind| has_internal_nodes(kind)).collect();

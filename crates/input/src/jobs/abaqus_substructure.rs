@@ -17,17 +17,17 @@ use std::path::{Path, PathBuf};
 
 const HELP: &str = "write it with *SUBSTRUCTURE MATRIX OUTPUT, STIFFNESS=YES, MASS=YES, OUTPUT FILE=USER DEFINED, FILE NAME=part (without .mtx)";
 
-/// A model condensed to some of its nodes.
+/// Model condensed to some of its nodes.
 pub(super) struct Substructure {
     pub labels: Vec<DofLabel>,
     pub stiffness: RawMatrix,
     pub mass: RawMatrix,
-    /// The file that has them.
+    /// File of the substructure.
     pub seen: SeenFile,
 }
 
-/// The file that the last request of a deck for the matrices of a substructure names, and which of several it
-/// is.
+/// Returns the file named by the last request of a deck for the matrices of a substructure, with a note if there are
+/// several.
 pub(super) fn file_of(deck: &Deck, path: &Path) -> Option<(PathBuf, Option<Diagnostic>)> {
     let requests = || {
         deck.cards()
@@ -48,8 +48,8 @@ impl Substructure {
     /// Reads the file of a substructure.
     ///
     /// # Errors
-    /// FB101, FB106; FB109 where one of the matrices is not there; FB110 for what cannot be read; FB111 for
-    /// degrees of freedom other than displacements and rotations; FB301, FB303, FB312.
+    /// FB101, FB106; FB109 if a matrix is missing; FB110 for lines that cannot be read; FB111 for degrees of freedom
+    /// other than displacements and rotations; FB301, FB303, FB312.
     pub(super) fn read(path: &Path) -> Found<Self> {
         let deck = Deck::read(path)?;
         let mut elements = deck.cards().iter().filter(|card| card.keyword == "USERELEMENT");
@@ -75,7 +75,7 @@ struct SubstructureFile<'d> {
 }
 
 impl SubstructureFile<'_> {
-    /// Node and direction of every row.
+    /// Returns node and direction of every row.
     fn labels(&self) -> Result<Vec<DofLabel>, Diagnostic> {
         let nodes = self.nodes()?;
         let changes = self.changes(nodes.len())?;
@@ -89,7 +89,7 @@ impl SubstructureFile<'_> {
         Ok(nodes.iter().enumerate().flat_map(of_node).collect())
     }
 
-    /// The retained nodes, which stand in comments.
+    /// Returns the retained nodes, which are listed in comments.
     fn nodes(&self) -> Result<Vec<i64>, Diagnostic> {
         let count = self.element.parameter("NODES").and_then(|count| count.parse::<usize>().ok());
         let (_, text) = self.deck.text(self.element);
@@ -106,7 +106,8 @@ impl SubstructureFile<'_> {
         }
     }
 
-    /// Directions of the nodes from a position on, from 1: those of the first node, and where they change.
+    /// Returns the positions (from 1) at which the directions of the nodes change, each with the directions from there
+    /// on.
     fn changes(&self, nodes: usize) -> Result<Vec<(usize, Vec<u8>)>, Diagnostic> {
         let mut changes: Vec<(usize, Vec<u8>)> = Vec::new();
         for (line, text) in self.deck.data(self.element) {
@@ -148,7 +149,7 @@ impl SubstructureFile<'_> {
         numbers.iter().map(direction).collect()
     }
 
-    /// The matrix of a type with `n` rows.
+    /// Returns the matrix of a type with `n` rows.
     fn matrix(&self, kind: &str, n: usize, stored: StoredEntries) -> Found<RawMatrix> {
         let is_meant =
             |card: &&Card| card.keyword == "MATRIX" && card.name("TYPE").is_some_and(|own| own == kind);
@@ -170,6 +171,7 @@ impl SubstructureFile<'_> {
         }
         check_size(n as u64, n as u64, count as u64).map_err(in_file)?;
         let written = pieces.iter().map(|piece| piece.written).max().unwrap_or(0);
+        // Number of values before each piece, from which its positions follow.
         let mut end = 0;
         let starts: Vec<usize> = pieces
             .iter()
@@ -183,7 +185,7 @@ impl SubstructureFile<'_> {
         assemble(n, entries, stored, written, self.path).map_err(|diagnostic| vec![diagnostic])
     }
 
-    /// The numbers below a card.
+    /// Returns the numbers below a card.
     fn values(&self, card: &Card) -> Found<Vec<NumberLines>> {
         let (first, text) = self.deck.text(card);
         let texts: Vec<&[u8]> = line_aligned(text).collect();
@@ -208,7 +210,7 @@ struct NumberLines {
     values: Vec<f64>,
     written: u8,
     lines: usize,
-    /// The first line with something else: number within the piece, from 0, and text.
+    /// First line with other text: its number within the piece, from 0, and the text.
     bad: Option<(usize, String)>,
 }
 
@@ -235,7 +237,7 @@ impl NumberLines {
     }
 }
 
-/// Values of which the first is the one of place `start`, counted row by row.
+/// Returns entries for values that begin at position `start`, counted row by row.
 fn in_rows(values: &[f64], start: usize, n: usize, stored: StoredEntries) -> Vec<Entry> {
     let length = |row: usize| if stored == StoredEntries::Full { n } else { row + 1 };
     let (mut row, mut col) = (0, start);

@@ -1,5 +1,5 @@
-//! Jobs of CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes `job.sti`, `job.mas` (upper triangles, 14
-//! digits) and `job.dof` (a line `node.direction` for every row) beside the deck `job.inp`.
+//! Jobs of CalculiX: `*FREQUENCY, SOLVER=MATRIXSTORAGE` writes `job.sti`, `job.mas` (upper triangles, 14 digits) and
+//! `job.dof` (a line `node.direction` for every row) into the folder of the deck `job.inp`.
 
 use super::coordinate_files::CoordinateFile;
 use super::deck::Deck;
@@ -16,7 +16,7 @@ use flexbody_model::{DofLabel, GivenRows, Nodes};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// The reader of CalculiX jobs.
+/// Reader of CalculiX jobs.
 pub(super) struct Calculix;
 
 const HELP: &str =
@@ -52,7 +52,7 @@ impl JobReader for Calculix {
         let means = reference_places(&deck, &mesh)?;
         let n = labels.len();
         let read = |file| CoordinateFile::read(file, n as u32)?.into_matrix(n);
-        // One after the other: each is read by all threads, and the entries of only one are held.
+        // The files are read one after the other: each uses all threads, and the entries of only one are in memory.
         let stiffness = read(&sti);
         let ((stiffness, stiffness_file), (mass, mass_file)) = both(stiffness, read(&mas))?;
         let Once { labels, places } = label_once(&deck, &mesh, labels, [&stiffness, &mass], &dof)?;
@@ -61,7 +61,7 @@ impl JobReader for Calculix {
             None => *own,
         };
         let dofs: Vec<DofLabel> = labels.iter().map(label).collect();
-        // The nodes that only name rotations stand at no place of their own.
+        // Nodes that only carry rotations have no position.
         let placed = mesh.nodes.iter().filter(|(id, _)| !rotations.contains_key(id));
         let place = |(id, x): (&i64, &[f64; 3])| (*id, *means.get(id).unwrap_or(x));
         let mut nodes: BTreeMap<i64, [f64; 3]> = placed.map(place).collect();
@@ -86,7 +86,7 @@ impl JobReader for Calculix {
     }
 }
 
-/// Labels of the rows: lines `node.direction`.
+/// Reads the labels of the rows from lines `node.direction`.
 fn read_labels(path: &Path) -> Found<(Vec<DofLabel>, SeenFile)> {
     let file = InputFile::open(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut labels = Vec::with_capacity(file.bytes().len() / 6);

@@ -9,13 +9,13 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// The entries of a file, in its order.
+/// Entries of a file, in its order.
 pub(super) struct CoordinateFile {
     seen: SeenFile,
     pieces: Vec<Vec<Entry>>,
     count: u64,
     written: u8,
-    /// On which sides of the diagonal they lie.
+    /// Sides of the diagonal on which the entries lie.
     pub sides: Sides,
 }
 
@@ -23,11 +23,12 @@ impl CoordinateFile {
     /// Reads a file whose indices are at most `n`.
     ///
     /// # Errors
-    /// FB101, FB103, FB106, FB132, and FB301, FB303, FB306 for its lines.
+    /// FB101, FB103, FB106 for a file that cannot be read, FB132 for one that changed; FB301 for bad lines, FB303 for
+    /// indices out of range, FB306 for values that are not finite.
     pub(super) fn read(path: &Path, n: u32) -> Found<Self> {
         let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
         let read = Self::read_opened(&file, n);
-        // What is wrong with a file that changed meanwhile may be wrong for this reason.
+        // A change of the file during reading may be the cause of other problems, so it is reported first.
         file.refuse_changed().map_err(|diagnostic| vec![diagnostic])?;
         read
     }
@@ -54,16 +55,16 @@ impl CoordinateFile {
         Ok(Self { seen, pieces: body.pieces, count, written: body.written, sides })
     }
 
-    /// Number of rows that its indices ask for.
+    /// Returns the number of rows that the indices require.
     pub(super) fn rows(&self) -> usize {
         let largest = |piece: &Vec<Entry>| piece.iter().map(|e| e.row.max(e.col) as usize + 1).max();
         self.pieces.par_iter().filter_map(largest).max().unwrap_or(0)
     }
 
-    /// The matrix of `n` rows: one triangle stands for both.
+    /// Returns the matrix of `n` rows. A single triangle represents both.
     ///
     /// # Errors
-    /// FB301 for more rows than entries can fill, FB306, FB312.
+    /// FB301 for more rows than the entries can fill, FB306, FB312.
     pub(super) fn into_matrix(self, n: usize) -> Found<FromFile> {
         let path = &self.seen.path;
         let in_file = |diagnostic: Diagnostic| vec![diagnostic.in_file(path)];

@@ -8,26 +8,26 @@ use flexbody_base::text::input_file::{InputFile, SeenFile};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Files that include one another deeper than this include themselves.
+/// Depth of included files above which a file is taken to include itself.
 const DEEPEST: usize = 20;
 
-/// Files that a deck may include, each counted as often as it is included.
+/// Largest number of included files, each counted as often as it is included.
 const MOST_FILES: usize = 1000;
 
-/// A deck with everything that it includes.
+/// Deck with all files that it includes.
 pub(super) struct Deck {
     files: Vec<InputFile>,
     cards: Vec<Card>,
 }
 
-/// A keyword line and the lines of data below it.
+/// Keyword line and the lines of data below it.
 #[derive(Debug, Clone)]
 pub(super) struct Card {
-    /// In upper case, without the asterisk and without blanks, which do not count.
+    /// Keyword in upper case, without the asterisk and without blanks, which have no meaning.
     pub keyword: String,
-    /// Keyword as it is written, in upper case, words one blank apart.
+    /// Keyword as written, in upper case, with single blanks between words.
     pub title: String,
-    /// Names in upper case, and values; a parameter without a value has an empty one.
+    /// Parameter names in upper case, and values; empty for a parameter without a value.
     parameters: Vec<(String, String)>,
     file: usize,
     /// Line of the keyword, from 1.
@@ -38,12 +38,12 @@ pub(super) struct Card {
 }
 
 impl Card {
-    /// The value of a parameter, without quotes; empty where it has none.
+    /// Returns the value of a parameter, without quotes; empty if it has none, `None` without the parameter.
     pub(super) fn parameter(&self, name: &str) -> Option<&str> {
         self.parameters.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
     }
 
-    /// Returns the value of a parameter in the form that names are compared in.
+    /// Returns the value of a parameter in the form in which names are compared.
     pub(super) fn name(&self, parameter: &str) -> Option<String> {
         self.parameter(parameter).map(comparable)
     }
@@ -53,40 +53,40 @@ impl Deck {
     /// Reads a deck and the files that it includes.
     ///
     /// # Errors
-    /// FB101, FB106 for files that cannot be read; FB110 for lines of data before the first keyword, and for
-    /// files that include themselves.
+    /// FB101, FB106 for files that cannot be read; FB110 for lines of data before the first keyword, and for files that
+    /// include themselves.
     pub(super) fn read(path: &Path) -> Found<Self> {
         let mut deck = Self { files: Vec::new(), cards: Vec::new() };
         deck.include(path, 0).map_err(|diagnostic| vec![diagnostic])?;
         Ok(deck)
     }
 
-    /// The cards in the order of the deck. Data that an included file, or the deck after it, goes on with has
-    /// a card of its own with the keyword that it belongs to.
+    /// Returns the cards in the order of the deck. Data that continue in an included file, or after it, have a separate
+    /// card with the keyword that they belong to.
     pub(super) fn cards(&self) -> &[Card] {
         &self.cards
     }
 
-    /// Path of the main file.
+    /// Returns the path of the main file.
     pub(super) fn path(&self) -> Option<&Path> {
         self.files.first().map(InputFile::path)
     }
 
-    /// The files of the deck, the main one first.
+    /// Returns the files of the deck, the main one first.
     ///
     /// # Errors
-    /// FB132.
+    /// FB132 for files that changed while they were read.
     pub(super) fn seen(&self) -> Found<Vec<(&'static str, SeenFile)>> {
         let seen = |file: &InputFile| Ok(("deck", file.seen()?));
         self.files.iter().map(seen).collect::<Result<_, Diagnostic>>().map_err(|diagnostic| vec![diagnostic])
     }
 
-    /// What stands below a card as it is written, comments included, and the number of its first line.
+    /// Returns the text below a card as written, comments included, and the number of its first line.
     pub(super) fn text(&self, card: &Card) -> (usize, &[u8]) {
         (card.first, &self.files[card.file].bytes()[card.data.clone()])
     }
 
-    /// Lines of data of a card with their numbers, without comments and blank lines.
+    /// Returns the lines of data of a card with their numbers, without comments and blank lines.
     pub(super) fn data<'d>(&'d self, card: &Card) -> impl Iterator<Item = (usize, &'d [u8])> + use<'d> {
         let (first, bytes) = self.text(card);
         let lines = Lines::below(bytes, first.saturating_sub(1));
@@ -95,12 +95,12 @@ impl Deck {
             .filter(|(_, line)| !line.is_empty() && !line.starts_with(b"**"))
     }
 
-    /// A diagnostic about a line of the file that a card stands in.
+    /// Returns a diagnostic about a line of the file with the card.
     pub(super) fn at(&self, card: &Card, line: usize, code: Code, message: impl Into<String>) -> Diagnostic {
         Diagnostic::new(code, message).in_file(self.files[card.file].path()).at_line(line)
     }
 
-    /// A diagnostic about a card.
+    /// Returns a diagnostic about a card.
     pub(super) fn about(&self, card: &Card, code: Code, message: impl Into<String>) -> Diagnostic {
         self.at(card, card.line, code, message)
     }
@@ -126,14 +126,14 @@ impl Deck {
             let more = self.more(&card, &folder);
             if card.keyword != "INCLUDE" {
                 let mut card = card.clone();
-                // Data of the file that it names go on with it, and name no file.
+                // Data of the file named in INPUT belong to the card, and name no further file.
                 card.parameters.retain(|(name, _)| more.is_none() || name != "INPUT");
                 self.cards.push(card);
             }
             if let Some(path) = more {
                 let path = path?;
                 self.include(&path, depth + 1).map_err(|diagnostic| match diagnostic.file() {
-                    // A missing file is looked for where it is included.
+                    // A missing file is reported at the card that includes it.
                     Some(own) if own == path && diagnostic.code() == Code::FileUnreadable => self.about(
                         &card,
                         Code::FileUnreadable,
@@ -150,7 +150,7 @@ impl Deck {
         Ok(())
     }
 
-    /// The file that a card names for more of the deck (*INCLUDE) or of its own data; `None` of one that has all.
+    /// Returns the file that a card names for more of the deck (*INCLUDE) or of its data; `None` if it names none.
     fn more(&self, card: &Card, folder: &Path) -> Option<Result<PathBuf, Diagnostic>> {
         match (card.keyword.as_str(), card.parameter("INPUT")) {
             ("INCLUDE" | "NODE" | "ELEMENT" | "NSET" | "ELSET", Some(name)) if !name.is_empty() => {
@@ -163,8 +163,8 @@ impl Deck {
         }
     }
 
-    /// A file that a card names: from the folder of the job, in which programs run, else from that of the file
-    /// that names it.
+    /// Returns the path of a file that a card names: relative to the folder of the job, in which programs run, else to
+    /// that of the file with the card.
     fn place_of(&self, name: &str, folder: &Path) -> PathBuf {
         let main = self.files.first().and_then(|file| file.path().parent()).unwrap_or(folder);
         let upright = name.replace('\\', "/");
@@ -172,14 +172,15 @@ impl Deck {
         places.iter().find(|path| path.is_file()).unwrap_or(&places[0]).clone()
     }
 
-    /// The data below an *INCLUDE, if there is any: it goes on with the last card of the included file.
+    /// Returns the data below an *INCLUDE, if there are any, as a continuation of the last card of the included file.
     fn continued(&self, include: &Card) -> Option<Card> {
         self.data(include).next()?;
         let Card { file, line, ref data, first, .. } = *include;
         Some(Card { file, line, data: data.clone(), first, ..self.cards.last()?.clone() })
     }
 
-    /// The card that begins at a byte of a file, `None` where only comments stand, and where the next begins.
+    /// Returns the card that begins at a byte of a file (`None` if there are only comments), and the start of the next
+    /// card.
     fn next_card(
         &self,
         at: usize,
@@ -189,7 +190,7 @@ impl Deck {
         let bytes = self.files[at].bytes();
         let (mut head, mut end, mut number) = (String::new(), position, line);
         if is_keyword(&bytes[position..]) {
-            // A keyword line that ends with a comma goes on.
+            // A keyword line that ends with a comma continues.
             loop {
                 let stop = line_end(bytes, end);
                 let text = String::from_utf8_lossy(&bytes[end..stop]);
@@ -201,6 +202,7 @@ impl Deck {
                 }
             }
         }
+        // Data extend to the next keyword line.
         let (data, first) = (end, number);
         while end < bytes.len() && !is_keyword(&bytes[end..]) {
             end = line_end(bytes, end);
@@ -218,7 +220,7 @@ impl Deck {
         let stray = self.data(&loose).next();
         match (stray, self.cards.last()) {
             (None, _) => Ok((None, end, number)),
-            // The first lines of an included file go on with what stood above its *INCLUDE.
+            // The first lines of an included file continue the card above its *INCLUDE.
             (Some(_), Some(before)) if position == 0 => {
                 Ok((Some(Card { file: at, line, data: data..end, first, ..before.clone() }), end, number))
             }
@@ -233,23 +235,23 @@ impl Deck {
     }
 }
 
-/// A name as names are compared: in upper case, without blanks.
+/// Returns a name in the form in which names are compared: in upper case, without blanks.
 pub(crate) fn comparable(name: &str) -> String {
     name.split_whitespace().collect::<String>().to_uppercase()
 }
 
-/// True if a line is a keyword line: an asterisk that is not doubled; blanks before it do not count.
+/// Returns true when a line is a keyword line: it begins with a single asterisk, after any blanks.
 fn is_keyword(line: &[u8]) -> bool {
     let start = line.iter().position(|b| !matches!(b, b' ' | b'\t')).unwrap_or(line.len());
     line.get(start) == Some(&b'*') && line.get(start + 1) != Some(&b'*')
 }
 
-/// Where the next line begins.
+/// Returns the start of the next line.
 fn line_end(bytes: &[u8], at: usize) -> usize {
     memchr::memchr(b'\n', &bytes[at..]).map_or(bytes.len(), |length| at + length + 1)
 }
 
-/// Keyword and parameters of a keyword line.
+/// Returns keyword and parameters of a keyword line.
 fn keyword(line: &str) -> (String, Vec<(String, String)>) {
     let mut fields = line.trim_start_matches('*').split(',').map(str::trim);
     let words = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase();
@@ -261,7 +263,7 @@ fn keyword(line: &str) -> (String, Vec<(String, String)>) {
     (title, parameters.collect())
 }
 
-/// Fields of a line of data, trimmed; a comma at its end begins no field.
+/// Returns the trimmed fields of a line of data. A comma at the end of the line begins no field.
 pub(super) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> {
     line.strip_suffix(b",").unwrap_or(line).split(|&b| b == b',').map(<[u8]>::trim_ascii)
 }
@@ -297,7 +299,7 @@ mod tests {
         assert_eq!(texts(&deck, node), [(8, "1, 0, 0, 0".to_owned())]);
         assert_eq!(texts(&deck, more), [(1, "3, 1, 0, 0".to_owned())]);
         assert_eq!(texts(&deck, elset), [(4, "7".to_owned())]);
-        // What stands below *INCLUDE goes on with the last card of the included file.
+        // Data below *INCLUDE continue the last card of the included file.
         assert_eq!(texts(&deck, rest), [(10, "8".to_owned())]);
     }
 

@@ -1,4 +1,4 @@
-//! Nodes, elements and sets of a keyword deck, parts and instances of Abaqus included.
+//! Nodes, elements and sets of a keyword deck, including parts and instances of Abaqus.
 
 use super::deck::{Card, Deck, comparable, fields};
 use super::deck_sets::{Elements, Found as Resolved, Instances, Member, Scope};
@@ -13,33 +13,33 @@ use std::collections::{BTreeMap, HashMap};
 /// Number of bad lines of a deck that are reported one by one.
 const SHOWN: usize = 5;
 
-/// Members that a line of a generated set stands for at the most.
+/// Largest number of members of a line of a generated set.
 const MOST_GENERATED: i64 = 100_000_000;
 
-/// Numbers of nodes that are renumbered are below this.
+/// Upper limit of the numbers of renumbered nodes.
 const LARGEST: i64 = 1_000_000_000_000;
 
 /// Nodes, elements and node sets in the numbering of the whole model.
 #[derive(Debug, Default)]
 pub(super) struct DeckMesh {
-    /// Ascending by number.
+    /// Positions of the nodes, ascending by number.
     pub nodes: BTreeMap<i64, [f64; 3]>,
     pub elements: Vec<Elements>,
-    /// Node sets by name as the deck has it, in the order of the deck.
+    /// Node sets by name as in the deck, in the order of the deck.
     pub sets: NodeSets,
-    /// Node sets that cannot be resolved, and why.
+    /// Node sets that cannot be resolved, with the reason.
     pub unresolved: Unresolved,
-    /// Element sets by name as names are compared. Those of parts and instances are not among them.
+    /// Element sets by name in the form of comparison, without those of parts and instances.
     pub element_sets: HashMap<String, Vec<i64>>,
     /// Notes about the numbering.
     pub notes: Vec<Diagnostic>,
 }
 
 impl DeckMesh {
-    /// Everything that `deck` says of nodes, elements and node sets.
+    /// Reads nodes, elements and node sets of `deck`.
     ///
     /// # Errors
-    /// FB110 for lines that cannot be read, FB111 for cards that make nodes in ways that are not read.
+    /// FB110 for lines that cannot be read, FB111 for cards that define nodes in a way that is not supported.
     pub(super) fn of(deck: &Deck) -> Found<Self> {
         let mut reading = DeckMeshReader { deck, bad: Vec::new(), bad_count: 0 };
         let mut scopes = Scopes::default();
@@ -50,7 +50,7 @@ impl DeckMesh {
         if found.is_empty() { scopes.assembled() } else { Err(found) }
     }
 
-    /// The elements as they are drawn.
+    /// Returns the elements for drawing.
     pub(super) fn drawn(&self) -> flexbody_model::Elements {
         let mut drawn = flexbody_model::Elements::default();
         for Elements { kind, members } in &self.elements {
@@ -66,16 +66,16 @@ impl DeckMesh {
     }
 }
 
-/// A part at a place of the assembly.
+/// Part at a position of the assembly.
 #[derive(Debug, Clone)]
 struct Instance {
     name: String,
-    /// Nodes, elements and sets of the part, and those that are defined within the instance.
+    /// Nodes, elements and sets of the part, and those defined within the instance.
     own: Scope,
     moved: Placement,
 }
 
-/// A turn about an axis, after a displacement.
+/// Displacement, then a rotation about an axis.
 #[derive(Debug, Clone, Default)]
 struct Placement {
     displacement: [f64; 3],
@@ -95,10 +95,10 @@ impl Placement {
     }
 }
 
-/// Where the cards of a deck belong.
+/// Scopes to which the cards of a deck belong.
 #[derive(Debug, Default)]
 struct Scopes {
-    /// Of a deck without parts, and of the assembly.
+    /// Scope of the assembly, or of a deck without parts.
     top: Scope,
     parts: HashMap<String, Scope>,
     instances: Vec<Instance>,
@@ -107,14 +107,14 @@ struct Scopes {
 }
 
 impl Scopes {
-    /// Instances with their sets, for sets of the assembly; none within a part or an instance.
+    /// Returns the instances with their sets, for sets of the assembly; none within a part or an instance.
     fn instances(&self) -> Instances<'_> {
         let is_assembly = self.part.is_none() && !self.in_instance;
         let some = if is_assembly { self.instances.as_slice() } else { &[] };
         Instances::new(some.iter().map(|own| (own.name.as_str(), &own.own)).collect())
     }
 
-    /// The scope that cards belong to; `None` of a part that has nothing yet.
+    /// Returns the scope to which cards belong; `None` for a part without content.
     fn open(&self) -> Option<&Scope> {
         match (&self.part, self.in_instance) {
             (Some(part), _) => self.parts.get(part),
@@ -131,8 +131,8 @@ impl Scopes {
         }
     }
 
-    /// The model of all instances. Numbers stay as they are where no two instances have the same; else every
-    /// instance has numbers of its own.
+    /// Returns the model of all instances. Node numbers are kept if no two instances share one; else every instance
+    /// gets a separate range of numbers.
     fn assembled(self) -> Found<DeckMesh> {
         let placed: Vec<(&Instance, &Scope)> = self.instances.iter().map(|one| (one, &one.own)).collect();
         let mut taken: std::collections::HashSet<i64> = self.top.nodes.keys().copied().collect();
@@ -144,6 +144,7 @@ impl Scopes {
                 format!("instances share node numbers, which are too large ({highest}) to be changed");
             return Err(vec![Diagnostic::new(Code::DeckUnsupported, message)]);
         }
+        // Each instance gets a range of numbers above the highest one, a power of ten apart.
         let stride = if unique { 0 } else { power_of_ten_above(highest) };
         // Nodes of the assembly keep their numbers.
         let first = i64::from(!self.top.nodes.is_empty());
@@ -183,14 +184,14 @@ impl DeckMesh {
         }
     }
 
-    /// The nodes of a set.
+    /// Returns the nodes of a set.
     pub(super) fn set(&self, name: &str) -> Option<&[i64]> {
         let name = comparable(name);
         self.sets.iter().find(|(own, _)| comparable(own) == name).map(|(_, nodes)| nodes.as_slice())
     }
 }
 
-/// The least power of ten that no number reaches.
+/// Returns the lowest power of ten above `number`.
 fn power_of_ten_above(number: i64) -> i64 {
     let mut power = 10i64;
     while power <= number && power < i64::MAX / 10 {
@@ -199,7 +200,7 @@ fn power_of_ten_above(number: i64) -> i64 {
     power
 }
 
-/// A deck while it is read.
+/// State of reading a deck.
 struct DeckMeshReader<'d> {
     deck: &'d Deck,
     bad: Vec<Diagnostic>,
@@ -334,7 +335,7 @@ impl DeckMeshReader<'_> {
                 (true, Some((_, nodes))) => nodes.extend(ids),
                 _ => members.extend(ids.split_first().map(|(id, nodes)| (*id, nodes.to_vec()))),
             }
-            // A line that ends with a comma goes on; long elements go on without one as well.
+            // A line that ends with a comma continues. Elements with many nodes continue without a comma as well.
             let wanted = super::element_kinds::n_nodes(&kind);
             let have = members.last().map_or(0, |(_, nodes)| nodes.len());
             goes_on = wanted.map_or(text.ends_with(b","), |wanted| have < wanted);
@@ -345,8 +346,8 @@ impl DeckMeshReader<'_> {
         scope.elements.push(Elements { kind, members });
     }
 
-    /// Members of a set: numbers, ranges with GENERATE, and what `known` makes of names. The first name that is
-    /// not known leaves the set without members.
+    /// Returns the members of a set: numbers, ranges with GENERATE, and the result of `known` for names. The first
+    /// unknown name is an error for the whole set.
     fn members<T>(
         &mut self,
         card: &Card,
@@ -399,7 +400,7 @@ impl DeckMeshReader<'_> {
         scopes.current().sets.extend(&name, members);
     }
 
-    /// The nodes of *NSET, ELSET=NAME, of an instance or of the scope of the card.
+    /// Returns the nodes of *NSET, ELSET=NAME, of an instance or of the scope of the card.
     fn nodes_of_elements(&self, card: &Card, elements: &str, scopes: &Scopes) -> Resolved<Member> {
         let nodes = match card.parameter("INSTANCE") {
             Some(instance) => scopes.instances().nodes_of_elements(instance, elements),
@@ -415,7 +416,7 @@ impl DeckMeshReader<'_> {
         })
     }
 
-    /// The nodes of *NSET by numbers and names, of an instance or of the scope of the card.
+    /// Returns the nodes of *NSET by numbers and names, of an instance or of the scope of the card.
     fn nodes_of_set(&mut self, card: &Card, scopes: &Scopes) -> Resolved<Member> {
         let instances = scopes.instances();
         let Some(instance) = card.parameter("INSTANCE") else {
@@ -436,10 +437,10 @@ impl DeckMeshReader<'_> {
     }
 
     fn element_set(&mut self, card: &Card, scope: &mut Scope) {
-        // Element sets of the assembly pick elements of instances; nothing here needs them.
+        // Element sets of the assembly select elements of instances; they are not needed.
         let (Some(name), None) = (card.name("ELSET"), card.parameter("INSTANCE")) else { return };
         let known = |set: &str| scope.element_sets.get(&comparable(set)).cloned();
-        // One with a name that is not known is not known either.
+        // A set with an unknown name is unknown as well.
         if let Ok(members) = self.members(card, |id| id, known) {
             scope.element_sets.entry(name).or_default().extend(members);
         } else {
@@ -448,7 +449,7 @@ impl DeckMeshReader<'_> {
     }
 }
 
-/// First, last and increment of a generated set.
+/// Returns first, last and increment of a generated set.
 fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
     let (first, last, step) = match *bounds {
         [first, last] => (first, last, 1),
@@ -459,12 +460,12 @@ fn range(bounds: &[i64]) -> Option<(i64, i64, i64)> {
     (first <= last && few).then_some((first, last, step))
 }
 
-/// A number; an empty field is zero.
+/// Returns a number; an empty field is zero.
 fn real(field: &[u8]) -> Option<f64> {
     if field.is_empty() { Some(0.0) } else { crate::coordinates::real(field) }
 }
 
-/// Cartesian coordinates of a node given in cylindrical (`C`: radius, degrees, z) or spherical ones (`S`:
+/// Returns Cartesian coordinates of a node in cylindrical (`C`: radius, degrees, z) or spherical coordinates (`S`:
 /// radius, longitude and latitude in degrees).
 fn in_cartesian(system: &str, x: [f64; 3]) -> [f64; 3] {
     let [r, theta, third] = x;

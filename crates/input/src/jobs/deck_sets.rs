@@ -1,5 +1,5 @@
-//! Nodes, elements and node sets of a keyword deck: by the scope that defines them, and those of instances as the assembly names them
-//! (`INSTANCE.SET`, `INSTANCE.12`).
+//! Nodes, elements and node sets of a keyword deck, by the scope that defines them, and node sets of instances by the
+//! names of the assembly (`INSTANCE.SET`, `INSTANCE.12`).
 
 use super::deck::comparable;
 use super::{NodeSets, Unresolved};
@@ -7,10 +7,10 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::table::integer;
 use std::collections::{BTreeMap, HashMap};
 
-/// Instances that a message names.
+/// Number of instances that a message names.
 const NAMED: usize = 5;
 
-/// Members of a set, or why it cannot be resolved.
+/// Members of a set, or the reason why it cannot be resolved.
 pub(super) type Found<T> = Result<Vec<T>, Diagnostic>;
 
 /// Elements of one type.
@@ -18,11 +18,11 @@ pub(super) type Found<T> = Result<Vec<T>, Diagnostic>;
 pub(super) struct Elements {
     /// Type in upper case.
     pub kind: String,
-    /// Number and nodes of each.
+    /// Number and nodes of each element.
     pub members: Vec<(i64, Vec<i64>)>,
 }
 
-/// Nodes, elements and sets of a part, of the assembly, or of a deck that has neither.
+/// Nodes, elements and sets of a part, of the assembly, or of a deck without either.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Scope {
     pub nodes: BTreeMap<i64, [f64; 3]>,
@@ -32,7 +32,7 @@ pub(super) struct Scope {
 }
 
 impl Scope {
-    /// Nodes of the elements of a set, ascending.
+    /// Returns the nodes of the elements of a set, ascending.
     pub(super) fn nodes_of_elements(&self, set: &str) -> Option<Vec<i64>> {
         let wanted = self.element_sets.get(&comparable(set))?;
         let wanted: std::collections::HashSet<i64> = wanted.iter().copied().collect();
@@ -47,22 +47,22 @@ impl Scope {
     }
 }
 
-/// A node of a set.
+/// Node of a set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Member {
-    /// Place of its instance among all; `None` of a node of the scope that defines the set.
+    /// Index of the instance of the node; `None` for a node of the scope that defines the set.
     instance: Option<usize>,
     id: i64,
 }
 
 impl Member {
-    /// A node of the scope that defines the set.
+    /// Returns a node of the scope that defines the set.
     pub(super) fn own(id: i64) -> Self {
         Self { instance: None, id }
     }
 }
 
-/// The sets of a scope, in the order of the deck, with their names as written.
+/// Sets of a scope, in the order of the deck, with their names as written.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sets {
     all: Vec<(String, Found<Member>)>,
@@ -74,8 +74,8 @@ impl Sets {
         self.all.iter().find(|(own, _)| comparable(own) == name).map(|(_, members)| members)
     }
 
-    /// Adds members to the set of this name, which is made where there is none. A set with members that cannot be
-    /// resolved has none.
+    /// Adds members to the set of this name, which is created if necessary. A set with members that cannot be resolved
+    /// is an error as a whole.
     pub(super) fn extend(&mut self, name: &str, members: Found<Member>) {
         let wanted = comparable(name);
         let Some((_, own)) = self.all.iter_mut().find(|(own, _)| comparable(own) == wanted) else {
@@ -88,8 +88,8 @@ impl Sets {
         }
     }
 
-    /// The sets of the whole model: those of the assembly (or of a deck without one), and those of the instances,
-    /// each with its shift of node numbers, as `INSTANCE.SET` and, where one instance alone has it, as `SET`.
+    /// Returns the sets of the whole model: those of the assembly (or of a deck without one), and those of the
+    /// instances, each with its shift of node numbers, as `INSTANCE.SET` and, if a single instance has it, as `SET`.
     pub(super) fn of_model(&self, instances: &[(&str, &Scope, i64)]) -> (NodeSets, Unresolved) {
         let (mut sets, mut unresolved) = (NodeSets::new(), Unresolved::new());
         let mut add = |name: String, members: &Found<Member>, shift: i64| match members {
@@ -112,7 +112,7 @@ impl Sets {
                 let others = || instances.iter().filter(|(_, scope, _)| scope.sets.find(name).is_some());
                 match others().count() {
                     1 => add(name.clone(), members, *shift),
-                    // The first of them tells that there are several.
+                    // The first of several instances reports the ambiguity.
                     _ if instances[..k].iter().all(|(_, scope, _)| scope.sets.find(name).is_none()) => {
                         let names = others().take(NAMED).map(|(own, ..)| format!("{own}.{name}"));
                         add(name.clone(), &Err(ambiguous(name, &names.collect::<Vec<_>>())), 0);
@@ -130,12 +130,12 @@ fn ambiguous(name: &str, all: &[String]) -> Diagnostic {
     Diagnostic::new(Code::NodeSetUnknown, message).with_help(format!("name one of them: {}", all.join(", ")))
 }
 
-/// The instances that sets of the assembly pick nodes of.
+/// Instances from which sets of the assembly select nodes.
 pub(super) struct Instances<'s> {
     all: Vec<(&'s str, &'s Scope)>,
 }
 
-/// One of them.
+/// One instance of the assembly.
 pub(super) struct OneInstance<'s> {
     place: usize,
     scope: &'s Scope,
@@ -152,7 +152,7 @@ impl<'s> Instances<'s> {
         Some(OneInstance { place, scope: self.all[place].1 })
     }
 
-    /// The nodes of `INSTANCE.12` or `INSTANCE.SET`; names may have dots themselves.
+    /// Returns the nodes of `INSTANCE.12` or `INSTANCE.SET`. Names may contain dots.
     pub(super) fn named(&self, name: &str) -> Option<Vec<Member>> {
         name.match_indices('.').find_map(|(dot, _)| {
             let (instance, rest) = (self.find(&name[..dot])?, &name[dot + 1..]);
@@ -160,7 +160,7 @@ impl<'s> Instances<'s> {
         })
     }
 
-    /// The nodes of an element set of an instance.
+    /// Returns the nodes of an element set of an instance.
     pub(super) fn nodes_of_elements(&self, instance: &str, set: &str) -> Option<Vec<Member>> {
         let one = self.find(instance)?;
         let nodes = one.scope.nodes_of_elements(set)?;
@@ -173,7 +173,7 @@ impl OneInstance<'_> {
         Member { instance: Some(self.place), id }
     }
 
-    /// The nodes of a set of the instance.
+    /// Returns the nodes of a set of the instance.
     pub(super) fn set(&self, name: &str) -> Option<Vec<Member>> {
         let members = self.scope.sets.find(name)?.as_ref().ok()?;
         Some(members.iter().map(|own| self.member(own.id)).collect())

@@ -5,8 +5,7 @@ use super::deck_mesh::DeckMesh;
 use flexbody_base::text::table::integer;
 use std::collections::{BTreeSet, HashMap};
 
-/// Nodes of the faces S1 to S6 of a hexahedron, numbered from 1 in the order of C3D20; C3D8 has those up to
-/// 8.
+/// Nodes of the faces S1 to S6 of a hexahedron, numbered from 1 in the order of C3D20; C3D8 has the first 8 nodes.
 const HEXAHEDRON: &[&[usize]] = &[
     &[1, 2, 3, 4, 9, 10, 11, 12],
     &[5, 6, 7, 8, 13, 14, 15, 16],
@@ -16,12 +15,11 @@ const HEXAHEDRON: &[&[usize]] = &[
     &[4, 1, 5, 8, 12, 17, 16, 20],
 ];
 
-/// Nodes of the faces S1 to S4 of a tetrahedron, numbered from 1 in the order of C3D10; C3D4 has those up to
-/// 4.
+/// Nodes of the faces S1 to S4 of a tetrahedron, numbered from 1 in the order of C3D10; C3D4 has the first 4 nodes.
 const TETRAHEDRON: &[&[usize]] =
     &[&[1, 2, 3, 5, 6, 7], &[1, 2, 4, 5, 9, 8], &[2, 3, 4, 6, 10, 9], &[1, 4, 3, 8, 10, 7]];
 
-/// Nodes of the faces S1 to S5 of a wedge, numbered from 1 in the order of C3D15; C3D6 has those up to 6.
+/// Nodes of the faces S1 to S5 of a wedge, numbered from 1 in the order of C3D15; C3D6 has the first 6 nodes.
 const WEDGE: &[&[usize]] = &[
     &[1, 2, 3, 7, 8, 9],
     &[4, 5, 6, 10, 11, 12],
@@ -30,9 +28,9 @@ const WEDGE: &[&[usize]] = &[
     &[3, 1, 4, 6, 9, 13, 12, 15],
 ];
 
-/// Returns the nodes of the surface `name` (in upper case), given by nodes or by faces of solid elements. A
-/// surface of nodes goes before one of faces that has the same name. Returns `None` if there is no such
-/// surface, or if it has sets that the deck does not define or faces of other elements.
+/// Returns the nodes of the surface `name` (in upper case), given by nodes or by faces of solid elements. A surface of
+/// nodes takes precedence over one of faces with the same name. Returns `None` if there is no such surface, or if it
+/// has sets that the deck does not define or faces of other elements.
 pub(super) fn nodes_of_surface(deck: &Deck, mesh: &DeckMesh, name: &str) -> Option<BTreeSet<i64>> {
     let is_wanted = |card: &&Card| card.keyword == "SURFACE" && card.name("NAME").as_deref() == Some(name);
     let is_of_nodes = |card: &Card| card.name("TYPE").as_deref() == Some("NODE");
@@ -101,8 +99,8 @@ mod tests {
     use super::*;
     use std::fs;
 
-    /// A surface of nodes has the members of its sets once, one of faces the nodes of the faces, mid-side
-    /// nodes included; what cannot be resolved is no surface.
+    /// A surface of nodes has each member of its sets once, a surface of faces the nodes of the faces, mid-side nodes
+    /// included. A surface that cannot be resolved is none.
     #[test]
     fn surfaces_are_sets_of_nodes() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -1,8 +1,8 @@
 //! Reference nodes of `*DISTRIBUTING COUPLING` of CalculiX.
 //!
-//! Such a coupling makes the displacement of its reference node the mean of those of its nodes, with weights, and
-//! eliminates the first of these. The coordinates of the reference node mean nothing to CalculiX; a rigid motion moves it
-//! as the mean of the places of the nodes, which is where its rows are.
+//! Such a coupling makes the displacement of its reference node the weighted mean of those of its nodes, and eliminates
+//! the first of these nodes. CalculiX does not use the coordinates of the reference node. In a rigid motion it moves as
+//! the mean of the node positions, so this mean is the position of its rows.
 
 use super::Found;
 use super::deck::{Card, Deck, fields};
@@ -17,7 +17,7 @@ use std::path::Path;
 
 const HELP: &str = "write *DISTRIBUTING COUPLING, ELSET=E with one element of type DCOUP3D in E and lines `node or set, weight`; or take it out of the deck and name its nodes as an averaging interface: --interface NAME=SET,averaging";
 
-/// Returns the reference nodes of the couplings of a deck, each with the mean of the places of its nodes.
+/// Returns the reference nodes of the couplings of a deck, each with the mean of the positions of its nodes.
 ///
 /// # Errors
 /// FB111 for a coupling whose reference node or nodes cannot be identified.
@@ -27,7 +27,7 @@ pub(super) fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i
     for card in deck.cards().iter().filter(is_coupling) {
         let node = reference_node(card, mesh).map_err(|why| refused(deck, card, &why))?;
         let sum = sums.entry(node).or_insert(Sum { card, moment: Vector3::zeros(), total: 0.0 });
-        // Data that goes on in another file has a card of its own.
+        // Data that continue in another file have a separate card.
         for (line, text) in deck.data(card) {
             let (places, weight) = weighted(text, mesh).ok_or_else(|| {
                 let text = printable(text);
@@ -48,7 +48,7 @@ pub(super) fn reference_places(deck: &Deck, mesh: &DeckMesh) -> Found<BTreeMap<i
     sums.into_iter().map(mean).collect()
 }
 
-/// Places of nodes, summed up with their weights.
+/// Weighted sum of node positions.
 struct Sum<'d> {
     card: &'d Card,
     moment: Vector3<f64>,
@@ -60,7 +60,7 @@ fn refused(deck: &Deck, card: &Card, why: &str) -> Vec<Diagnostic> {
     vec![deck.about(card, Code::DeckUnsupported, message).with_help(HELP)]
 }
 
-/// Returns a note that names the reference nodes with rows, which lie elsewhere than the deck says.
+/// Returns a note that names the reference nodes with rows, whose positions differ from those in the deck.
 pub(super) fn placed_note(
     means: &BTreeMap<i64, [f64; 3]>,
     labels: &[DofLabel],
@@ -82,7 +82,7 @@ pub(super) fn placed_note(
 /// Returns the node of the only element of the set of a coupling.
 ///
 /// # Errors
-/// A set that is missing, or has other elements than one DCOUP3D, in words.
+/// The set is missing, or has other elements than one DCOUP3D; the error is in words.
 fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
     let set = card.name("ELSET").ok_or("ELSET is missing")?;
     let members = mesh.element_sets.get(&set).ok_or_else(|| format!("element set `{set}` is unknown"))?;
@@ -101,8 +101,8 @@ fn reference_node(card: &Card, mesh: &DeckMesh) -> Result<i64, String> {
     }
 }
 
-/// Returns the places of the nodes that a line names by a number or a set, and the weight of each; `None` for a line that
-/// names no node or set of the deck, or has no weight.
+/// Returns the positions of the nodes that a line names by a number or a set, and the weight of each; `None` for a line
+/// without a weight, or without a node or set of the deck.
 fn weighted(line: &[u8], mesh: &DeckMesh) -> Option<(Vec<[f64; 3]>, f64)> {
     let mut given = fields(line);
     let (name, weight) = (given.next()?, given.next()?);

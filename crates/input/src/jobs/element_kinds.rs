@@ -1,11 +1,11 @@
-//! What element types of Abaqus and CalculiX are made of.
+//! The properties of element types of Abaqus and CalculiX: nodes, directions and shapes.
 
 use flexbody_model::ElementShape;
 
-/// Family of an element type: what its nodes can do.
+/// Family of an element type, by the degrees of freedom of its nodes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Family {
-    /// Displacements in space.
+    /// Displacements in space: solids.
     Solid,
     /// Displacements in a plane: plane stress, plane strain.
     Plane,
@@ -15,14 +15,14 @@ pub(super) enum Family {
     PlaneTurning,
     /// Displacements along a line or in a membrane.
     Pulling,
-    /// A mass at a node.
+    /// Mass at a node.
     Mass,
-    /// The inertia of a turning node.
+    /// Rotary inertia of a node.
     Turner,
 }
 
 impl Family {
-    /// Directions that a node of such an element has, 1 to 6.
+    /// Returns the directions that a node of such an element has, 1 to 6.
     pub(super) fn directions(self) -> &'static [u8] {
         match self {
             Self::Solid | Self::Pulling | Self::Mass => &[1, 2, 3],
@@ -34,7 +34,7 @@ impl Family {
     }
 }
 
-/// Family of an element type; `None` of one that is not known.
+/// Returns the family of an element type; `None` if it is unknown.
 pub(super) fn family(kind: &str) -> Option<Family> {
     let begins = |heads: &[&str]| heads.iter().any(|head| kind.starts_with(head));
     if begins(&["C3D", "SC6", "SC8", "CSS8"]) {
@@ -56,7 +56,7 @@ pub(super) fn family(kind: &str) -> Option<Family> {
     }
 }
 
-/// Number of nodes of an element type where it is in its name: `C3D20R`, `S8R`, `B32`.
+/// Returns the number of nodes of an element type if its name contains it: `C3D20R`, `S8R`, `B32`.
 pub(super) fn n_nodes(kind: &str) -> Option<usize> {
     let digits = |text: &str| -> Option<usize> {
         let end = text.find(|c: char| !c.is_ascii_digit()).unwrap_or(text.len());
@@ -79,38 +79,38 @@ pub(super) fn n_nodes(kind: &str) -> Option<usize> {
     }
 }
 
-/// True if elements of the type have nodes of their own besides those of the deck, with rows in the matrices.
+/// Returns true when elements of the type have internal nodes, which are not in the deck but have rows in the matrices.
 pub(super) fn has_internal_nodes(kind: &str) -> bool {
     kind.starts_with("B33") || kind.starts_with("B23") || kind.starts_with('B') && kind.ends_with('H')
 }
 
-/// What there is to draw of an element.
+/// Drawing of an element.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Drawing {
-    /// A shape, and its nodes in the order of the shape.
+    /// Shape, and its nodes in the order of the shape.
     Shape(ElementShape, Vec<i64>),
-    /// A point, or nothing.
+    /// A point, which is not drawn.
     Nothing,
-    /// The type or its number of nodes is not known.
+    /// Unknown type or number of nodes.
     Unknown,
 }
 
-/// How an element of a type is drawn that has these nodes.
+/// Returns the drawing of an element of a type with these nodes.
 pub(super) fn drawing(kind: &str, nodes: &[i64]) -> Drawing {
     let is_line =
         ["T2D", "T3D", "B21", "B22", "B23", "B31", "B32", "B33"].iter().any(|head| kind.starts_with(head));
-    // Beams may have a node more, which says how they are turned.
+    // Beams may have an additional node, which defines their orientation.
     let count = if is_line { n_nodes(kind).unwrap_or(nodes.len()).min(nodes.len()) } else { nodes.len() };
     let shape = match (family(kind), count) {
         (Some(Family::Mass | Family::Turner), _) => return Drawing::Nothing,
-        // The reference node of a distributing coupling.
+        // Element of the reference node of a distributing coupling.
         (None, 1) if kind == "DCOUP3D" => return Drawing::Nothing,
         (Some(Family::Solid), 4 | 10) => ElementShape::Tetrahedron,
         (Some(Family::Solid), 5 | 13) => ElementShape::Pyramid,
         (Some(Family::Solid), 6 | 15 | 18) => ElementShape::Wedge,
         (Some(Family::Solid), 8 | 20 | 27) => ElementShape::Hexahedron,
         (Some(_), 2 | 3) if is_line => {
-            // The node in the middle stands between the ends here, behind them in shapes.
+            // The middle node is between the end nodes in the element, but after them in the shape.
             let ends_first =
                 if count == 3 { vec![nodes[0], nodes[2], nodes[1]] } else { nodes[..2].to_vec() };
             return Drawing::Shape(ElementShape::Line, ends_first);

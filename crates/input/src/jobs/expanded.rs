@@ -1,11 +1,11 @@
 //! Elements that CalculiX expands into solids: several rows have the label of one node of the deck.
 //!
-//! A node at the corner of a quadratic shell (S6, S8, S8R) becomes three, on both faces and between them, one
-//! at the middle of an edge becomes two. The one between the faces has more mass than those beside it, since it is
-//! the middle of an edge of the solid. With the node of the deck at x, the vector d through the thickness and the
-//! OFFSET o of the section they lie at x - (1/2 + o) d, x - o d and x + (1/2 - o) d, and K says what d is: K R = 0
-//! of the rigid rotations R leaves it no other. Where none of them lies at x, the one between the faces has the
-//! number of the node; others get numbers that the deck does not have.
+//! A node at the corner of a quadratic shell (S6, S8, S8R) becomes three nodes, on both faces and between them; one at
+//! the middle of an edge becomes two. The middle node of three has more mass than the others, since it is in the middle
+//! of an edge of the solid. With the node of the deck at x, the vector d through the thickness and the OFFSET o of the
+//! section, the nodes are at x - (1/2 + o) d, x - o d and x + (1/2 - o) d. K determines d: it follows from K R = 0 for
+//! the rigid rotations R. If none of the three is at x, the middle one keeps the number of the node; others get numbers
+//! that the deck does not have.
 
 use super::Found;
 use super::deck::Deck;
@@ -17,31 +17,31 @@ use flexbody_model::{DofLabel, RawMatrix};
 use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 
-/// Elements that are expanded, and those among them whose rows can be told apart.
+/// Prefixes of the types of expanded elements; `SHELLS` are the types among them whose rows can be identified.
 const EXPANDED: &[&str] = &["S", "B", "CPS", "CPE", "CAX", "M3D", "T3D", "T2D"];
 const SHELLS: &[&str] = &["S6", "S8", "S8R"];
 
 /// Part of the size of the body by which the rows of a node may differ from those of a point.
 const POINT: f64 = 1e-6;
 
-/// Labels of which each stands for one row, and places of nodes that lie elsewhere than the deck says, most of
-/// which it does not have.
+/// Unique labels of the rows, and the positions of nodes that differ from the deck; most of these nodes are not in the
+/// deck.
 pub(super) struct Once {
     pub labels: Vec<DofLabel>,
     pub places: BTreeMap<i64, [f64; 3]>,
 }
 
-/// A node of the deck that has become several.
+/// Node of the deck that was expanded into several nodes.
 struct Expanded {
     node: i64,
-    /// First row of each, from one face to the other, and how much of d it lies off the node of the deck.
+    /// First row of each copy, from one face to the other, and its distance from the node of the deck in units of d.
     copies: Vec<(usize, f64)>,
 }
 
-/// Labels each row once.
+/// Gives each row a unique label.
 ///
 /// # Errors
-/// FB111 where rows of one label cannot be told apart, or K does not say where they belong.
+/// FB111 if rows with one label cannot be identified, or K does not determine their positions.
 pub(super) fn label_once(
     deck: &Deck,
     mesh: &DeckMesh,
@@ -51,6 +51,7 @@ pub(super) fn label_once(
 ) -> Found<Once> {
     let mut rows: BTreeMap<i64, Vec<usize>> = BTreeMap::new();
     labels.iter().enumerate().for_each(|(row, label)| rows.entry(label.node).or_default().push(row));
+    // Nodes with more than one row in a direction were expanded.
     let is_repeated = |rows: &Vec<usize>| {
         let mut directions: Vec<u8> = rows.iter().map(|row| labels[*row].direction).collect();
         directions.sort_unstable();
@@ -65,6 +66,7 @@ pub(super) fn label_once(
     if kinds.is_empty() || !kinds.iter().all(|kind| SHELLS.contains(kind)) {
         return Err(refuse("the deck does not say where their nodes lie"));
     }
+    // Copies of each node from one face to the other, and the vector through the thickness from K.
     let offsets = offsets(deck, mesh, &rows).map_err(refuse)?;
     let mut all = Vec::new();
     for (&node, own) in &rows {
@@ -78,8 +80,8 @@ pub(super) fn label_once(
     numbered(mesh, labels, &all, &through).ok_or_else(|| refuse("their nodes have no numbers left"))
 }
 
-/// The rows of a node as points, each with the part of d by which it lies off the node; `None` where rows are no
-/// points, or none of three is the one between the faces.
+/// Returns the copies of a node with their distances from the node in units of d. `None` means that the rows are no
+/// points, or that no copy of three can be identified as the middle one.
 fn copies(rows: &[usize], labels: &[DofLabel], mass: &RawMatrix, offset: f64) -> Option<Vec<(usize, f64)>> {
     let is_vector = |own: &[usize]| {
         let direction = |k: usize| own.get(k).map(|row| (*row, labels[*row].direction));
@@ -95,7 +97,7 @@ fn copies(rows: &[usize], labels: &[DofLabel], mass: &RawMatrix, offset: f64) ->
     rows.chunks(3).all(is_vector).then(|| rows.chunks(3).zip(parts).map(place).collect())
 }
 
-/// OFFSET of the sections of the elements of each node, in parts of the thickness.
+/// Returns the OFFSET of the sections of the elements of each node, in parts of the thickness.
 fn offsets(
     deck: &Deck,
     mesh: &DeckMesh,
@@ -115,6 +117,7 @@ fn offsets(
         };
         of_elements.extend(members.iter().map(|element| (*element, offset)));
     }
+    // Nodes take the OFFSET of their elements, which must agree.
     let mut of_nodes: BTreeMap<i64, f64> = BTreeMap::new();
     for (element, own) in mesh.elements.iter().flat_map(|own| &own.members) {
         let offset = of_elements.get(element).copied().unwrap_or(0.0);
@@ -130,7 +133,7 @@ fn offsets(
     Ok(of_nodes)
 }
 
-/// Labels with a number for each point, and where these points lie; `None` if there are no numbers left.
+/// Returns labels with a number for each copy, and the positions of the copies; `None` if there are no numbers left.
 fn numbered(
     mesh: &DeckMesh,
     mut labels: Vec<DofLabel>,
@@ -159,8 +162,9 @@ fn numbered(
     Some(Once { labels, places })
 }
 
-/// Vectors d of the nodes. With R_b of the rows that are known, turned about each axis, those of a node at x move
-/// by e x x + c e x d, c being the parts of their copies: C'KC D = -C'K R_b. `None` where they are no points.
+/// Returns the vectors d of the nodes. With R_b of the known rows, rotated about each axis, the copies of a node at x
+/// move by e x x + c e x d, where c are the distances of the copies: C'KC D = -C'K R_b. `None` means that the rows are
+/// no points.
 fn thickness(
     stiffness: &RawMatrix,
     labels: &[DofLabel],
@@ -169,7 +173,7 @@ fn thickness(
 ) -> Option<Vec<[f64; 3]>> {
     let n = labels.len();
     let size = nodes.values().flatten().fold(0.0f64, |size, x| size.max(x.abs()));
-    // Unknown of each row, and its part.
+    // Index of the unknown of each row, and the distance of its copy.
     let mut unknown = vec![None; n];
     for (at, Expanded { node, copies }) in all.iter().enumerate() {
         nodes.get(node)?;
@@ -181,13 +185,14 @@ fn thickness(
         let DofLabel { node, direction } = labels[row];
         let Some(x) = nodes.get(&node) else { return 0.0 };
         let k = usize::from(direction) - 1;
-        // e_a x x along k.
+        // Component k of e_a x x.
         match (k + 3 - axis) % 3 {
             1 => -x[(axis + 2) % 3],
             2 => x[(axis + 1) % 3],
             _ => 0.0,
         }
     };
+    // Matrix C'KC and load -C'K R_b.
     let mut load = Mat::zeros(3 * all.len(), 3);
     let mut entries = Vec::new();
     for column in 0..n {
@@ -204,7 +209,8 @@ fn thickness(
     let turned = solved(&own, &load)?;
     let vector = |at: usize| {
         let entry = |k: usize, axis: usize| turned[(3 * at + k, axis)];
-        // The two entries that a coordinate has, and how far the rows are from those of a point.
+        // Each coordinate of d appears in two entries; the other entries measure the deviation of the rows from those
+        // of a point.
         let pairs = [0, 1, 2].map(|c| (entry((c + 1) % 3, (c + 2) % 3), -entry((c + 2) % 3, (c + 1) % 3)));
         let differs = pairs.iter().map(|(a, b)| (a - b).abs()).chain((0..3).map(|k| entry(k, k).abs()));
         (differs.fold(0.0, f64::max) <= POINT * size).then(|| pairs.map(|(a, b)| 0.5 * (a + b)))
@@ -212,7 +218,7 @@ fn thickness(
     (0..all.len()).map(vector).collect()
 }
 
-/// Solves A X = B for a positive definite matrix, with one step of refinement; `None` for another matrix.
+/// Solves A X = B for a positive definite matrix, with one step of refinement; returns `None` for another matrix.
 fn solved(own: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
     let n = own.n();
     let unit: Vec<_> = (0..n as u32).map(|i| (i, i, 1.0)).collect();
@@ -228,7 +234,7 @@ fn solved(own: &SymmetricMatrix, load: &Mat<f64>) -> Option<Mat<f64>> {
     Some(solution)
 }
 
-/// Types of the expanded elements of a deck.
+/// Returns the types of the expanded elements of a deck.
 fn expanded_kinds(mesh: &DeckMesh) -> Vec<&str> {
     let expanded = |kind: &&str| EXPANDED.iter().any(|head| kind.starts_with(head));
     let mut kinds: Vec<&str> = mesh.elements.iter().map(|own| own.kind.as_str()).filter(expanded).collect();

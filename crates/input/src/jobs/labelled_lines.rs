@@ -1,5 +1,5 @@
-//! Matrices whose lines name node and direction of row and column, as Abaqus writes them with FORMAT=MATRIX INPUT
-//! or LABELS: `node, direction, node, direction, value`. Their rows are the labels in ascending order.
+//! Matrices whose lines name node and direction of row and column, as Abaqus writes them with FORMAT=MATRIX INPUT or
+//! LABELS: `node, direction, node, direction, value`. Their rows are the labels in ascending order.
 
 use super::deck::fields;
 use super::{Found, FromFile, both};
@@ -16,13 +16,14 @@ use flexbody_model::{DofLabel, RawMatrix};
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Bad lines of a file that are told one by one.
+/// Number of bad lines of a file that are reported one by one.
 const SHOWN: usize = 5;
 
-/// Two matrices and the labels of their rows.
+/// Reads two matrices and the labels of their rows.
 ///
 /// # Errors
-/// FB101, FB132, FB301 for their lines, and those of [`assemble`].
+/// FB101 for files that cannot be read, FB132 for files that changed, FB301 for bad lines, and the errors of
+/// [`assemble`].
 pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2])> {
     let ((k, k_file), (m, m_file)) = both(LabelledLines::read(paths[0]), LabelledLines::read(paths[1]))?;
     let all = [&k, &m].into_iter().flat_map(|own| &own.pieces).flat_map(|piece| &piece.labels);
@@ -33,7 +34,7 @@ pub(super) fn labelled(paths: [&Path; 2]) -> Found<(Vec<DofLabel>, [FromFile; 2]
     Ok((labels, [(k, k_file), (m, m_file)]))
 }
 
-/// Whether the first line of data of a matrix names nodes and directions: it has fields with commas.
+/// Returns true when the first line of data of a matrix names nodes and directions: it has fields with commas.
 pub(super) fn has_labels(path: &Path) -> Found<bool> {
     let file = InputFile::open_unread(path).map_err(|diagnostic| vec![diagnostic])?;
     let mut blocks = Blocks::of(&file, Compression::None);
@@ -49,7 +50,7 @@ fn is_data(line: &[u8]) -> bool {
     !line.is_empty() && !line.starts_with(b"*")
 }
 
-/// The lines of a file.
+/// Lines of a file.
 struct LabelledLines {
     pieces: Vec<LabelledEntries>,
 }
@@ -65,13 +66,13 @@ impl LabelledLines {
             pieces.par_extend(texts.into_par_iter().map(LabelledEntries::parse));
             blocks.take_back(block);
         }
-        // What is wrong with a file that changed meanwhile may be wrong for this reason.
+        // A change of the file during reading may be the cause of other problems, so it is reported first.
         file.refuse_changed().map_err(one)?;
         let bad = bad_lines(&pieces, path);
         if bad.is_empty() { Ok((Self { pieces }, file.seen().map_err(one)?)) } else { Err(bad) }
     }
 
-    /// The matrix whose rows have the ascending `labels`.
+    /// Returns the matrix with rows in the order of the ascending `labels`.
     fn into_matrix(self, labels: &[DofLabel], path: &Path) -> Found<RawMatrix> {
         let n = labels.len() as u64;
         let count = self.pieces.iter().map(|piece| piece.entries.len() as u64).sum();
@@ -100,14 +101,14 @@ fn bad_lines(pieces: &[LabelledEntries], path: &Path) -> Vec<Diagnostic> {
     told
 }
 
-/// Some lines. Rows and columns of the entries are places in `labels`, where a label may stand more than once.
+/// Entries of some lines. Rows and columns are indices in `labels`, where a label may occur more than once.
 #[derive(Default)]
 struct LabelledEntries {
     entries: Vec<Entry>,
     labels: Vec<DofLabel>,
     written: u8,
     lines: usize,
-    /// The first bad lines: number within the piece, from 1, and what is wrong.
+    /// First bad lines: number within the piece, from 1, and problem.
     bad: Vec<(usize, Diagnostic)>,
 }
 
@@ -142,7 +143,7 @@ impl LabelledEntries {
         piece
     }
 
-    /// The entries with the places of their labels among all.
+    /// Returns the entries with rows and columns as indices in `all`.
     fn numbered(mut self, all: &[DofLabel]) -> Vec<Entry> {
         let at = |label: &DofLabel| all.binary_search(label).expect("every label is listed") as u32;
         let place: Vec<u32> = self.labels.iter().map(at).collect();
@@ -153,7 +154,7 @@ impl LabelledEntries {
     }
 }
 
-/// Row, column, value and the value as written.
+/// Returns row, column, value and the value as written; `None` for a line of another form.
 fn labelled_line(text: &[u8]) -> Option<(DofLabel, DofLabel, f64, &[u8])> {
     let mut parts = fields(text);
     let mut label = || {
@@ -172,7 +173,8 @@ mod tests {
     use super::*;
     use std::fmt::Write;
 
-    /// Nodes 3, 10, 17, ... far apart and in no order, a chain of springs on each direction; more than two pieces.
+    /// Returns a text of springs between nodes 3, 10, 17, ... in no order, in each direction, and the node numbers; the
+    /// text has more than two pieces.
     fn chain(nodes: usize) -> (String, Vec<i64>) {
         let ids: Vec<i64> = (0..nodes as i64).map(|k| 3 + 7 * ((k * 7919) % nodes as i64)).collect();
         let mut text = String::from("** a comment\n");

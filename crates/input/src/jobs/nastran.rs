@@ -1,5 +1,5 @@
-//! Jobs of Nastran: a deck (.bdf, .dat, .nas), or a punch file with the grids of a superelement, and the
-//! matrices in it or beside it: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
+//! Jobs of Nastran: a deck (.bdf, .dat, .nas), or a punch file with the grids of a superelement, and the matrices in it
+//! or in its folder: DMIG cards, which name their rows, or OUTPUT4, whose rows follow the points.
 
 mod assigned;
 mod bulk;
@@ -25,10 +25,10 @@ use std::collections::HashMap;
 use std::path::Path;
 use systems::Systems;
 
-/// Bytes in which a deck is recognised: comments may stand above its first card.
+/// Number of bytes in which a deck is recognised: comments may precede its first card.
 const DECK_HEAD: usize = 1 << 20;
 
-/// The reader of Nastran jobs.
+/// Reader of Nastran jobs.
 pub(super) struct Nastran;
 
 impl JobReader for Nastran {
@@ -73,7 +73,7 @@ impl JobReader for Nastran {
         let given_rows = matrices.given_rows(axes);
         let unresolved = Unresolved::new();
         let Matrices { stiffness, mass, labels: dofs, .. } = matrices;
-        // Condensed matrices leave no element all of its nodes.
+        // With condensed matrices no element has all of its nodes.
         let elements = if bulk.is_condensed() { Elements::default() } else { bulk.elements };
         Ok(JobModel {
             stiffness,
@@ -90,7 +90,8 @@ impl JobReader for Nastran {
     }
 }
 
-/// Places of the grids in the basic system, and the axes of the rows of those that stand along others.
+/// Returns the positions of the grids in the basic system, and the row axes of grids with other axes than the basic
+/// ones.
 fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
     const SHOWN: usize = 5;
     let mut systems = Systems::new(&bulk.systems, &bulk.grids);
@@ -119,11 +120,10 @@ fn places(bulk: &Bulk) -> Found<(Nodes, HashMap<i64, Axes>)> {
     if bad.is_empty() { Ok((nodes, axes)) } else { Err(bad) }
 }
 
-/// The grids, sets and elements of a deck whose matrices come from elsewhere.
+/// Returns the grids, sets and elements of a deck for matrices from other files.
 ///
 /// # Errors
-/// Those of [`Bulk::read`], and FB111 where rows of grids stand along other axes than those of the basic
-/// system.
+/// The errors of [`Bulk::read`]; FB111 if rows of grids are along other axes than those of the basic system.
 pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
     let bulk = Bulk::read(path)?;
     let (nodes, axes) = places(&bulk)?;
@@ -140,7 +140,7 @@ pub(crate) fn nodes_of_bulk(path: &Path) -> Found<NodeFile> {
     Ok(NodeFile { nodes, sets, elements: bulk.elements, followers, ..NodeFile::default() })
 }
 
-/// What the deck says that a user should know.
+/// Returns warnings and notes about the deck.
 fn told(bulk: &Bulk, path: &Path) -> Vec<Diagnostic> {
     let mut found = Vec::new();
     if bulk.has_elements && !bulk.coupled_mass {

@@ -1,10 +1,9 @@
 //! Nodes of CalculiX whose directions 1 to 3 are rotations of a reference node.
 //!
-//! ROT NODE of *RIGID BODY names such a node. *COUPLING with *KINEMATIC makes one that the deck does not
-//! have, and its number follows from the deck: CalculiX reads all *NODE cards, then all *COUPLING cards in
-//! their order, and only then the cards and elements that make further nodes. Each kinematic coupling takes
-//! the next number for its rotation node, and numbers without rows for its equations (see
-//! [`Coupling::n_numbers`]).
+//! ROT NODE of *RIGID BODY names such a node. *COUPLING with *KINEMATIC creates a node that is not in the deck, but its
+//! number follows from the deck: CalculiX reads all *NODE cards, then all *COUPLING cards in their order, and then the
+//! cards and elements that create further nodes. Each kinematic coupling takes the next number for its rotation node,
+//! and further numbers without rows for its equations (see [`Coupling::n_numbers`]).
 
 use super::Found;
 use super::deck::{Card, Deck, fields};
@@ -15,16 +14,16 @@ use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 use std::collections::{BTreeSet, HashMap};
 
-/// Internal nodes of an element with incompatible modes (C3D8I).
+/// Number of internal nodes of an element with incompatible modes (C3D8I).
 const INTERNAL_NODES: usize = 3;
 
 const HELP: &str = "run CalculiX again if the deck has changed since; else write *RIGID BODY, NSET=SET, REF NODE=A, ROT NODE=B instead of the coupling";
 
-/// Returns the rotation nodes of a deck, each with the reference node that turns. `labels` are the rows as
-/// CalculiX labels them.
+/// Returns the rotation nodes of a deck, each with the reference node that rotates. `labels` are the labels of the rows
+/// by CalculiX.
 ///
 /// # Errors
-/// FB111 if the rows that are rotations, or the node that they turn, cannot be identified.
+/// FB111 if the rows that are rotations, or their reference node, cannot be identified.
 pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<HashMap<i64, i64>> {
     let mut rotations = named_rotation_nodes(deck)?;
     rotations.extend(made_rotation_nodes(deck, mesh, labels)?);
@@ -32,7 +31,7 @@ pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) 
     let mut turned: HashMap<i64, i64> = HashMap::new();
     let mut nodes = HashMap::new();
     for Rotation { node, reference, card } in rotations {
-        // One rotation node turns one reference node, and no reference node has rotations of two.
+        // A rotation node belongs to one reference node, and a reference node has one rotation node.
         if let Some(other) = nodes.insert(node, reference).filter(|other| *other != reference) {
             let message = format!("ROT NODE {node} is that of two reference nodes, {other} and {reference}");
             let diagnostic = deck.about(card, Code::DeckUnsupported, message);
@@ -50,7 +49,7 @@ pub(super) fn rotation_nodes(deck: &Deck, mesh: &DeckMesh, labels: &[DofLabel]) 
     Ok(nodes)
 }
 
-/// A rotation node, the reference node that it turns, and the card that says so.
+/// Rotation node, its reference node, and the card that defines them.
 struct Rotation<'d> {
     node: i64,
     reference: i64,
@@ -84,13 +83,13 @@ fn named_rotation_nodes(deck: &Deck) -> Found<Vec<Rotation<'_>>> {
 /// A *COUPLING with *KINEMATIC.
 struct Coupling<'d> {
     card: &'d Card,
-    /// Lines of directions below *KINEMATIC.
+    /// Number of lines of directions below *KINEMATIC.
     n_lines: usize,
 }
 
 impl Coupling<'_> {
-    /// Returns the kinematic couplings of a deck in their order. *DISTRIBUTING only spreads loads over a
-    /// surface: it makes no nodes, and its reference node has no rows.
+    /// Returns the kinematic couplings of a deck in their order. *DISTRIBUTING only distributes loads over a surface:
+    /// it creates no nodes, and its reference node has no rows.
     fn all(deck: &Deck) -> Vec<Coupling<'_>> {
         let cards = deck.cards();
         let mut couplings = Vec::new();
@@ -104,10 +103,10 @@ impl Coupling<'_> {
         couplings
     }
 
-    /// Returns how many numbers the coupling takes besides that of its rotation node. Each line of directions
-    /// makes one node for each node of the surface; with ORIENTATION every node of the surface makes a copy
-    /// of itself and one node for the copy's equations, and the lines make none. Returns `None` if the nodes
-    /// of the surface are unknown.
+    /// Returns the number of node numbers that the coupling takes besides that of its rotation node. Each line of
+    /// directions creates one node for each node of the surface. With ORIENTATION every node of the surface creates a
+    /// copy of itself and one node for the equations of the copy, and the lines create none. Returns `None` if the
+    /// nodes of the surface are unknown.
     fn n_numbers(&self, deck: &Deck, mesh: &DeckMesh) -> Option<i64> {
         let nodes = nodes_of_surface(deck, mesh, &self.card.name("SURFACE")?)?.len();
         let for_each = if self.card.parameter("ORIENTATION").is_some() { 2 } else { self.n_lines };
@@ -140,17 +139,17 @@ impl Coupling<'_> {
     }
 }
 
-/// A kinematic coupling with its reference node, and the number that its rotation node has by the deck.
+/// Kinematic coupling with its reference node, and the number of its rotation node by the deck.
 struct Numbered<'d> {
     coupling: Coupling<'d>,
     reference: i64,
     node: i64,
 }
 
-/// Returns the rotation nodes that kinematic couplings make and that have rows.
+/// Returns the rotation nodes that kinematic couplings create and that have rows.
 ///
 /// # Errors
-/// FB111 if rows of nodes that the deck does not have are not those that its couplings make.
+/// FB111 if rows of nodes outside the deck are not those that its couplings create.
 fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel]) -> Found<Vec<Rotation<'d>>> {
     let mut next = mesh.nodes.keys().next_back().and_then(|highest| highest.checked_add(1));
     let mut end = i64::MIN;
@@ -164,21 +163,20 @@ fn made_rotation_nodes<'d>(deck: &'d Deck, mesh: &DeckMesh, labels: &[DofLabel])
             return coupling.refuse(deck, reference, why, help);
         };
         next = coupling.n_numbers(deck, mesh).and_then(|count| node.checked_add(count)?.checked_add(1));
-        // Numbers below this are those of couplings.
+        // Numbers below `end` belong to couplings.
         end = next.unwrap_or(node);
         numbered.push(Numbered { coupling, reference, node });
     }
     let Some(last) = numbered.last() else { return Ok(Vec::new()) };
     let expected: BTreeSet<i64> = numbered.iter().map(|own| own.node).collect();
-    // Nodes that have rows, but no place in the deck: rotation nodes, and others beyond their numbers.
+    // Nodes with rows but without a position in the deck: rotation nodes, and others with higher numbers.
     let made: BTreeSet<i64> =
         labels.iter().map(|label| label.node).filter(|node| !mesh.nodes.contains_key(node)).collect();
     let others: Vec<i64> = made.difference(&expected).copied().collect();
     let stray = others.first().filter(|other| **other < end);
     let n_internal = INTERNAL_NODES * n_with_internal_nodes(mesh);
     let is_explained = others.len() == n_internal;
-    // A coupling has no rows if all its nodes follow another coupling, or if the deck is not the one that was
-    // run.
+    // A coupling has no rows if all its nodes follow another coupling, or if the deck is not the one that was run.
     let absent = numbered.iter().find(|own| own.coupling.n_lines > 0 && !made.contains(&own.node));
     let Numbered { coupling, reference, node } = absent.unwrap_or(last);
     match stray {

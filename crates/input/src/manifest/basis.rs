@@ -1,5 +1,5 @@
-//! The table `[basis]`: what the command line may say about the basis, kept with the model. What the command
-//! line says replaces it.
+//! The table `[basis]`: settings of the basis that are stored with the model. Settings on the command line replace
+//! them.
 
 use super::{ManifestWalk, MatrixLocation, TomlTable};
 use crate::LoadSource;
@@ -10,8 +10,7 @@ use toml::de::DeValue;
 pub(super) const BASIS: &[&str] = &["residual_vectors", "loads"];
 
 impl ManifestWalk<'_, '_> {
-    /// The loads of residual vectors; empty without the table, and with something in `found` when it is
-    /// wrong.
+    /// Reads the loads of residual vectors. The list is empty without the table; errors are in `found`.
     pub(super) fn residual_vectors(&mut self, top: &TomlTable) -> Vec<LoadSource> {
         let Some((table, _)) = self.table(top, "basis") else { return Vec::new() };
         self.known_keys(table, "[basis]", BASIS);
@@ -20,7 +19,7 @@ impl ManifestWalk<'_, '_> {
         loads
     }
 
-    /// Nodal forces of the user.
+    /// Reads the file of nodal forces of the user.
     fn load_file(&mut self, table: &TomlTable) -> Option<LoadSource> {
         let file = self.string(table, "loads")?;
         let folder = self.path.parent().unwrap_or(Path::new(""));

@@ -9,7 +9,7 @@ pub(super) const DAMPING: &[&str] = &["ratio", "bands", "rayleigh", "matrix"];
 pub(super) const RAYLEIGH: &[&str] = &["alpha", "beta"];
 
 impl ManifestWalk<'_, '_> {
-    /// `None` without the table, and with something in `found` when it is wrong.
+    /// Reads the damping. `None` means that there is no table, or that `found` has errors.
     pub(super) fn damping(&mut self, top: &TomlTable) -> Option<Damping<MatrixLocation>> {
         let (table, span) = self.table(top, "damping")?;
         self.known_keys(table, "[damping]", DAMPING);

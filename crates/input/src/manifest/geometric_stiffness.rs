@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::DeValue;
 
-/// `file`, `interface`, and the kinds of loads.
+/// Keys `file`, `interface`, and the kinds of loads.
 pub(super) const GEOMETRIC_STIFFNESS: &[&str] = &[
     "file",
     "interface",
@@ -20,7 +20,7 @@ pub(super) const GEOMETRIC_STIFFNESS: &[&str] = &[
 ];
 
 impl ManifestWalk<'_, '_> {
-    /// Whatever is not in the list is in `found`.
+    /// Reads the geometric stiffness of unit loads. Entries with errors are left out; the errors are in `found`.
     pub(super) fn geometric_stiffness(&mut self, top: &TomlTable) -> Vec<GeometricStiffness<MatrixLocation>> {
         const EXPECTED: &str = "a list of tables: write [[geometric_stiffness]]";
         let Some(value) = top.get("geometric_stiffness") else { return Vec::new() };
@@ -54,7 +54,7 @@ impl ManifestWalk<'_, '_> {
         Some(GeometricStiffness { load, matrix: MatrixLocation::parse(file?).relative_to(folder) })
     }
 
-    /// The load whose stress it is: one key with the axis (or the name of the load) as its value.
+    /// Reads the load that causes the stress: one key with the axis (or the name of the load) as its value.
     fn unit_load(&mut self, table: &TomlTable, span: Range<usize>) -> Option<UnitLoad> {
         let given: Vec<&str> =
             LoadKind::NAMES.iter().copied().filter(|name| table.contains_key(*name)).collect();

@@ -23,14 +23,14 @@ pub(super) const INTERFACE: &[&str] = &[
     "reference_node",
 ];
 
-/// Interfaces of a body: each takes sixteen entries of its file, which has at most 100,000.
+/// Largest number of interfaces of a body: each takes sixteen entries of its file, which has at most 100,000.
 const MOST_INTERFACES: usize = 6000;
 
-/// Keys of [`INTERFACE`] that say which nodes it has.
+/// Keys of [`INTERFACE`] that select the nodes.
 const NODES: &[&str] = &["nodes", "nodes_file", "set", "box", "cylinder", "plane", "nearest"];
 
 impl ManifestWalk<'_, '_> {
-    /// `None` when anything is wrong with the list.
+    /// Reads the interfaces. `None` means that the list has errors.
     pub(super) fn interfaces(&mut self, top: &TomlTable, dimension: usize) -> Option<Vec<InterfaceSource>> {
         let Some(value) = top.get("interface") else {
             return Some(Vec::new());
@@ -74,8 +74,8 @@ impl ManifestWalk<'_, '_> {
             self.complain(Code::ManifestSyntax, span.clone(), "interface has no name".into());
         }
         let name = self.string(table, "name")?;
-        // The name becomes a group of the flex-body file, where a slash is encoded, and a word in files of
-        // text, where a line break cannot be.
+        // The name becomes a group of the flex-body file, where a slash is encoded, and a word in text files, which
+        // cannot contain a line break.
         if name.is_empty() || name.chars().any(char::is_control) {
             let message =
                 format!("interface name `{}` is empty or has control characters", name.escape_debug());
@@ -109,7 +109,7 @@ impl ManifestWalk<'_, '_> {
         Some(InterfaceSource { name, nodes, coupling, reference })
     }
 
-    /// Which nodes an interface has: one key says it.
+    /// Reads the nodes of an interface, which exactly one key selects.
     fn interface_nodes(
         &mut self,
         table: &TomlTable,
@@ -153,7 +153,7 @@ impl ManifestWalk<'_, '_> {
         coupling
     }
 
-    /// A point in space; in the plane its two coordinates.
+    /// Reads a point in space, or its two coordinates in the plane.
     pub(super) fn point(&mut self, key: &str, value: &Value, dimension: usize) -> Option<[f64; 3]> {
         let coordinates: Option<Vec<f64>> = match value.get_ref() {
             DeValue::Array(list) => list.iter().map(real).collect(),

@@ -1,4 +1,4 @@
-//! Regions whose nodes an interface has: `box`, `cylinder`, `plane`, `nearest`.
+//! The regions that select the nodes of an interface: `box`, `cylinder`, `plane`, `nearest`.
 
 use super::{ManifestWalk, TomlTable, Value, integer, real};
 use crate::region::Region;
@@ -12,7 +12,7 @@ pub(super) const PLANE: &[&str] = &["point", "normal", "within"];
 pub(super) const NEAREST: &[&str] = &["point", "count"];
 
 impl ManifestWalk<'_, '_> {
-    /// The region of the key `key`.
+    /// Reads the region of the key `key`.
     pub(super) fn region(&mut self, key: &str, value: &Value, dimension: usize) -> Option<Region> {
         let DeValue::Table(table) = value.get_ref() else {
             self.mistyped(key, value, "a table");
@@ -77,7 +77,7 @@ impl ManifestWalk<'_, '_> {
         length
     }
 
-    /// A largest distance, or a list of the least and the largest.
+    /// Reads the largest distance, or a list of the smallest and the largest.
     fn radius(&mut self, table: &TomlTable, span: &Range<usize>) -> Option<[f64; 2]> {
         let Some(value) = table.get("radius") else { return self.lacks("cylinder", "radius", span) };
         let given: Option<Vec<f64>> = match value.get_ref() {
@@ -104,7 +104,7 @@ impl ManifestWalk<'_, '_> {
         count.map(|count| count as usize)
     }
 
-    /// The region, unless nothing can lie in it.
+    /// Returns the region unless it is empty by definition.
     fn sensible(&mut self, key: &str, region: &Region, span: Range<usize>) -> Option<Region> {
         let message = match region {
             Region::Box { min, max } if (0..3).any(|k| min[k] > max[k]) => "`min` lies beyond `max`",

@@ -7,7 +7,7 @@ use std::io::{ErrorKind, Read};
 
 pub(crate) type Found<T> = std::result::Result<T, Diagnostic>;
 
-/// Order of the bytes of numbers.
+/// Byte order of numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Order {
     Little,
@@ -15,7 +15,7 @@ pub(super) enum Order {
 }
 
 impl Order {
-    /// That of a file of version 5 that begins with `head`.
+    /// Returns the byte order of a file of version 5 that begins with `head`; `None` for other files.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         match head.get(124..128)? {
             b"\x00\x01IM" => Some(Self::Little),
@@ -24,7 +24,7 @@ impl Order {
         }
     }
 
-    /// The number that these bytes are, without regard to a sign.
+    /// Returns the bytes as a number, without regard to a sign.
     fn digits(self, bytes: &[u8]) -> u64 {
         let append = |number: u64, byte: &u8| number << 8 | u64::from(*byte);
         match self {
@@ -33,39 +33,39 @@ impl Order {
         }
     }
 
-    /// Two whole numbers of four bytes.
+    /// Returns two whole numbers of four bytes.
     pub(super) fn two(self, bytes: &[u8; 8]) -> [u32; 2] {
         [self.digits(&bytes[..4]) as u32, self.digits(&bytes[4..]) as u32]
     }
 }
 
-/// The elements that a variable consists of, one after the other.
+/// Consecutive elements of a variable.
 pub(super) struct Elements<'a> {
     stream: Box<dyn Read + 'a>,
     order: Order,
 }
 
 impl<'a> Elements<'a> {
-    /// Those in `body`, which is that of a variable.
+    /// Returns the elements in the body of a variable.
     pub(super) fn of(body: &'a [u8], compressed: bool, order: Order) -> Found<Self> {
         let mut elements = Self { stream: Box::new(body), order };
         if compressed {
             elements.stream = Box::new(flate2::read::ZlibDecoder::new(body));
-            // What is packed is a variable with its tag.
+            // Packed bytes hold a variable with its tag.
             elements.take(8)?;
         }
         Ok(elements)
     }
 
-    /// The next element.
+    /// Returns the next element.
     ///
     /// # Errors
-    /// FB103 for damaged packed bytes, FB304 where the variable ends within it or the element has more than `most`
-    /// bytes, FB601.
+    /// FB103 for damaged packed bytes, FB304 if the variable ends within the element or the element has more than
+    /// `most` bytes, FB601.
     pub(super) fn next(&mut self, most: u64) -> Found<Numbers> {
         let tag: [u8; 8] = self.take(8)?.try_into().expect("eight bytes were read");
         let [kind, length] = self.order.two(&tag);
-        // Up to four bytes stand in the tag itself.
+        // An element of up to four bytes is stored in the tag itself.
         if kind >> 16 != 0 {
             let bytes = tag[4..].get(..(kind >> 16) as usize).ok_or_else(|| {
                 Diagnostic::new(Code::MatrixSyntax, "an element within its tag is longer than that")
@@ -82,12 +82,12 @@ impl<'a> Elements<'a> {
             .map_err(|error| error.first_error().clone())?;
         let bytes = self.take(u64::from(length))?;
         let padding = u64::from(length).next_multiple_of(8) - u64::from(length);
-        // The last element of a file may lack it.
+        // The padding of the last element of a file may be missing.
         self.read(padding)?;
         Ok(Numbers { kind, bytes, order: self.order })
     }
 
-    /// Goes to the end, where the checksum of packed bytes stands.
+    /// Reads to the end, where the checksum of packed bytes is verified.
     pub(super) fn finish(mut self) -> Found<()> {
         std::io::copy(&mut self.stream, &mut std::io::sink()).map_err(damaged).map(|_| ())
     }
@@ -101,7 +101,7 @@ impl<'a> Elements<'a> {
         Err(Diagnostic::new(Code::MatrixCount, message).with_help(HELP))
     }
 
-    /// So many bytes, or those that there are.
+    /// Returns the next `length` bytes, or fewer at the end.
     fn read(&mut self, length: u64) -> Found<Vec<u8>> {
         let mut bytes = Vec::new();
         self.stream.by_ref().take(length).read_to_end(&mut bytes).map_err(damaged)?;
@@ -117,7 +117,7 @@ fn damaged(error: std::io::Error) -> Diagnostic {
     Diagnostic::new(Code::FileCompressionBroken, message).with_help(HELP)
 }
 
-/// The contents of an element: numbers of one type, or text.
+/// Content of an element: numbers of one type, or text.
 pub(super) struct Numbers {
     kind: u32,
     pub bytes: Vec<u8>,
@@ -125,7 +125,7 @@ pub(super) struct Numbers {
 }
 
 impl Numbers {
-    /// Bytes of a number; `None` where the element is none of numbers.
+    /// Returns the bytes per number; `None` if the element holds no numbers.
     fn width(&self) -> Option<usize> {
         Some(match self.kind {
             1 | 2 => 1,
@@ -136,7 +136,7 @@ impl Numbers {
         })
     }
 
-    /// How many numbers there are.
+    /// Returns the number of numbers.
     pub(super) fn len(&self) -> usize {
         self.width().map_or(0, |width| self.bytes.len() / width)
     }
@@ -145,12 +145,12 @@ impl Numbers {
         matches!(self.kind, 7 | 9)
     }
 
-    /// Whether every number is a whole one by its type.
+    /// Returns true when the type of the numbers is an integer.
     pub(super) fn is_whole(&self) -> bool {
         self.width().is_some() && !self.is_real()
     }
 
-    /// The k-th number, if it is a whole one that fits.
+    /// Returns the k-th number if it is an integer that fits into i64.
     pub(super) fn whole(&self, k: usize) -> Option<i64> {
         if !self.is_whole() {
             return None;
@@ -164,7 +164,7 @@ impl Numbers {
         }
     }
 
-    /// The k-th number.
+    /// Returns the k-th number.
     pub(super) fn real(&self, k: usize) -> Option<f64> {
         let digits = |width: usize| Some(self.order.digits(self.bytes.get(k * width..(k + 1) * width)?));
         match self.kind {

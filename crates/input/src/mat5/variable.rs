@@ -1,4 +1,4 @@
-//! One variable of a MAT-file: what it is, and the matrix that it holds.
+//! A variable of a MAT-file: its kind, and its matrix.
 
 use super::HELP;
 use super::elements::{Elements, Found, Numbers, Order};
@@ -8,30 +8,30 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_model::RawMatrix;
 use std::path::Path;
 
-/// Bytes that flags, extents and the name of a variable may have each.
+/// Largest number of bytes of the flags, the extents and the name of a variable, each.
 const HEAD_BYTES: u64 = 1 << 16;
 
 const REAL: &str = "save a matrix of real numbers: K = sparse(real(K)); save('FILE.mat', 'K')";
 const BOTH_TRIANGLES: &str = "save both triangles: K + tril(K, -1)'";
 
-/// What a variable holds.
+/// Kind of the content of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum VariableKind {
     Sparse,
-    /// A full array of real numbers with two extents.
+    /// Full array of real numbers with two extents.
     Full,
-    /// What is no matrix, in words.
+    /// Content that is no matrix, in words.
     Other(&'static str),
 }
 
-/// A variable whose head has been read.
+/// Variable whose head has been read.
 pub(super) struct Variable<'a> {
     pub name: String,
     pub kind: VariableKind,
     pub rows: u64,
     pub columns: u64,
     single: bool,
-    /// What its values are, when they are no real numbers.
+    /// Kind of its values, if they are no real numbers.
     not_real: Option<&'static str>,
     body: &'a [u8],
     compressed: bool,
@@ -74,7 +74,7 @@ impl<'a> Variable<'a> {
         })
     }
 
-    /// Flags, extents and name.
+    /// Reads flags, extents and name.
     fn head(elements: &mut Elements<'a>) -> Found<[Numbers; 3]> {
         let mut next = || elements.next(HEAD_BYTES);
         let head = [next()?, next()?, next()?];
@@ -85,10 +85,10 @@ impl<'a> Variable<'a> {
         Ok(head)
     }
 
-    /// The matrix that it is.
+    /// Returns the matrix of the variable.
     ///
     /// # Errors
-    /// FB302 for what is no matrix of real numbers, FB103, and those of matrices.
+    /// FB302 for a variable that is no matrix of real numbers, FB103, and the errors of matrices.
     pub(super) fn matrix(&self, path: &Path) -> Found<RawMatrix> {
         let mut elements = Elements::of(self.body, self.compressed, self.order)?;
         Self::head(&mut elements)?;
@@ -112,7 +112,7 @@ impl<'a> Variable<'a> {
         Ok(RawMatrix { digits: if self.single { raw.digits.min(7) } else { raw.digits }, ..raw })
     }
 
-    /// Largest number of entries that a matrix of this size may have.
+    /// Returns the largest number of entries of a matrix of this size.
     fn most_entries(&self) -> u64 {
         most_entries_of(self.columns).min(u64::MAX / 8)
     }
@@ -122,7 +122,7 @@ impl<'a> Variable<'a> {
         let pointers: Vec<u64> = (0..pointers.len())
             .map(|k| pointers.whole(k).and_then(|at| u64::try_from(at).ok()).unwrap_or(u64::MAX))
             .collect();
-        // There may be room for more entries than there are.
+        // The arrays may have capacity for more entries than are used.
         let room = indices.len().min(values.len());
         let entries = pointers.last().map_or(0, |last| (*last).min(room as u64) as usize);
         let compressed = Compressed {

@@ -10,7 +10,7 @@ use flexbody_base::memory::{left, refuse_beyond};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::compression::{Compression, broken};
 
-/// Values whose written digits are counted.
+/// Number of values whose written digits are counted.
 const COUNTED: usize = 4096;
 
 const HELP: &str = "write the array as Matrix Market array real general: scipy.io.mmwrite of a numpy array";
@@ -32,7 +32,7 @@ pub(crate) fn read_array(file: &InputFile, compression: Compression) -> Found<Ar
                 reading.content(line).map_err(|diagnostic| vec![diagnostic.at_line(reading.line)])?;
             }
         }
-        // What follows the last line end of a block is no line of its own.
+        // The text after the last line end of a block is no separate line.
         reading.line -= usize::from(block.ends_with(b"\n"));
     }
     reading.finish().map_err(|diagnostic| vec![diagnostic])
@@ -63,11 +63,11 @@ fn banner(line: &[u8]) -> Found<()> {
     if found.is_empty() { Ok(()) } else { Err(found) }
 }
 
-/// What has been read below the first line.
+/// State of reading below the first line.
 #[derive(Default)]
 struct ArrayReader {
     line: usize,
-    /// Rows, columns and their product.
+    /// Number of rows, number of columns and their product.
     size: Option<(usize, usize, usize)>,
     values: Vec<f64>,
     written: u8,

@@ -4,16 +4,16 @@ use crate::coordinates::excerpt;
 use crate::scanner::words;
 use flexbody_base::diagnostic::{Code, Diagnostic};
 
-/// Which entries of the matrix are written.
+/// Entries of the matrix that are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Symmetry {
-    /// One triangle.
+    /// One triangle of a symmetric matrix.
     Symmetric,
-    /// All.
+    /// All entries.
     General,
 }
 
-/// Sizes and symmetry that the head of the file states.
+/// Sizes and symmetry stated in the header of the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Header {
     pub integer: bool,
@@ -25,7 +25,7 @@ pub(super) struct Header {
 
 const BANNER: &[u8] = b"%%MatrixMarket";
 
-/// Whether the text begins with the banner, in any case.
+/// Returns true when the text begins with the banner, in any case.
 pub(super) fn has_banner(text: &[u8]) -> bool {
     without_bom(text).get(..BANNER.len()).is_some_and(|start| start.eq_ignore_ascii_case(BANNER))
 }
@@ -34,7 +34,7 @@ fn without_bom(text: &[u8]) -> &[u8] {
     text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
 }
 
-/// The header, the number of bytes and the number of lines that it takes.
+/// Returns the header, and its numbers of bytes and lines.
 pub(super) fn parse(text: &[u8]) -> Result<(Header, usize, usize), Vec<Diagnostic>> {
     let mut lines = text.split_inclusive(|&b| b == b'\n');
     let first = lines.next().unwrap_or(b"");
@@ -58,12 +58,12 @@ pub(super) fn parse(text: &[u8]) -> Result<(Header, usize, usize), Vec<Diagnosti
     Err(vec![Diagnostic::new(Code::MatrixSyntax, message).at_line(count)])
 }
 
-/// A whole number.
+/// Parses a whole number.
 pub(super) fn size(field: &[u8]) -> Option<u64> {
     std::str::from_utf8(field).ok()?.parse().ok()
 }
 
-/// Field type and symmetry of the banner; all that is not supported is named.
+/// Returns field type and symmetry of the banner. The error names every unsupported property.
 fn banner(line: &[u8]) -> Result<(bool, Symmetry), Vec<Diagnostic>> {
     let shown = excerpt(line.trim_ascii());
     if !has_banner(line) {

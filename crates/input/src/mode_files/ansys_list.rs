@@ -10,23 +10,23 @@ use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 use std::f64::consts::TAU;
 
-/// Whether the text has the head of a list of degrees of freedom.
+/// Returns true when the text has the heading of a list of degrees of freedom.
 pub(super) fn recognises(head: &[u8]) -> bool {
     let text = String::from_utf8_lossy(head);
     text.contains("NODAL DEGREE OF FREEDOM LISTING")
 }
 
-/// What is read so far.
+/// State of reading.
 #[derive(Default)]
 struct AnsysListReader {
     table: ModeTable,
     /// Load step and substep of the mode.
     mode: Option<(i64, i64)>,
-    /// Directions of the columns below a head; `None` for the sum and for what is no displacement.
+    /// Directions of the columns below a heading; `None` for the sum and for columns that are no displacement.
     columns: Option<Vec<Option<u8>>>,
 }
 
-/// Reads all lists; pages and lists of one substep are one mode.
+/// Reads all lists. Pages and lists of one substep belong to one mode.
 pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut reading = AnsysListReader::default();
     for Line { number: at, text: line } in Lines::of(file.bytes()) {
@@ -61,7 +61,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 }
 
 impl AnsysListReader {
-    /// `LOAD STEP=     1  SUBSTEP=     7`, and below it `FREQ=    3907.0      LOAD CASE=   0`.
+    /// Reads the heading `LOAD STEP=  1  SUBSTEP=  7`, and below it `FREQ= 3907.0   LOAD CASE=   0`.
     fn head(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
         self.columns = None;
         if let (Some(step), Some(substep)) =
@@ -87,7 +87,7 @@ impl AnsysListReader {
         Ok(())
     }
 
-    /// A line of a node.
+    /// Reads a line of a node.
     fn node(&mut self, file: &InputFile, at: usize, node: i64, words: &[Vec<u8>]) -> Found<()> {
         let Some(columns) = &self.columns else { return Ok(()) };
         let values: Option<Vec<f64>> = words.iter().map(|word| real(word)).collect();
@@ -105,7 +105,7 @@ impl AnsysListReader {
     }
 }
 
-/// Directions of the columns `UX UY UZ USUM`, `ROTX ROTY ROTZ RSUM`; `None` where no column has one.
+/// Returns the directions of the columns `UX UY UZ USUM`, `ROTX ROTY ROTZ RSUM`; `None` if no column has one.
 fn columns(names: &[Vec<u8>]) -> Option<Vec<Option<u8>>> {
     const NAMES: [&[u8]; 6] = [b"UX", b"UY", b"UZ", b"ROTX", b"ROTY", b"ROTZ"];
     let direction = |name: &Vec<u8>| (1..).zip(NAMES).find(|(_, own)| name == own).map(|(k, _)| k);
@@ -113,15 +113,15 @@ fn columns(names: &[Vec<u8>]) -> Option<Vec<Option<u8>>> {
     directions.iter().any(Option::is_some).then_some(directions)
 }
 
-/// The word behind a name in a line.
+/// Returns the word after a name in a line.
 fn behind<'l>(line: &'l [u8], name: &[u8]) -> Option<&'l [u8]> {
     let is_name = |at: &usize| line[*at..].starts_with(name) && (*at == 0 || line[*at - 1] == b' ');
     let at = (0..line.len()).find(is_name)? + name.len();
     words(&line[at..]).next()
 }
 
-/// The words of a line; numbers of full width touch each other, and a sign that follows a digit begins the
-/// next.
+/// Returns the words of a line. Numbers of full width touch each other: a minus sign after a digit begins the next
+/// number.
 fn numbers_apart(line: &[u8]) -> Vec<Vec<u8>> {
     let mut apart: Vec<Vec<u8>> = Vec::new();
     for word in words(line) {

@@ -1,5 +1,5 @@
-//! Results of CalculiX (.frd, text): the displacements of every mode of a `*FREQUENCY` step, with five
-//! decimals behind the first digit, in fields of fixed width that touch each other.
+//! Results of CalculiX (.frd, text): the displacements of every mode of a `*FREQUENCY` step, with five decimals, in
+//! fields of fixed width that touch each other.
 
 use super::table::ModeTable;
 use super::{Found, syntax, unexpected, unreadable};
@@ -10,7 +10,7 @@ use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 use std::f64::consts::TAU;
 
-/// Whether a file begins as results of CalculiX do.
+/// Returns true when a file begins like results of CalculiX.
 pub(super) fn recognises(head: &[u8]) -> bool {
     head.starts_with(b"    1C")
 }
@@ -18,25 +18,25 @@ pub(super) fn recognises(head: &[u8]) -> bool {
 /// Significant digits of a displacement (12 characters as in -1.23456E-02), and of an eigenvalue.
 const DIGITS: (u8, u8) = (6, 7);
 
-/// Characters of a displacement.
+/// Number of characters of a displacement.
 const WIDTH: usize = 12;
 
-/// Kind of the analysis in the head of a block: vibration.
+/// Kind of the analysis in the heading of a block: vibration.
 const FREQUENCY: &[u8] = b"2";
 
-/// What stands above the blocks of a mode.
+/// Parameters above the blocks of a mode.
 #[derive(Debug, Default)]
 struct Head {
-    /// Whether the step has modes at all.
+    /// True if the step has modes.
     mode: bool,
     modal_mass: Option<f64>,
     modal_stiffness: Option<f64>,
 }
 
-/// A block of values by nodes.
+/// Block of values by nodes.
 struct Block {
     eigenvalue: f64,
-    /// Where the number of a node ends and the values begin.
+    /// Column where the number of a node ends and the values begin.
     start: usize,
     expected: i64,
     read: i64,
@@ -47,6 +47,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut table = ModeTable::new(DIGITS.0, DIGITS.1);
     let (mut head, mut pending, mut block): (Head, Option<Block>, Option<Block>) = Default::default();
     for Line { number: at, text: line } in Lines::of(file.bytes()) {
+        // Within a block: lines of nodes, lines of component names, and the end with the announced number of nodes.
         if let Some(open) = &mut block {
             if line.starts_with(b" -1") {
                 open.node(&mut table, file, at, line)?;
@@ -63,6 +64,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
                 ));
             }
         }
+        // Outside: parameters, the heading of a block (100C), and the name of its quantity (-4).
         if line.starts_with(b"    1P") {
             head.parameter(file, at, line)?;
         } else if line.starts_with(b"  100C") {
@@ -95,8 +97,8 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
 }
 
 impl Head {
-    /// A line that says something of the step: `1PMODE`, `1PGM` and `1PGK` (modal mass and stiffness),
-    /// `1PHID` (nodal diameter of a cyclic structure, -1 without).
+    /// Reads a line with a parameter of the step: `1PMODE`, `1PGM` and `1PGK` (modal mass and stiffness), `1PHID`
+    /// (nodal diameter of a cyclic structure, -1 without).
     fn parameter(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
         let mut words = words(&line[6..]);
         let (Some(name), Some(value)) = (words.next(), words.next()) else { return Ok(()) };
@@ -114,7 +116,7 @@ impl Head {
         Ok(())
     }
 
-    /// The block of a mode below the head of a block.
+    /// Returns the block of a mode from the heading of a block; `None` for other blocks.
     fn block(&mut self, file: &InputFile, at: usize, line: &[u8]) -> Found<Option<Block>> {
         if !self.mode || field(line, 56..58) != FREQUENCY {
             return Ok(None);
@@ -140,7 +142,7 @@ impl Head {
 }
 
 impl Block {
-    /// The displacements of a node.
+    /// Reads the displacements of a node.
     fn node(&mut self, table: &mut ModeTable, file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
         let node = line.get(3..self.start).and_then(|field| integer(field.trim_ascii()));
         let value =

@@ -1,14 +1,14 @@
-//! Binary results of Nastran (.op2): the real eigenvectors of the tables OUGV1 and their kin, in words of 32
-//! bits (single precision) or 64 bits (double precision, as ILP64 builds write them). Records have their length before and behind them; between records stand keys (a
-//! record of one word): a positive one says how many words the next record has, one that is not positive ends
-//! a part of the table, zero the table.
+//! Binary results of Nastran (.op2): the real eigenvectors of the tables OUGV1 and similar ones, in words of 32 bits
+//! (single precision) or 64 bits (double precision, as ILP64 builds write them). Records have their length before and
+//! after them. Between records are keys (records of one word): a positive key is the number of words of the next
+//! record, a key that is not positive ends a part of the table, and zero ends the table.
 
 use super::table::ModeTable;
 use super::{Found, unreadable};
 use flexbody_base::text::InputFile;
 use flexbody_model::DofLabel;
 
-/// Whether a file begins with a key of 32 or 64 bits.
+/// Returns true when a file begins with a key of 32 or 64 bits.
 pub(super) fn recognises(head: &[u8]) -> bool {
     let begins = |key: [u8; 8]| head.starts_with(&key);
     let is_key = |value: u8| {
@@ -20,25 +20,25 @@ pub(super) fn recognises(head: &[u8]) -> bool {
     is_key(2) || is_key(3)
 }
 
-/// Digits of single and of double precision.
+/// Number of digits of single and of double precision.
 const DIGITS: [u8; 2] = [7, 15];
 
-/// Words of the head of a part.
+/// Number of words of the head of a part.
 const IDENT: usize = 146;
 
 /// Approach code of real eigenvalues, table codes of displacements and eigenvectors.
 const REAL_EIGENVALUES: i64 = 2;
 const SHAPES: [i64; 2] = [1, 7];
 
-/// Words of a grid point: its number, its type, three displacements, three rotations.
+/// Number of words per grid point: its number, its type, three displacements, three rotations.
 const WIDE: usize = 8;
 
-/// Type of a grid point, beside scalar points and others.
+/// Type of a grid point, unlike scalar points and others.
 const GRID: i64 = 1;
 
 const HELP: &str = "write it with PARAM,POST,-1, or give the shapes as an array: docs/fe_programs.md has the lines for pyNastran";
 
-/// Tables of eigenvectors along the axes of the grid points.
+/// Names of tables of eigenvectors along the axes of the grid points.
 const TABLES: &[&str] = &["OUGV1", "OUG1", "OUGV1PAT", "OPHIG"];
 
 /// Reads the eigenvectors of all modes.
@@ -49,7 +49,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     records.skip_label()?;
     while let Some(name) = records.table_name()? {
         let parts = records.parts(TABLES.contains(&name.as_str()))?;
-        // A trailer, a name, then pairs of a head and its values.
+        // A table has a trailer, a name, then pairs of a head and its values.
         for pair in parts.get(2..).unwrap_or_default().chunks_exact(2) {
             add_mode(&mut table, &records, &pair[0], &pair[1])?;
         }
@@ -60,7 +60,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     Ok(table)
 }
 
-/// The values of a mode, if the part is one.
+/// Adds the values of a mode, if the part is one.
 fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: &[u64]) -> Found<()> {
     let file = records.file;
     let whole = |at: usize| records.whole(head[at]);
@@ -85,29 +85,29 @@ fn add_mode(table: &mut ModeTable, records: &Records<'_>, head: &[u64], values: 
     Ok(())
 }
 
-/// The records of a file. Their lengths have 32 bits, their words and keys 32 or 64.
+/// Records of a file. Their lengths have 32 bits, their words and keys 32 or 64.
 struct Records<'f> {
     file: &'f InputFile,
     rest: &'f [u8],
     little: bool,
-    /// Words of 64 bits.
+    /// True for words of 64 bits.
     wide: bool,
 }
 
 impl<'f> Records<'f> {
     fn new(file: &'f InputFile) -> Self {
         let rest = file.bytes();
-        // The length of the first key: that of a word.
+        // The length of the first key is that of a word.
         let head = rest.get(..4).unwrap_or_default();
         Self { file, rest, little: head.starts_with(&[4]) || head.starts_with(&[8]), wide: head.contains(&8) }
     }
 
-    /// Bytes of a word.
+    /// Returns the number of bytes of a word.
     fn width(&self) -> usize {
         if self.wide { 8 } else { 4 }
     }
 
-    /// The bits of a word or a length.
+    /// Returns the bits of a word or a length.
     fn bits(&self, bytes: &[u8]) -> u64 {
         let add = |bits: u64, byte: &u8| bits << 8 | u64::from(*byte);
         if self.little { bytes.iter().rev().fold(0, add) } else { bytes.iter().fold(0, add) }
@@ -117,17 +117,17 @@ impl<'f> Records<'f> {
         (bytes.len() == self.width()).then(|| self.bits(bytes))
     }
 
-    /// A word as a whole number.
+    /// Returns a word as a whole number.
     fn whole(&self, word: u64) -> i64 {
         if self.wide { word as i64 } else { i64::from(word as u32 as i32) }
     }
 
-    /// A word as a real number.
+    /// Returns a word as a real number.
     fn real(&self, word: u64) -> f64 {
         if self.wide { f64::from_bits(word) } else { f64::from(f32::from_bits(word as u32)) }
     }
 
-    /// The letters of a record: four to a word.
+    /// Returns the letters of a record, four per word.
     fn letters(&self, record: &[u8]) -> String {
         let letters: Vec<u8> =
             record.chunks(self.width()).flat_map(|word| &word[..word.len().min(4)]).copied().collect();
@@ -139,7 +139,7 @@ impl<'f> Records<'f> {
         Err(unreadable(self.file, format!("records do not follow each other at byte {at}"), HELP))
     }
 
-    /// The bytes of the next record; `None` at the end of the file.
+    /// Returns the bytes of the next record; `None` at the end of the file.
     fn record(&mut self) -> Found<Option<&'f [u8]>> {
         if self.rest.is_empty() {
             return Ok(None);
@@ -158,7 +158,7 @@ impl<'f> Records<'f> {
         Ok(Some(record))
     }
 
-    /// The next key; `None` at the end of the file.
+    /// Returns the next key; `None` at the end of the file.
     fn key(&mut self) -> Found<Option<i64>> {
         match self.record()? {
             None => Ok(None),
@@ -169,7 +169,7 @@ impl<'f> Records<'f> {
         }
     }
 
-    /// The record that a key announces.
+    /// Returns the record that a key announces.
     fn announced(&mut self, words: i64) -> Found<&'f [u8]> {
         match self.record()? {
             Some(record) if record.len() as u64 == (words as u64).saturating_mul(self.width() as u64) => {
@@ -179,7 +179,7 @@ impl<'f> Records<'f> {
         }
     }
 
-    /// The label of the tape, where there is one: a date, a name, eight more letters.
+    /// Skips the label of the tape, if there is one: a date, a name, eight more letters.
     fn skip_label(&mut self) -> Found<()> {
         let start = self.rest;
         if self.key()? != Some(3) {
@@ -196,7 +196,7 @@ impl<'f> Records<'f> {
         }
     }
 
-    /// Name of the next table; `None` behind the last.
+    /// Returns the name of the next table; `None` after the last.
     fn table_name(&mut self) -> Found<Option<String>> {
         match self.key()? {
             Some(2) => {
@@ -208,10 +208,10 @@ impl<'f> Records<'f> {
         }
     }
 
-    /// The words of every part of a table, where they are `wanted`.
+    /// Returns the words of every part of a table if they are `wanted`.
     fn parts(&mut self, wanted: bool) -> Found<Vec<Vec<u64>>> {
         let mut parts: Vec<Vec<u64>> = Vec::new();
-        // The first record of a part behind the first says of which kind it is, in one word.
+        // Each part after the first begins with a record of one word, its kind.
         let mut kind_follows = false;
         loop {
             match self.key()? {

@@ -1,5 +1,5 @@
-//! Punch files of Nastran (.pch): `DISPLACEMENT(PUNCH) = ALL` in SOL 103 writes two lines for every grid
-//! point of every mode, with seven digits.
+//! Punch files of Nastran (.pch): `DISPLACEMENT(PUNCH) = ALL` in SOL 103 writes two lines for every grid point of every
+//! mode, with seven digits.
 
 use super::table::ModeTable;
 use super::{Found, syntax, unexpected, unreadable};
@@ -9,7 +9,7 @@ use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 use flexbody_model::DofLabel;
 
-/// Whether a file begins as a punch file with results does.
+/// Returns true when a file begins like a punch file with results.
 pub(super) fn recognises(head: &[u8]) -> bool {
     let first = head.trim_ascii_start();
     [&b"$TITLE"[..], b"$SUBTITLE", b"$LABEL", b"$EIGENVECTOR", b"$DISPLACEMENTS", b"$SUBCASE"]
@@ -17,18 +17,18 @@ pub(super) fn recognises(head: &[u8]) -> bool {
         .any(|word| first.starts_with(word))
 }
 
-/// Digits of a value and of an eigenvalue, as in 1.234567E-02.
+/// Number of digits of a value and of an eigenvalue, as in 1.234567E-02.
 const DIGITS: u8 = 7;
 
-/// Columns of a line before its sequence number.
+/// Number of columns of a line before its sequence number.
 const COLUMNS: usize = 72;
 
-/// What the lines below a head are.
+/// Kind of the lines below a heading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum SectionKind {
     /// Shapes of modes.
     Modes,
-    /// Anything else.
+    /// Other results.
     Other,
 }
 
@@ -37,7 +37,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     let mut table = ModeTable::new(DIGITS, DIGITS).along_nodes();
     let mut kind = SectionKind::Other;
     let mut is_mode = false;
-    // The node whose rotations are on the next line.
+    // Node whose rotations are on the next line.
     let mut node: Option<i64> = None;
     for Line { number: at, text: line } in Lines::of(file.bytes()) {
         let line = &line[..line.len().min(COLUMNS)];
@@ -73,7 +73,7 @@ pub(super) fn read(file: &InputFile) -> Found<ModeTable> {
     }
 }
 
-/// What a line of the head says of the lines below it.
+/// Returns the kind of the lines below a line of the heading; `before` if the line does not state it.
 fn kind_of(line: &[u8], before: SectionKind) -> SectionKind {
     const HEADS: &[&[u8]] = &[
         b"$TITLE",
@@ -108,7 +108,7 @@ fn refuse_other_forms(file: &InputFile, at: usize, line: &[u8]) -> Found<()> {
         .collect())
 }
 
-/// `$EIGENVALUE =  3.947842E+05  MODE =     1`.
+/// Reads a line `$EIGENVALUE =  3.947842E+05  MODE =  1`.
 fn eigenvalue(file: &InputFile, at: usize, line: &[u8]) -> Found<Option<f64>> {
     let Some(rest) = line.strip_prefix(b"$EIGENVALUE") else { return Ok(None) };
     let mut words = words(rest);
@@ -122,8 +122,8 @@ fn eigenvalue(file: &InputFile, at: usize, line: &[u8]) -> Found<Option<f64>> {
     }
 }
 
-/// A line of a grid point (its number, G and three displacements; below it -CONT- and three rotations). Gives
-/// the node whose rotations are to follow.
+/// Reads a line of a grid point (its number, G and three displacements; below it -CONT- and three rotations). Returns
+/// the node whose rotations must follow.
 fn grid_line(
     table: &mut ModeTable,
     file: &InputFile,

@@ -1,4 +1,4 @@
-//! Values of modes as they come out of a file: node by node, mode by mode.
+//! Values of modes as read from a file: node by node, mode by mode.
 
 use super::{Found, unreadable};
 use faer::Mat;
@@ -8,36 +8,36 @@ use flexbody_base::text::InputFile;
 use flexbody_model::{DofLabel, RawModes};
 use std::collections::HashMap;
 
-/// The modes of a file, all of the same nodes and directions.
+/// Modes of a file, all of the same nodes and directions.
 #[derive(Debug, Default)]
 pub(super) struct ModeTable {
     labels: Vec<DofLabel>,
     /// Row of each label.
     index: HashMap<DofLabel, usize>,
     modes: Vec<Mode>,
-    /// Row behind the one that was set last: files list the same nodes for every mode.
+    /// Row after the last one that was set: files list the nodes in one order for every mode.
     next: usize,
     /// Significant digits of the eigenvalues and of the values.
     pub eigenvalue_digits: u8,
     pub digits: u8,
-    /// True if values stand along the axes of the rows of their nodes.
+    /// True if values are along the axes of the rows of their nodes.
     along_nodes: bool,
 }
 
 #[derive(Debug)]
 struct Mode {
     eigenvalue: Option<f64>,
-    /// By rows; NaN where nothing is set.
+    /// Values by rows; NaN where none is set.
     values: Vec<f64>,
 }
 
 impl ModeTable {
-    /// No modes yet, of values and eigenvalues with so many digits.
+    /// Creates a table without modes for values and eigenvalues with these numbers of digits.
     pub(super) fn new(digits: u8, eigenvalue_digits: u8) -> Self {
         Self { digits, eigenvalue_digits, ..Self::default() }
     }
 
-    /// Marks the values as standing along the axes of the rows of their nodes.
+    /// Marks the values as components along the axes of the rows of their nodes.
     pub(super) fn along_nodes(self) -> Self {
         Self { along_nodes: true, ..self }
     }
@@ -48,22 +48,22 @@ impl ModeTable {
         self.next = 0;
     }
 
-    /// States the eigenvalue of the mode that was begun last.
+    /// Sets the eigenvalue of the last mode.
     pub(super) fn state(&mut self, eigenvalue: f64) {
         if let Some(mode) = self.modes.last_mut() {
             mode.eigenvalue = Some(eigenvalue);
         }
     }
 
-    /// Number of modes.
+    /// Returns the number of modes.
     pub(super) fn len(&self) -> usize {
         self.modes.len()
     }
 
-    /// Sets a value of the mode that was begun last; `line` is where it stands in a file that has lines.
+    /// Sets a value of the last mode; `line` is its line in a text file.
     ///
     /// # Errors
-    /// FB128 for a value that is set twice, or without a mode; FB306 for one that is not finite.
+    /// FB128 for a value that is set twice, or without a mode; FB306 for a value that is not finite.
     pub(super) fn set(
         &mut self,
         file: &InputFile,
@@ -103,10 +103,10 @@ impl ModeTable {
         Ok(())
     }
 
-    /// All modes by the same rows.
+    /// Returns all modes by the same rows.
     ///
     /// # Errors
-    /// FB128 for no mode, or modes of different nodes.
+    /// FB128 if there is no mode, or if modes have different nodes.
     pub(super) fn into_modes(mut self, file: &InputFile, source: SourceFile) -> Found<RawModes> {
         let n = self.labels.len();
         if n == 0 {

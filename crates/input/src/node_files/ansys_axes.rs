@@ -1,10 +1,10 @@
-//! Axes of rotated nodes of Ansys: three angles in degrees, THXY about z, THYZ about the x so turned, THZX about
-//! the y so turned.
+//! Axes of rotated nodes of Ansys: three angles in degrees, THXY about z, THYZ about the rotated x, THZX about the
+//! rotated y.
 
 use flexbody_model::NodeAxes;
 use nalgebra::{Rotation3, Vector3};
 
-/// Returns the unit vectors along the rows of a node; `None` if no angle turns them.
+/// Returns the unit vectors along the rows of a node; `None` if all angles are zero.
 pub(super) fn axes([xy, yz, zx]: [f64; 3]) -> Option<NodeAxes> {
     if [xy, yz, zx] == [0.0; 3] {
         return None;
@@ -18,7 +18,7 @@ pub(super) fn axes([xy, yz, zx]: [f64; 3]) -> Option<NodeAxes> {
 mod tests {
     use super::*;
 
-    /// A quarter about z, then one about the x that points along y: z points along x.
+    /// A quarter turn about z, then one about the rotated x, which points along y: z then points along x.
     #[test]
     fn angles_turn_about_axes_that_are_turned() {
         let own = axes([90.0, 90.0, 0.0]).expect("turned");

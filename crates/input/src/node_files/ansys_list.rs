@@ -1,5 +1,5 @@
-//! Node lists of Ansys: a table between tabs, whose header names the columns in the user's language, and the
-//! listing of NLIST. Decimal commas are read.
+//! Node lists of Ansys: a table with tabs, whose header names the columns in the user's language, and the listing of
+//! NLIST. Decimal commas are read.
 
 use super::ansys_axes::axes;
 use super::{Found, NodeFile, unexpected};
@@ -8,7 +8,7 @@ use crate::scanner::{Line, Lines, words};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 
-/// Whether the text begins with a header between tabs that has an X, or with the listing of NLIST.
+/// Returns true when the text begins with a header with tabs and a column X, or with the listing of NLIST.
 pub(super) fn recognises(head: &str) -> bool {
     let first = head.lines().find(|line| !line.trim().is_empty()).unwrap_or_default();
     let tabs = first.contains('\t')
@@ -21,14 +21,14 @@ pub(super) fn recognises(head: &str) -> bool {
         || head.lines().any(is_listing_head)
 }
 
-/// `NODE  X  Y  Z` above every page of a listing.
+/// Returns true for the heading `NODE  X  Y  Z` above every page of a listing.
 fn is_listing_head(line: &str) -> bool {
     let words: Vec<&str> = line.split_whitespace().collect();
     !line.contains([',', '\t', ';']) && words.len() >= 4 && words[..4] == ["NODE", "X", "Y", "Z"]
 }
 
-/// Reads every line that is a node number and three coordinates, with three angles of rotated nodes where the
-/// head of the page has them (`THXY`); others are heads of pages.
+/// Reads every line with a node number and three coordinates, and three angles of rotated nodes if the heading of the
+/// page has them (`THXY`). Other lines are headings of pages.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let mut read = NodeFile::default();
     let mut with_angles = false;
@@ -54,7 +54,7 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     Ok(read)
 }
 
-/// A number with a decimal point or a decimal comma.
+/// Parses a number with a decimal point or a decimal comma.
 fn decimal(field: &[u8]) -> Option<f64> {
     let text: Vec<u8> = field.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
     real(&text)

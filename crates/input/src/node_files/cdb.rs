@@ -10,7 +10,7 @@ use crate::scanner::{Lines, field};
 use flexbody_base::text::InputFile;
 use flexbody_base::text::table::integer;
 
-/// Whether the text is an archive.
+/// Returns true when the text is an archive.
 pub(super) fn recognises(head: &str) -> bool {
     head.lines().any(|line| {
         let line = line.trim_start().to_uppercase();
@@ -18,7 +18,7 @@ pub(super) fn recognises(head: &str) -> bool {
     })
 }
 
-/// Reads all blocks of nodes and all components of nodes.
+/// Reads all blocks of nodes, all components of nodes, and the elements.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let text: Vec<&[u8]> = Lines::of(file.bytes()).map(|line| line.text).collect();
     let mut read = NodeFile::default();
@@ -40,8 +40,8 @@ pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     Ok(read)
 }
 
-/// Widths of the fields of a line, from a Fortran format as in `(3i9,6e21.13e3)`: number and width of whole
-/// numbers, then of reals.
+/// Returns the widths of the fields of a line, from a Fortran format as in `(3i9,6e21.13e3)`: number and width of
+/// integers, then of reals.
 fn widths(format: &[u8]) -> Option<[(usize, usize); 2]> {
     let text = String::from_utf8_lossy(format).trim().to_lowercase();
     let inner = text.strip_prefix('(')?.strip_suffix(')')?.to_owned();
@@ -60,7 +60,7 @@ fn widths(format: &[u8]) -> Option<[(usize, usize); 2]> {
     (fits(whole) && fits(reals)).then_some([whole, reals])
 }
 
-/// The k-th field of a width; trailing fields may be missing.
+/// Returns the k-th field of a width. Trailing fields may be missing.
 fn nth_field(line: &[u8], k: usize, width: usize) -> &[u8] {
     field(line, k * width..(k + 1) * width)
 }
@@ -81,13 +81,13 @@ fn nodes(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile) -> 
             continue;
         }
         let id = integer(nth_field(line, 0, width));
-        // Three coordinates, and three angles of nodes that are rotated.
+        // Three coordinates, and three angles of rotated nodes.
         let mut values = [0.0; 6];
         let mut good = id.is_some();
         for (axis, value) in values.iter_mut().enumerate().take(reals) {
             let start = count * width + axis * length;
             let own = field(line, start..start + length);
-            // Values that are zero at the end of a line are left out.
+            // Zeros at the end of a line are left out.
             match if own.is_empty() { Some(0.0) } else { real(own) } {
                 Some(own) => *value = own,
                 None => good = false,
@@ -141,7 +141,7 @@ fn component(file: &InputFile, text: &[&[u8]], head: usize, read: &mut NodeFile)
             ));
         };
         match members.last() {
-            // A negative number ends a range that the one before it begins.
+            // A negative number ends a range that the preceding number begins.
             Some(&first) if member < 0 => {
                 let after = known.partition_point(|id| *id <= first);
                 members.extend(known[after..].iter().take_while(|id| **id <= member.saturating_neg()));

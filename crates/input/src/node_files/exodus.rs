@@ -1,13 +1,14 @@
 //! Meshes of Exodus II (.exo, .e, .g, .exii): nodes, node sets by their names or numbers, elements.
-//! <https://sandialabs.github.io/seacas-docs/exodusII-new.pdf>. They are netCDF files: of netCDF-4, which is HDF5.
+//! <https://sandialabs.github.io/seacas-docs/exodusII-new.pdf>. They are netCDF files. Those of netCDF-4, which is
+//! HDF5, are read.
 
 use super::{Found, NodeFile, refused};
 use crate::hdf5::read_exodus;
 use flexbody_base::text::InputFile;
 
-/// Whether a file is HDF5 or of classic netCDF.
+/// Returns true when a file is HDF5 or classic netCDF.
 pub(super) fn recognises(head: &str) -> bool {
-    // The first byte of HDF5 is no text.
+    // The first byte of HDF5 is no valid text.
     head.starts_with("\u{fffd}HDF\r\n\u{1a}\n") || is_classic(head)
 }
 

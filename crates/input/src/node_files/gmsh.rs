@@ -1,5 +1,4 @@
-//! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and
-//! elements.
+//! Meshes of Gmsh (.msh, versions 2.2 and 4.1, text): nodes, the nodes of physical groups as sets, and elements.
 
 use super::{Found, NodeFile, syntax};
 use crate::scanner::Words;
@@ -9,7 +8,7 @@ use flexbody_base::text::table::integer;
 use flexbody_model::{ElementShape, Elements};
 use std::collections::{BTreeSet, HashMap};
 
-/// Whether the text is such a mesh.
+/// Returns true when the text is a mesh of Gmsh.
 pub(super) fn recognises(head: &str) -> bool {
     head.trim_start().starts_with("$MeshFormat")
 }
@@ -17,7 +16,7 @@ pub(super) fn recognises(head: &str) -> bool {
 /// Dimension and tag of a geometric entity, or of a physical group.
 type Tag = (i64, i64);
 
-/// A mesh while it is read.
+/// State of reading a mesh.
 #[derive(Default)]
 struct Mesh {
     read: NodeFile,
@@ -27,7 +26,7 @@ struct Mesh {
     members: HashMap<Tag, BTreeSet<i64>>,
 }
 
-/// Reads nodes and groups.
+/// Reads nodes, groups and elements.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let mut words = MeshWords { file, text: Words::of(file.bytes()) };
     let mut mesh = Mesh::default();
@@ -163,7 +162,7 @@ impl Mesh {
         Ok(())
     }
 
-    /// Groups without a name are called by their tag.
+    /// Returns the nodes, sets and elements. Groups without a name are named by their tag.
     fn finish(self) -> NodeFile {
         let Self { mut read, names, members, .. } = self;
         let mut groups: Vec<(Tag, BTreeSet<i64>)> =
@@ -178,7 +177,7 @@ impl Mesh {
     }
 }
 
-/// Number of nodes of an element type.
+/// Returns the number of nodes of an element type.
 fn nodes_of(kind: i64) -> Option<usize> {
     const NODES: [usize; 31] = [
         2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20,
@@ -187,7 +186,7 @@ fn nodes_of(kind: i64) -> Option<usize> {
     usize::try_from(kind - 1).ok().and_then(|at| NODES.get(at).copied())
 }
 
-/// Dimension of an element type.
+/// Returns the dimension of an element type.
 fn dimension_of(kind: i64) -> Option<i64> {
     Some(match kind {
         15 => 0,
@@ -198,10 +197,10 @@ fn dimension_of(kind: i64) -> Option<i64> {
     })
 }
 
-/// Type of a point.
+/// Element type of a point.
 const POINT: i64 = 15;
 
-/// Adds an element of a type as it is drawn: those of the third order and higher by their corners alone.
+/// Adds an element of a type for drawing. Elements of the third order and higher are drawn by their corners only.
 fn draw(elements: &mut Elements, kind: i64, nodes: &[i64]) {
     let (shape, middles): (_, &[[usize; 2]]) = match kind {
         POINT => return,
@@ -230,18 +229,18 @@ fn draw(elements: &mut Elements, kind: i64, nodes: &[i64]) {
     elements.add(&format!("Gmsh type {kind}"), shape, &ordered);
 }
 
-/// The edges whose middles follow the corners of elements of the second order, in the order of Gmsh where
-/// that is not the one of [`ElementShape::edges`].
+/// Edges of a tetrahedron whose mid-edge nodes follow the corners of elements of the second order, in the order of
+/// Gmsh, which differs from that of [`ElementShape::edges`].
 const TETRAHEDRON: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [2, 3], [1, 3]];
-/// See [`TETRAHEDRON`].
+/// Edges of a hexahedron, see [`TETRAHEDRON`].
 const HEXAHEDRON: [[usize; 2]; 12] =
     [[0, 1], [0, 3], [0, 4], [1, 2], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 7], [5, 6], [6, 7]];
-/// See [`TETRAHEDRON`].
+/// Edges of a wedge, see [`TETRAHEDRON`].
 const WEDGE: [[usize; 2]; 9] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 4], [2, 5], [3, 4], [3, 5], [4, 5]];
-/// See [`TETRAHEDRON`].
+/// Edges of a pyramid, see [`TETRAHEDRON`].
 const PYRAMID: [[usize; 2]; 8] = [[0, 1], [0, 3], [0, 4], [1, 2], [1, 4], [2, 3], [2, 4], [3, 4]];
 
-/// The words of a mesh.
+/// Words of a mesh.
 struct MeshWords<'a> {
     file: &'a InputFile,
     text: Words<'a>,
@@ -281,7 +280,7 @@ impl MeshWords<'_> {
         }
     }
 
-    /// The name of the next section.
+    /// Returns the name of the next section.
     fn section(&mut self) -> Option<String> {
         loop {
             let word = self.text.next()?;
@@ -291,7 +290,7 @@ impl MeshWords<'_> {
         }
     }
 
-    /// Goes behind the end of a section.
+    /// Skips the text up to the end of a section.
     fn skip_to_end(&mut self, section: &str) {
         let end = format!("$End{}", &section[1..]);
         for word in self.text.by_ref() {

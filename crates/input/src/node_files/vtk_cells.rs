@@ -3,15 +3,16 @@
 use super::vtk_numbers::Unpacked;
 use flexbody_model::{ElementShape, Elements};
 
-/// Order of the corners of pixels and voxels, which go along the axes, around the quadrilateral.
+/// Order of the corners of pixels and voxels, which VTK lists along the axes, around the quadrilaterals.
 const AROUND: [usize; 8] = [0, 1, 3, 2, 4, 5, 7, 6];
 
-/// Nodes of a wedge seen from its other end: VTK's first triangle looks outward, that of the shape inward.
+/// Order of the nodes of a wedge from its other end: the first triangle of VTK faces outward, that of the shape inward.
 const TURNED_WEDGE: [usize; 15] = [0, 2, 1, 3, 5, 4, 8, 7, 6, 11, 10, 9, 12, 14, 13];
 
-/// The elements that cells are, of points whose numbers are `ids`.
+/// Returns the elements of cells, with points whose numbers are `ids`.
 ///
-/// * `connectivity`: points of all cells, from 0; `offsets`: where each cell ends there; `types`: VTK's.
+/// * `connectivity`: points of all cells, from 0; `offsets`: end of each cell in `connectivity`; `types`: cell types of
+///   VTK.
 pub(super) fn elements_of(
     connectivity: &[f64],
     offsets: &[f64],
@@ -39,7 +40,7 @@ pub(super) fn elements_of(
 fn add(elements: &mut Elements, kind: u8, nodes: Vec<i64>) {
     let ordered = |order: &[usize]| order.iter().filter_map(|&k| nodes.get(k).copied()).collect::<Vec<_>>();
     let (shape, nodes) = match kind {
-        // Vertices.
+        // Vertices are not drawn.
         1 | 2 => return,
         3 | 21 => (ElementShape::Line, nodes),
         5 | 22 | 34 => (ElementShape::Triangle, nodes),

@@ -8,12 +8,12 @@ use flexbody_base::text::InputFile;
 
 const BANNER: &str = "# vtk DataFile Version";
 
-/// Whether the text is such a file.
+/// Returns true when the text is a legacy file of VTK.
 pub(super) fn recognises(head: &str) -> bool {
     head.starts_with(BANNER)
 }
 
-/// Reads the points, numbered from 0 as ParaView shows them.
+/// Reads the points, numbered from 0 as in ParaView.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     let mut cursor = Cursor { text: Words::of(file.bytes()), binary: false };
     let places = cursor.points().map_err(|message| syntax(file, cursor.text.line_number(), message))?;
@@ -29,9 +29,9 @@ struct Cursor<'a> {
 }
 
 impl Cursor<'_> {
-    /// The coordinates of all points.
+    /// Reads the coordinates of all points.
     fn points(&mut self) -> Result<Vec<f64>, String> {
-        // Banner and title.
+        // Banner and title are skipped.
         self.text.line();
         self.text.line();
         self.binary = match self.words().first().map(|word| word.to_ascii_uppercase()).as_deref() {
@@ -44,7 +44,7 @@ impl Cursor<'_> {
                 return Err("file has no POINTS".to_owned());
             }
             let begin = self.text.at;
-            // Keywords are read in any case.
+            // Keywords are case-insensitive.
             let words: Vec<String> = self.words().iter().map(|word| word.to_ascii_uppercase()).collect();
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
             match words.as_slice() {
@@ -64,7 +64,7 @@ impl Cursor<'_> {
         }
     }
 
-    /// Goes behind arrays that are no points.
+    /// Skips arrays that hold no points.
     fn skip_fields(&mut self, count: &str) -> Result<(), String> {
         let count: u64 = count.parse().map_err(|_| "expected the number of fields".to_owned())?;
         for _ in 0..count {
@@ -84,7 +84,7 @@ impl Cursor<'_> {
         Ok(())
     }
 
-    /// How many numbers there are to be, and their type.
+    /// Returns the announced number of numbers, and their type.
     fn announced(
         &mut self,
         tuples: &str,
@@ -121,7 +121,7 @@ impl Cursor<'_> {
         Ok(numbers)
     }
 
-    /// The words of the rest of the line.
+    /// Returns the words of the rest of the line.
     fn words(&mut self) -> Vec<String> {
         String::from_utf8_lossy(self.text.line()).split_whitespace().map(str::to_owned).collect()
     }

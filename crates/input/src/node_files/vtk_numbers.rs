@@ -1,12 +1,12 @@
-//! Numbers in files of VTK: their types, and how the XML form packs them.
+//! Numbers in files of VTK: their types, and their packing in XML files.
 
 use flexbody_base::memory::left;
 use std::io::{Error, ErrorKind, Read};
 
-/// Why an array cannot be read, as the end of a sentence about it.
+/// Result of reading an array. The error is a clause about the array for a message.
 pub(super) type Unpacked<T> = Result<T, String>;
 
-/// The type of the numbers of an array.
+/// Type of the numbers of an array.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum NumberType {
     Signed(usize),
@@ -16,7 +16,7 @@ pub(super) enum NumberType {
 }
 
 impl NumberType {
-    /// A type by its name in XML files (`Float64`) or in legacy files (`double`).
+    /// Returns the type of this name in XML files (`Float64`) or in legacy files (`double`).
     pub(super) fn named(name: &str) -> Option<Self> {
         Some(match name.to_ascii_lowercase().as_str() {
             "float32" | "float" => Self::Float,
@@ -33,7 +33,7 @@ impl NumberType {
         })
     }
 
-    /// Bytes of a number.
+    /// Returns the number of bytes of a number.
     pub(super) fn bytes(self) -> usize {
         match self {
             Self::Signed(bytes) | Self::Unsigned(bytes) => bytes,
@@ -46,7 +46,7 @@ impl NumberType {
         matches!(self, Self::Signed(_) | Self::Unsigned(_))
     }
 
-    /// The numbers that `bytes` are; what is left over is none.
+    /// Returns the numbers in `bytes`; incomplete bytes at the end are left out.
     pub(super) fn decode(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
         bytes.chunks_exact(self.bytes()).map(|own| self.number(digits(own, big_endian))).collect()
     }
@@ -72,22 +72,24 @@ fn digits(bytes: &[u8], big_endian: bool) -> u64 {
     }
 }
 
-/// How the arrays of an XML file are packed.
+/// Packing of the arrays of an XML file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Packing {
     pub big_endian: bool,
-    /// Bytes of the numbers that say how long an array is.
+    /// Number of bytes of the length in front of an array.
     pub header_bytes: usize,
     pub zlib: bool,
 }
 
 impl Packing {
-    /// The bytes of the array that begins the stream, at most `most`.
+    /// Returns the bytes of the array at the beginning of the stream, at most `most`.
     pub(super) fn unpack(self, mut stream: impl Read, most: u64) -> Unpacked<Vec<u8>> {
         if !self.zlib {
             let length = self.header(&mut stream)?;
             return exactly(&mut stream, length);
         }
+        // The header holds the number of blocks, their size, and the size of an incomplete last block (0 if there is
+        // none).
         let [blocks, size, last] =
             [self.header(&mut stream)?, self.header(&mut stream)?, self.header(&mut stream)?];
         let whole = if last == 0 { blocks } else { blocks.saturating_sub(1) };
@@ -98,6 +100,7 @@ impl Packing {
         if left().is_some_and(|left| total > left) {
             return Err(format!("unpacks to {total} bytes, more than fit the memory"));
         }
+        // The packed length of every block precedes the blocks.
         let lengths = blocks.checked_mul(self.header_bytes as u64).ok_or(ENDS)?;
         let lengths = exactly(&mut stream, lengths)?;
         let mut unpacked = Vec::new();
@@ -129,12 +132,11 @@ fn exactly(stream: &mut impl Read, length: u64) -> Unpacked<Vec<u8>> {
     if bytes.len() as u64 == length { Ok(bytes) } else { Err(ENDS.to_owned()) }
 }
 
-/// The bytes that a text in base64 stands for. Pieces that were packed one by one may follow each other, each with
-/// its own padding.
+/// Decoder of a text in base64. The text may consist of several pieces, each with padding.
 pub(super) struct Base64<'a> {
     text: &'a [u8],
     group: [u8; 3],
-    /// Bytes of the group, and how many of them were given.
+    /// Number of bytes in the group, and number of those already read.
     count: usize,
     given: usize,
 }
@@ -144,7 +146,7 @@ impl<'a> Base64<'a> {
         Self { text, group: [0; 3], count: 0, given: 0 }
     }
 
-    /// Decodes the next four characters; `false` at the end.
+    /// Decodes the next four characters. Returns false at the end.
     fn next_group(&mut self) -> std::io::Result<bool> {
         let wrong = |what: &str| Err(Error::new(ErrorKind::InvalidData, what));
         let (mut bits, mut characters, mut padding) = (0u32, 0, 0);

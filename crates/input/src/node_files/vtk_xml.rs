@@ -1,5 +1,5 @@
-//! Meshes of VTK in XML (.vtu, .vtp, .vts): points, arrays of zeros and ones at the points as sets, and the cells
-//! of unstructured grids.
+//! Meshes of VTK in XML (.vtu, .vtp, .vts): points, arrays of zeros and ones at the points as sets, and the cells of
+//! unstructured grids.
 //! <https://docs.vtk.org/en/latest/vtk_file_formats/vtkxml_file_format.html>
 
 use super::vtk_cells::elements_of;
@@ -12,13 +12,12 @@ use flexbody_model::{Elements, Nodes};
 
 const HELP: &str = "write one mesh of points and cells (.vtu) in double precision, as it is or compressed by zlib, or give a table of nodes";
 
-/// Whether the text is such a file.
+/// Returns true when the text is an XML file of VTK.
 pub(super) fn recognises(head: &str) -> bool {
     head.trim_start().starts_with('<') && head.contains("<VTKFile")
 }
 
-/// Reads the points. They are numbered from 0, as ParaView shows them, or by the array that the file calls its
-/// global ids.
+/// Reads the points. They are numbered from 0, as in ParaView, or by the array that the file declares as global ids.
 pub(super) fn read(file: &InputFile) -> Found<NodeFile> {
     points_and_sets(file.bytes()).map_err(|message| refused(file, message, HELP))
 }
@@ -41,13 +40,13 @@ fn is_list_of_whole_numbers(array: &Element<'_>) -> bool {
         && array.attribute("NumberOfComponents").is_none_or(|components| components.trim() == "1")
 }
 
-/// A file with one piece of mesh.
+/// File with one piece of mesh.
 struct Mesh<'a> {
     elements: Vec<Element<'a>>,
     packing: Packing,
     /// Number of points.
     points: u64,
-    /// Number of cells, where the piece says it.
+    /// Number of cells, if the piece states it.
     cells: Option<u64>,
 }
 
@@ -81,7 +80,7 @@ impl<'a> Mesh<'a> {
         Ok(Self { elements, packing, points, cells })
     }
 
-    /// The coordinates of the points.
+    /// Returns the coordinates of the points.
     fn places(&self) -> Unpacked<Vec<[f64; 3]>> {
         let array = self.arrays("Points").next().ok_or("file has no array of points")?;
         let numbers = self.numbers(array, self.points.saturating_mul(3))?;
@@ -92,7 +91,7 @@ impl<'a> Mesh<'a> {
         Ok(numbers.chunks_exact(3).map(|x| [x[0], x[1], x[2]]).collect())
     }
 
-    /// Name of the array at the points that numbers them, where the file says so.
+    /// Returns the name of the array that numbers the points, if the file declares one.
     fn global_ids(&self) -> Option<&str> {
         let data = self.elements.iter().find(|element| element.name == "PointData")?;
         data.attribute("GlobalIds").filter(|name| !name.is_empty())
@@ -102,14 +101,14 @@ impl<'a> Mesh<'a> {
         let array = self.lists().find(|array| array.attribute("Name") == Some(name));
         let array = array.ok_or_else(|| format!("the global ids `{name}` are no list of whole numbers"))?;
         let ids = self.list(array)?;
-        // Larger numbers are not exact any more.
+        // Larger numbers are not exact in f64.
         match ids.iter().find(|id| id.abs() > 9e15) {
             Some(id) => Err(format!("array `{name}` numbers a point {id}")),
             None => Ok(ids.iter().map(|id| *id as i64).collect()),
         }
     }
 
-    /// Lists of zeros and ones are sets: they mark their points.
+    /// Returns the sets: lists of zeros and ones, which mark their points.
     fn sets(&self, ids: &[i64]) -> Unpacked<Vec<(String, Vec<i64>)>> {
         let mut sets = Vec::new();
         for array in self.lists().filter(|array| array.attribute("Name") != self.global_ids()) {
@@ -123,7 +122,7 @@ impl<'a> Mesh<'a> {
         Ok(sets)
     }
 
-    /// The cells of an unstructured grid; other meshes name theirs otherwise and are not drawn.
+    /// Returns the cells of an unstructured grid. Other meshes store cells under other names, and are not drawn.
     fn cells(&self, ids: &[i64]) -> Unpacked<Elements> {
         let array = |name: &str| self.arrays("Cells").find(|array| array.attribute("Name") == Some(name));
         let all = [array("connectivity"), array("offsets"), array("types")];
@@ -134,7 +133,7 @@ impl<'a> Mesh<'a> {
         elements_of(&self.numbers(connectivity, points)?, &offsets, &types, ids)
     }
 
-    /// The arrays at the points with one whole number for each.
+    /// Returns the arrays at the points with one integer per point.
     fn lists(&self) -> impl Iterator<Item = &Element<'a>> {
         self.arrays("PointData").filter(|array| is_list_of_whole_numbers(array))
     }
@@ -148,12 +147,12 @@ impl<'a> Mesh<'a> {
         Err(format!("array `{name}` has {} values for {} points", values.len(), self.points))
     }
 
-    /// The arrays within the elements called `parent`.
+    /// Returns the arrays within the elements named `parent`.
     fn arrays(&self, parent: &'static str) -> impl Iterator<Item = &Element<'a>> {
         self.elements.iter().filter(move |own| own.name == "DataArray" && own.parent == parent)
     }
 
-    /// The numbers of an array, which has `most` of them at the most where it is compressed.
+    /// Returns the numbers of an array. A compressed array may have at most `most` of them.
     fn numbers(&self, array: &Element<'_>, most: u64) -> Unpacked<Vec<f64>> {
         let name = array.attribute("Name").unwrap_or("Points");
         let within = |what: String| format!("array `{name}` {what}");
@@ -176,7 +175,7 @@ impl<'a> Mesh<'a> {
     fn appended(&self, array: &Element<'_>, most: u64) -> Unpacked<Vec<u8>> {
         let data = self.elements.iter().find(|element| element.name == "AppendedData");
         let data = data.ok_or("is appended, but the file has no appended data")?;
-        // The data begin behind an underscore.
+        // The data begin after an underscore.
         let content = data.content.trim_ascii_start().strip_prefix(b"_").unwrap_or_default();
         let offset = array.number("offset").and_then(|offset| usize::try_from(offset).ok());
         let own = offset.and_then(|offset| content.get(offset..));
@@ -189,7 +188,7 @@ impl<'a> Mesh<'a> {
     }
 }
 
-/// Number of points of a structured mesh.
+/// Returns the number of points of a structured mesh.
 fn extent(piece: &Element<'_>) -> Option<u64> {
     let numbers = piece.attribute("Extent")?.split_whitespace().map(str::parse::<i64>);
     let numbers: Vec<i64> = numbers.collect::<Result<_, _>>().ok()?;

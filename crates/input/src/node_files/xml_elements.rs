@@ -3,13 +3,13 @@
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::{Reader, XmlVersion};
 
-/// An element.
+/// Element of an XML file.
 pub(super) struct Element<'a> {
     pub name: String,
-    /// Name of the element around it; empty for the outermost.
+    /// Name of the enclosing element; empty for the outermost.
     pub parent: String,
     attributes: Vec<(String, String)>,
-    /// What stands between its tag and the next one.
+    /// Bytes between its tag and the next one.
     pub content: &'a [u8],
 }
 
@@ -18,20 +18,20 @@ impl Element<'_> {
         self.attributes.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
     }
 
-    /// An attribute that is a whole number.
+    /// Returns an attribute as a whole number.
     pub(super) fn number(&self, name: &str) -> Option<u64> {
         self.attribute(name)?.trim().parse().ok()
     }
 }
 
-/// Reads the elements until the end, or until one called `last` begins, whose content is all that follows.
+/// Reads the elements up to the end, or up to an element named `last`, whose content is the rest of the file.
 ///
 /// # Errors
-/// What is wrong, where the text is not XML.
+/// A description of the problem, if the text is not XML.
 pub(super) fn elements<'a>(bytes: &'a [u8], last: &str) -> Result<Vec<Element<'a>>, String> {
     let mut reader = Reader::from_reader(bytes);
     let mut elements: Vec<Element<'a>> = Vec::new();
-    // Numbers of the elements around the next one.
+    // Indices of the elements that enclose the next one.
     let mut open: Vec<usize> = Vec::new();
     loop {
         let event = reader.read_event().map_err(|error| format!("file is not XML: {error}"))?;

@@ -1,20 +1,20 @@
-//! Binary files: records of Fortran, each between two lengths, in either order of bytes and with words of
-//! four or eight bytes.
+//! Binary files: records of Fortran, each between two lengths, in either byte order and with words of four or eight
+//! bytes.
 
 use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 
-/// How the numbers of a file are stored.
+/// Storage of the numbers of a file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Binary {
     is_big_endian: bool,
-    /// Bytes of a word: 4 or 8.
+    /// Number of bytes of a word: 4 or 8.
     word: usize,
 }
 
 impl Binary {
-    /// The storage of a file that begins with `head`; `None` of one that is no binary OUTPUT4 file.
+    /// Returns the storage of a file that begins with `head`; `None` if it is no binary OUTPUT4 file.
     pub(super) fn of(head: &[u8]) -> Option<Self> {
         let length: [u8; 4] = head.get(..4)?.try_into().ok()?;
         let own = [(24, 4), (48, 8)].into_iter().find_map(|(bytes, word)| {
@@ -32,10 +32,10 @@ impl Binary {
         ((1..=15).contains(&form?) && (1..=4).contains(&kind?) && is_name).then_some(own)
     }
 
-    /// Place of the columns of the matrices.
+    /// Returns the positions of the columns of the matrices.
     ///
     /// # Errors
-    /// FB301, FB303, FB304 for records that are none of a matrix.
+    /// FB301, FB303, FB304 for records that do not belong to a matrix.
     pub(super) fn contents(self, file: &InputFile) -> Result<Vec<Stored>, Diagnostic> {
         let bytes = file.bytes();
         let (mut at, mut all) = (0, Vec::new());
@@ -62,10 +62,11 @@ impl Binary {
         Ok(all)
     }
 
-    /// The entries of some columns.
+    /// Returns the entries of some columns.
     ///
     /// # Errors
-    /// FB301, FB303, FB306.
+    /// FB301 for records that cannot be parsed, FB303 for indices outside the matrix, FB306 for values that are not
+    /// finite.
     pub(super) fn columns(self, bytes: &[u8], header: &Header) -> Result<Columns, Diagnostic> {
         let mut columns = Columns::with_room(bytes.len() / self.size(header));
         columns.written = if self.size(header) == 4 { SINGLE_DIGITS } else { 17 };
@@ -79,12 +80,12 @@ impl Binary {
         Ok(columns)
     }
 
-    /// Bytes of a value. Words of eight bytes hold any number.
+    /// Returns the number of bytes of a value. A word of eight bytes holds any number.
     fn size(self, header: &Header) -> usize {
         if header.is_single() { self.word } else { 8 }
     }
 
-    /// The values of one column.
+    /// Reads the values of one column.
     fn column(
         self,
         record: &[u8],
@@ -98,9 +99,11 @@ impl Binary {
             self.integer(record, 2).and_then(|words| usize::try_from(words).ok()).ok_or_else(misread)?;
         let data = record.get(3 * self.word..).ok_or_else(misread)?;
         let data = words.checked_mul(self.word).and_then(|bytes| data.get(..bytes)).ok_or_else(misread)?;
+        // A start other than zero marks a dense column.
         if start != 0 {
             return self.values(data, header, start, column, columns);
         }
+        // A sparse column consists of strings, each with one or two words of start and length.
         let mut rest = data;
         while !rest.is_empty() {
             let first = self.integer(rest, 0).ok_or_else(misread)?;
@@ -121,7 +124,7 @@ impl Binary {
         Ok(())
     }
 
-    /// Values below one another.
+    /// Reads consecutive values of a column.
     fn values(
         self,
         data: &[u8],
@@ -145,7 +148,7 @@ impl Binary {
         }
     }
 
-    /// The record at a byte of the file, and where the next begins.
+    /// Returns the record at a byte of the file, and the start of the next one.
     fn record(self, bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
         let length = |at: usize| -> Option<usize> {
             let four: [u8; 4] = bytes.get(at..at.checked_add(4)?)?.try_into().ok()?;
@@ -158,7 +161,7 @@ impl Binary {
         (length(end)? == own).then_some((record, end + 4))
     }
 
-    /// A word that is a whole number.
+    /// Returns the k-th word as an integer.
     fn integer(self, bytes: &[u8], k: usize) -> Option<i64> {
         let word = bytes.get(k * self.word..(k + 1) * self.word)?;
         let big = self.is_big_endian;

@@ -1,4 +1,4 @@
-//! What text and binary files have in common: headers, strings of values, and where they go.
+//! The common parts of text and binary files: headers, strings of values, and the collected columns.
 
 use crate::assemble::{ColumnEntries, Entry, Sides, StoredEntries, assemble, assemble_columns, push};
 use flexbody_base::diagnostic::{Code, Diagnostic};
@@ -7,27 +7,27 @@ use flexbody_model::RawMatrix;
 use std::ops::Range;
 use std::path::Path;
 
-/// Digits of single precision.
+/// Number of digits of single precision.
 pub(super) const SINGLE_DIGITS: u8 = 7;
 
-/// From this number of rows on, starts of strings do not fit beside their lengths.
+/// Number of rows from which on the start of a string does not fit into one word with its length.
 const BIG: u64 = 65_536;
 
-/// What a matrix begins with.
+/// Header of a matrix.
 #[derive(Debug, Clone)]
 pub(super) struct Header {
     pub name: String,
     pub rows: u64,
     pub columns: u64,
     pub form: i64,
-    /// 1, 2: real numbers of single and double precision; 3, 4: complex ones.
+    /// Kind of the numbers: 1, 2 for real numbers of single and double precision; 3, 4 for complex ones.
     pub kind: i64,
-    /// Strings have start and length in words of their own.
+    /// True if start and length of strings are in separate words.
     pub is_big: bool,
 }
 
 impl Header {
-    /// From the numbers of a header; a complaint about those of no matrix.
+    /// Creates the header from its numbers. The error describes numbers that belong to no matrix.
     pub(super) fn new(
         columns: i64,
         rows: i64,
@@ -56,7 +56,7 @@ impl Header {
         })
     }
 
-    /// A name that is stored in words of eight bytes: four letters in each, or eight.
+    /// Returns a name that is stored in words of eight bytes, with four or eight letters in each.
     pub(super) fn name_of_wide_words(name: &[u8]) -> Vec<u8> {
         let letters = |word: &[u8]| match word.split_at_checked(4) {
             Some((four, rest)) if unpadded(rest).is_empty() => four.to_vec(),
@@ -73,13 +73,13 @@ impl Header {
         self.kind % 2 == 1
     }
 
-    /// Start and number of words of a string whose two are packed into one number.
+    /// Returns start and number of words of a string, which are packed into one number.
     pub(super) fn unpacked(word: i64) -> (i64, i64) {
         let length = (word >> 16) - 1;
         (word - ((length + 1) << 16), length)
     }
 
-    /// Checks a column number: within the matrix, or the one after it, which ends the matrix.
+    /// Checks a column number: it is within the matrix, or the next one, which ends the matrix.
     pub(super) fn column(&self, column: i64) -> Result<ColumnRecord, Diagnostic> {
         match u64::try_from(column) {
             Ok(column) if column >= 1 && column <= self.columns => {
@@ -94,7 +94,7 @@ impl Header {
         }
     }
 
-    /// Checks where a string of values lies: its first row, from 0.
+    /// Checks the position of a string of values. Returns its first row, from 0.
     pub(super) fn first_row(&self, row: i64, count: usize) -> Result<u32, Diagnostic> {
         let end = row.checked_add(count as i64 - 1).unwrap_or(i64::MAX);
         if row < 1 || end.unsigned_abs() > self.rows || self.rows > u64::from(u32::MAX) {
@@ -105,7 +105,7 @@ impl Header {
     }
 }
 
-/// A name without the blanks and zero bytes that fill its field.
+/// Returns a name without the blanks and zero bytes that pad its field.
 pub(super) fn unpadded(name: &[u8]) -> &[u8] {
     let fills = |b: &u8| b.is_ascii_whitespace() || *b == 0;
     let start = name.iter().position(|b| !fills(b)).unwrap_or(name.len());
@@ -113,21 +113,20 @@ pub(super) fn unpadded(name: &[u8]) -> &[u8] {
     &name[start..end]
 }
 
-/// What a column record is.
+/// Kind of a column record.
 pub(super) enum ColumnRecord {
     Number(u32),
     End,
 }
 
-/// Where the columns of a matrix stand in its file. It is found from the lengths that the file states, before
-/// any value is read.
+/// Positions of the columns of a matrix in its file, found from the lengths in the file before any value is read.
 pub(super) struct Stored {
     pub header: Header,
-    /// Some whole columns each, in file order.
+    /// Groups of whole columns, in file order.
     pub stretches: Vec<Stretch>,
-    /// At least as many values as the columns hold.
+    /// Upper bound of the number of values in the columns.
     pub values: usize,
-    /// Whether every column has a higher number than the one before it.
+    /// True if every column has a higher number than the preceding one.
     pub ascending: bool,
     last: Option<u32>,
 }
@@ -140,14 +139,14 @@ pub(super) struct Stretch {
 }
 
 impl Stored {
-    /// Bytes of columns that one thread reads before it takes others.
+    /// Bytes of columns that one thread reads at a time.
     const STRETCH: usize = 1 << 20;
 
     pub(super) fn new(header: Header) -> Self {
         Self { header, stretches: Vec::new(), values: 0, ascending: true, last: None }
     }
 
-    /// Adds a column of at most so many values that stands at these bytes, below so many lines.
+    /// Adds a column with at most `values` values in the given bytes, below `line` lines.
     pub(super) fn add(&mut self, column: u32, values: usize, bytes: Range<usize>, line: usize) {
         self.ascending &= self.last.is_none_or(|last| last < column);
         self.last = Some(column);
@@ -159,20 +158,20 @@ impl Stored {
     }
 }
 
-/// The entries of some columns, in file order, without zeros.
+/// Entries of some columns, in file order, without zeros.
 #[derive(Default)]
 pub(super) struct Columns {
-    /// Each column and how many of the entries it has.
+    /// Each column with its number of entries.
     lengths: Vec<(u32, usize)>,
     rows: Vec<u32>,
     values: Vec<f64>,
     sides: Sides,
-    /// Digits as written.
+    /// Largest number of written digits.
     pub written: u8,
 }
 
 impl Columns {
-    /// Room for so many entries, as far as there is memory for it.
+    /// Creates an empty list with capacity for `entries` entries, as far as memory allows.
     pub(super) fn with_room(entries: usize) -> Self {
         let mut own = Self::default();
         or_go_without(|| {
@@ -183,16 +182,18 @@ impl Columns {
         own
     }
 
+    /// Adds an entry unless it is zero.
+    ///
     /// # Errors
-    /// FB306.
+    /// FB306 for a value that is not finite.
     pub(super) fn push(&mut self, row: u32, col: u32, value: f64) -> Result<(), Diagnostic> {
         self.extend(row, col, std::iter::once(value))
     }
 
-    /// Adds values that stand below one another in a column, from a row on.
+    /// Adds consecutive values of a column, beginning at row `first`.
     ///
     /// # Errors
-    /// FB306.
+    /// FB306 for a value that is not finite.
     pub(super) fn extend(
         &mut self,
         first: u32,
@@ -203,7 +204,7 @@ impl Columns {
             self.lengths.push((col, 0));
         }
         let before = self.rows.len();
-        // In this order the rows do not go beyond the last one.
+        // The zip in this order does not advance the rows beyond the last value.
         for (value, row) in values.zip(first..) {
             if !value.is_finite() {
                 let message = format!("entry ({}, {}) is {value}", row + 1, col + 1);
@@ -215,7 +216,7 @@ impl Columns {
             }
         }
         let added = &self.rows[before..];
-        // Rows ascend from the first to the last.
+        // Rows ascend from the first to the last value.
         self.sides.lower |= added.last().is_some_and(|row| *row > col);
         self.sides.upper |= added.first().is_some_and(|row| *row < col);
         if let Some((_, length)) = self.lengths.last_mut() {
@@ -242,10 +243,10 @@ impl Columns {
         self.sides
     }
 
-    /// The matrix of `n` rows and columns.
+    /// Returns the matrix of `n` rows and columns.
     ///
     /// # Errors
-    /// FB306, FB312.
+    /// FB306 if a sum of duplicates is not finite, FB312 if there is no nonzero entry.
     pub(super) fn into_matrix(self, n: usize, ascending: bool, path: &Path) -> Result<RawMatrix, Diagnostic> {
         if ascending {
             let columns = ColumnEntries::new(n, &self.lengths, self.rows, self.values);
@@ -260,7 +261,7 @@ impl Columns {
     }
 }
 
-/// FB304.
+/// Returns FB304: the file ends within a matrix.
 pub(super) fn cut_off(name: &str) -> Diagnostic {
     Diagnostic::new(Code::MatrixCount, format!("the file ends within matrix {name}"))
 }

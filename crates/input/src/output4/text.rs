@@ -1,5 +1,5 @@
-//! Text files: a header with the format of the numbers, a line for each column or string, and the numbers,
-//! side by side without blanks.
+//! Text files: a header with the format of the numbers, a line for each column or string, and the numbers, side by side
+//! without blanks.
 
 use super::layout::{ColumnRecord, Columns, Header, SINGLE_DIGITS, Stored, cut_off, unpadded};
 use crate::bulk_cards::whole;
@@ -9,21 +9,21 @@ use crate::scanner::{Lines, expected};
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use flexbody_base::text::InputFile;
 
-/// Whether a file begins with the header of a matrix.
+/// Returns true when a file begins with the header of a matrix.
 pub(super) fn begins(head: &[u8]) -> bool {
     Lines::of(head).next().is_some_and(|line| Heading::of(line.text).is_some())
 }
 
-/// Numbers in a line, and columns that each takes.
+/// Numbers per line, and the width of each.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Format {
     per_line: usize,
     width: usize,
 }
 
-/// The header line of a matrix.
+/// Header line of a matrix.
 struct Heading<'a> {
-    /// Columns, rows, form, type.
+    /// Numbers of columns and rows, form and type.
     numbers: [i64; 4],
     name: &'a [u8],
     format: Format,
@@ -53,7 +53,7 @@ impl<'a> Heading<'a> {
     }
 }
 
-/// `1P,5E16.9`, `3E24.16`; without a format the first of these.
+/// Parses a format such as `1P,5E16.9` or `3E24.16`; the first is the default for an empty text.
 fn format(text: &[u8]) -> Option<Format> {
     if text.is_empty() {
         return Some(Format { per_line: 5, width: 16 });
@@ -67,10 +67,10 @@ fn format(text: &[u8]) -> Option<Format> {
     ((1..=100).contains(&format.per_line) && (8..=100).contains(&format.width)).then_some(format)
 }
 
-/// Place of the columns of the matrices, and notation of their numbers.
+/// Returns the positions of the columns of the matrices, and the format of their numbers.
 ///
 /// # Errors
-/// FB301, FB303, FB304 for lines that are none of a matrix.
+/// FB301, FB303, FB304 for lines that do not belong to a matrix.
 pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagnostic> {
     let mut text = Text { lines: Lines::of(file.bytes()) };
     let mut all = Vec::new();
@@ -97,10 +97,10 @@ pub(super) fn contents(file: &InputFile) -> Result<Vec<(Stored, Format)>, Diagno
     Ok(all)
 }
 
-/// The entries of some columns of a matrix, which stand below so many lines.
+/// Returns the entries of some columns of a matrix, below `line` lines.
 ///
 /// # Errors
-/// FB301, FB303, FB306.
+/// FB301 for lines that cannot be parsed, FB303 for indices outside the matrix, FB306 for values that are not finite.
 pub(super) fn columns(
     bytes: &[u8],
     line: usize,
@@ -114,14 +114,14 @@ pub(super) fn columns(
     Ok(columns)
 }
 
-/// A text file while it is read.
+/// State of reading a text file.
 struct Text<'a> {
     lines: Lines<'a>,
 }
 
 impl<'a> Text<'a> {
-    /// The next column of a matrix: its number and how many values it has, which go to `place`. `None` for
-    /// what ends the matrix.
+    /// Reads the next column of a matrix into `place`. Returns its number and its number of values; `None` at the end
+    /// of the matrix.
     fn column(
         &mut self,
         header: &Header,
@@ -133,7 +133,7 @@ impl<'a> Text<'a> {
             integers(line).ok_or_else(|| self.expected("column, row and number of words", line))?;
         let values = match header.column(column).map_err(|d| d.at_line(self.lines.number))? {
             ColumnRecord::End => {
-                // The number that stands there has a format of its own.
+                // The number after the last column has a separate format.
                 let lines = words.clamp(1, 1 << 20).unsigned_abs().div_ceil(format.per_line as u64);
                 return match (0..lines).all(|_| self.next_line().is_some()) {
                     true => Ok(None),
@@ -148,7 +148,7 @@ impl<'a> Text<'a> {
         Ok(Some(values))
     }
 
-    /// A column as strings of nonzeros; how many values it has.
+    /// Reads a column as strings of nonzeros. Returns its number of values.
     fn strings(
         &mut self,
         header: &Header,
@@ -158,6 +158,7 @@ impl<'a> Text<'a> {
         mut place: Option<&mut Columns>,
     ) -> Result<usize, Diagnostic> {
         let per_value = if header.is_single() { 1 } else { 2 };
+        // Each string has a line with its start and length, which count as words of the column.
         let (mut left, mut values) = (words, 0);
         while left > 0 {
             let line = self.next_line().ok_or_else(|| cut_off(&header.name))?;
@@ -180,7 +181,7 @@ impl<'a> Text<'a> {
         Ok(values)
     }
 
-    /// Values below one another: column, first row, number of values. That number, as it is in the file.
+    /// Reads consecutive values: column, first row, number of values. Returns the number of values.
     fn string(
         &mut self,
         header: &Header,
@@ -214,14 +215,14 @@ impl<'a> Text<'a> {
         Ok(count)
     }
 
-    /// Adds the number in a field of the line that was read last.
+    /// Adds the number in a field of the last line.
     fn value(
         &self,
         field: &[u8],
         (row, column): (u32, u32),
         columns: &mut Columns,
     ) -> Result<(), Diagnostic> {
-        /// Numbers whose digits as written are counted, of each of the [`Columns`].
+        /// Number of values, for each of the [`Columns`], whose written digits are counted.
         const COUNTED: usize = 512;
         let number = field.trim_ascii();
         let value = real(number).ok_or_else(|| {
@@ -245,7 +246,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Whole numbers that fill a line: between blanks, or in fields of 8 or 16 characters.
+/// Parses integers that fill a line: between blanks, or in fields of 8 or 16 characters.
 fn integers<const N: usize>(line: &[u8]) -> Option<[i64; N]> {
     let apart = || exactly(line.split(|b| *b == b' ').filter(|word| !word.is_empty()));
     let in_fields = |width: usize| {
@@ -254,7 +255,7 @@ fn integers<const N: usize>(line: &[u8]) -> Option<[i64; N]> {
     apart().or_else(|| in_fields(8)).or_else(|| in_fields(16))
 }
 
-/// So many whole numbers, if there are so many words and each is one.
+/// Parses exactly N integers; returns `None` for another number of words or other words.
 fn exactly<'a, const N: usize>(mut words: impl Iterator<Item = &'a [u8]>) -> Option<[i64; N]> {
     let mut numbers = [0; N];
     for number in &mut numbers {

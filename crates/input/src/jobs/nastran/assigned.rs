@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// The lines of a deck above its bulk data that assign files.
+/// Lines of a deck above its bulk data that assign files.
 #[derive(Default)]
 pub(super) struct Assigned {
     statements: Vec<String>,
@@ -10,7 +10,7 @@ pub(super) struct Assigned {
 }
 
 impl Assigned {
-    /// Takes a line above the bulk data.
+    /// Reads a line above the bulk data.
     pub(super) fn line(&mut self, line: &str) {
         let line = line.trim();
         let first = line.split([' ', '\t', ',']).next().unwrap_or_default();
@@ -25,14 +25,15 @@ impl Assigned {
         self.goes_on = (self.goes_on || is_assign) && line.ends_with(',');
     }
 
-    /// The files of OUTPUT4, in the order of the deck at `deck`: where the deck says, or under the same name
-    /// beside it, as runs leave them that were moved. What is nowhere is given where the deck says.
+    /// Returns the files of OUTPUT4, in the order of the deck at `deck`. A file that is missing at the path in the deck
+    /// is looked up by its name in the folder of the deck, as after a move of the run; if it is missing there too, the
+    /// path of the deck is returned.
     pub(super) fn outputs(&self, deck: &Path) -> Vec<PathBuf> {
         let folder = deck.parent().unwrap_or(Path::new(""));
         let mut files = Vec::new();
         for name in self.statements.iter().filter_map(|statement| output(statement)) {
             let stated = folder.join(name);
-            // Decks of other systems have other separators.
+            // Decks of other operating systems have other separators.
             let last = name.rsplit(['/', '\\']).next().unwrap_or(name);
             let beside = folder.join(last);
             let file = if !stated.is_file() && beside.is_file() { beside } else { stated };
@@ -44,7 +45,7 @@ impl Assigned {
     }
 }
 
-/// The file of a statement `OUTPUT4='name',UNIT=12,FORM=FORMATTED`.
+/// Returns the file of a statement `OUTPUT4='name',UNIT=12,FORM=FORMATTED`.
 fn output(statement: &str) -> Option<&str> {
     let statement = statement.trim_start_matches([' ', '\t', ',']);
     let (kind, rest) = statement.split_once('=')?;

@@ -1,4 +1,4 @@
-//! What the bulk data and the case control of a deck say: places, axes of rows, boundary, supports, sets.
+//! The content of bulk data and case control of a deck: positions, axes of rows, boundary, supports, sets.
 
 use super::assigned::Assigned;
 use super::constraints::Constraints;
@@ -15,29 +15,29 @@ use flexbody_model::Elements;
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Bad cards that are told one by one.
+/// Number of bad cards that are reported one by one.
 const SHOWN: usize = 5;
-/// Scalar points that one range may name, and a deck.
+/// Largest number of scalar points in a range; `MOST_SCALARS` is the largest number in a deck.
 const MOST_IN_RANGE: i64 = 1_000_000;
 const MOST_SCALARS: usize = 10_000_000;
-/// Elements that have displacements only.
+/// Elements with displacements only.
 const SOLIDS: &[&str] = &["CHEXA", "CTETRA", "CPENTA", "CPYRAM", "CPYRA", "CHEXA8", "CHEXA20"];
-/// Cards that begin with C and are no elements.
+/// Prefixes of cards that begin with C and are no elements.
 const NO_ELEMENTS: &[&str] = &["CORD", "CSET", "CSUP", "CYJOIN", "CYSYM", "CYAX", "CYSUP", "CASE", "CSSCHD"];
 
-/// Points from one to another, and components of them.
+/// Range of points, and components of them.
 struct Members {
     first: i64,
     last: i64,
     components: Vec<u8>,
 }
 
-/// A deck.
+/// Content of a deck.
 #[derive(Default)]
 pub(super) struct Bulk {
-    /// The main file first.
+    /// Files of the deck, the main file first.
     pub files: Vec<SeenFile>,
-    /// The files of the cards.
+    /// Files of the cards.
     pub card_files: Vec<PathBuf>,
     pub grids: BTreeMap<i64, Grid>,
     pub scalars: BTreeSet<i64>,
@@ -46,18 +46,18 @@ pub(super) struct Bulk {
     pub sets: SetLines,
     pub assigned: Assigned,
     pub constraints: Constraints,
-    /// PARAM,COUPMASS.
+    /// True after PARAM,COUPMASS.
     pub coupled_mass: bool,
     pub has_elements: bool,
-    /// How they are drawn.
+    /// Elements for drawing.
     pub elements: Elements,
-    /// An element has more than displacements.
+    /// True if an element has more than displacements.
     pub has_rotations: bool,
-    /// SEQGP.
+    /// True after SEQGP.
     pub resequenced: bool,
-    /// EXTRN.
+    /// True after EXTRN.
     is_superelement: bool,
-    /// First card that supports the body, and how many there are.
+    /// First card that supports the body (file and line), and the number of such cards.
     pub supports: Option<(PathBuf, usize, usize)>,
     boundary: Vec<Members>,
     supported: Vec<Members>,
@@ -69,10 +69,11 @@ pub(super) struct Bulk {
 }
 
 impl Bulk {
-    /// Reads a deck with what it includes.
+    /// Reads a deck with the files that it includes.
     ///
     /// # Errors
-    /// FB101, FB106, FB110, FB111, FB205, and those of [`Dmigs`], all that are found.
+    /// FB101, FB106 for files that cannot be read, FB110 for bad lines, FB111 for unsupported cards, FB205 for a node
+    /// that is given twice, and the errors of [`Dmigs`], all that are found.
     pub(super) fn read(path: &Path) -> Found<Self> {
         let mut bulk = Self::default();
         let files = read_deck(path, &mut |item| match item {
@@ -113,18 +114,18 @@ impl Bulk {
         if bad.is_empty() { Ok(bulk) } else { Err(bad) }
     }
 
-    /// Whether matrices have the rows of a boundary only.
+    /// Returns true when the matrices have the rows of a boundary only.
     pub(super) fn is_condensed(&self) -> bool {
         let kept: BTreeSet<i64> = self.boundary().into_iter().map(|(id, _)| id).collect();
         self.is_superelement || !kept.is_empty() && self.grids.keys().any(|id| !kept.contains(id))
     }
 
-    /// The points of the a-set that cards name, ascending.
+    /// Returns the points of the a-set that cards name, ascending.
     pub(super) fn boundary(&self) -> BTreeSet<(i64, u8)> {
         self.named(&self.boundary)
     }
 
-    /// The points that supports hold.
+    /// Returns the points that supports hold.
     pub(super) fn supported(&self) -> BTreeSet<(i64, u8)> {
         self.named(&self.supported)
     }
@@ -219,7 +220,7 @@ impl Bulk {
             self.supported.push(Members { first: id, last: id, components: held });
         }
         let same = grid.clone();
-        // The same card may stand in several included files.
+        // A card may occur in several included files.
         if self.grids.insert(id, grid).is_some_and(|other| !other.is_the_same(&same)) {
             let message = format!("grid {id} is given twice");
             self.complain(Diagnostic::new(Code::NodeDuplicate, message).in_file(path).at_line(card.line()));
@@ -236,7 +237,7 @@ impl Bulk {
         Some(())
     }
 
-    /// Empty fields of GRID are those of GRDSET, which may stand anywhere.
+    /// Replaces empty fields of GRID by those of GRDSET, which may follow later.
     fn apply_defaults(&mut self) {
         let [system, axes] = self.defaults;
         for (&id, grid) in &mut self.grids {
@@ -327,7 +328,7 @@ fn kind(card: &Card) -> Option<SystemKind> {
     }
 }
 
-/// Points with components in turn.
+/// Adds the points of a card with pairs of point and components.
 fn pairs(card: &Card, from: usize, members: &mut Vec<Members>) -> Option<()> {
     for k in (from..card.len()).step_by(2).filter(|k| !card.field(*k).is_empty()) {
         let id = card.integer(k).filter(|id| *id > 0)?;
@@ -336,7 +337,7 @@ fn pairs(card: &Card, from: usize, members: &mut Vec<Members>) -> Option<()> {
     Some(())
 }
 
-/// After the number of the set: point, components, displacement in turn.
+/// Adds the points of a card with a set number, then triples of point, components and displacement.
 fn triples(card: &Card, members: &mut Vec<Members>) -> Option<()> {
     for k in (1..card.len()).step_by(3).filter(|k| !card.field(*k).is_empty()) {
         let id = card.integer(k).filter(|id| *id > 0)?;
@@ -345,7 +346,7 @@ fn triples(card: &Card, members: &mut Vec<Members>) -> Option<()> {
     Some(())
 }
 
-/// Components, then points or a range of them.
+/// Adds the points of a card with components, then points or a range of them.
 fn list(card: &Card, at: usize, members: &mut Vec<Members>) -> Option<()> {
     let own = components(card.field(at))?;
     let mut k = at + 1;

@@ -1,5 +1,5 @@
-//! Rigid elements and multipoint constraints of a deck: which components of grids follow others. KGG and MGG do
-//! not have them: rows that follow are eliminated.
+//! Rigid elements and multipoint constraints of a deck: the components of grids that follow others. KGG and MGG do not
+//! contain them: rows that follow others are eliminated.
 
 use crate::bulk_cards::{Card, components, whole};
 use crate::coordinates::real;
@@ -9,27 +9,27 @@ use flexbody_model::DofLabel;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Cards that make components of grids follow others and are not read.
+/// Constraint cards that are not supported.
 const NOT_READ: &[&str] = &[
     "RTRPLT", "RTRPLT1", "RJOINT", "RSPLINE", "RSSCON", "RSPINT", "RBE2GS", "RBE2A", "RBE3U", "MPCY", "MPCAX",
 ];
 
-/// Points that one THRU of a rigid element may name.
+/// Largest number of points in a THRU of a rigid element.
 const MOST_IN_RANGE: i64 = 1_000_000;
 
-/// The constraints of a deck.
+/// Constraints of a deck.
 #[derive(Default)]
 pub(super) struct Constraints {
     all: Vec<Constraint>,
-    /// Sets that MPCADD joins.
+    /// Sets joined by MPCADD.
     joined: BTreeMap<i64, Vec<i64>>,
-    /// Sets that the case control selects.
+    /// Sets selected by the case control.
     selected: BTreeSet<i64>,
 }
 
-/// A card that makes components follow others.
+/// Constraint of one card.
 pub(super) struct Constraint {
-    /// `RBE2 901`.
+    /// Name with number, for instance `RBE2 901`.
     pub name: String,
     pub relation: Relation,
     pub path: PathBuf,
@@ -38,20 +38,20 @@ pub(super) struct Constraint {
 
 /// Relation by which components follow others.
 pub(super) enum Relation {
-    /// A rigid body that six independent components move.
+    /// Rigid body moved by six independent components.
     Rigid { independent: Vec<Point>, dependent: Vec<Point> },
-    /// Two grids at a constant distance: the component that follows.
+    /// Two grids at a constant distance, with the dependent component.
     Rod { grids: [i64; 2], dependent: Point },
-    /// The weighted average of the motions of other grids.
+    /// Weighted average of the motions of other grids.
     Average { reference: i64, components: Vec<u8>, weighted: Vec<(Point, f64)> },
-    /// A sum of components that is zero, solved for the first of them, of the set with this number.
+    /// Zero sum of components, solved for the first of them; `set` is the number of its set.
     Sum { set: i64, terms: Vec<(Point, f64)> },
-    /// A card that is not read, with the whole numbers on it, some of which are grids.
+    /// Unsupported card with the whole numbers on it, some of which are grids.
     NotRead { numbers: Vec<i64> },
 }
 
 impl Constraint {
-    /// The points that follow.
+    /// Returns the dependent points.
     fn dependent(&self) -> Vec<Point> {
         match &self.relation {
             Relation::Rigid { dependent, .. } => dependent.clone(),
@@ -64,7 +64,7 @@ impl Constraint {
         }
     }
 
-    /// The points that are followed.
+    /// Returns the independent points.
     fn independent(&self) -> Vec<Point> {
         match &self.relation {
             Relation::Rigid { independent, .. } => independent.clone(),
@@ -78,7 +78,7 @@ impl Constraint {
         }
     }
 
-    /// FB111 about the card.
+    /// Returns FB111 about the card.
     pub(super) fn refused(&self, why: impl std::fmt::Display) -> Diagnostic {
         let message = format!("{}: {why}", self.name);
         Diagnostic::new(Code::DeckUnsupported, message).in_file(&self.path).at_line(self.line)
@@ -86,7 +86,7 @@ impl Constraint {
 }
 
 impl Constraints {
-    /// Takes a line of case control: `MPC = 5`.
+    /// Reads a line of case control, for instance `MPC = 5`.
     pub(super) fn control(&mut self, line: &str) {
         let words: Vec<&str> =
             line.split(|c: char| c == '=' || c.is_whitespace()).filter(|w| !w.is_empty()).collect();
@@ -97,7 +97,7 @@ impl Constraints {
         }
     }
 
-    /// Takes a card if it is one of a constraint; `None` for one that cannot be read.
+    /// Reads a card. Returns false if it is no constraint, `None` if it cannot be read.
     pub(super) fn card(&mut self, card: &Card, path: &Path) -> Option<bool> {
         let relation = match card.name.as_str() {
             "RBE2" => rbe2(card)?,
@@ -121,13 +121,13 @@ impl Constraints {
         Some(true)
     }
 
-    /// Sets that the case control selects, with those that MPCADD joins in them.
+    /// Returns the sets that the case control selects, with the sets that MPCADD joins in them.
     fn sets(&self) -> BTreeSet<i64> {
         let joined = |set: &i64| self.joined.get(set).into_iter().flatten().copied();
         self.selected.iter().flat_map(|set| joined(set).chain([*set])).collect()
     }
 
-    /// Constraints that hold: rigid elements, and sums of the sets that the case control selects.
+    /// Returns the active constraints: rigid elements, and sums of the sets that the case control selects.
     fn holding(&self) -> impl Iterator<Item = &Constraint> {
         let sets = self.sets();
         self.all.iter().filter(move |own| match &own.relation {
@@ -136,29 +136,30 @@ impl Constraints {
         })
     }
 
-    /// Returns the points that follow others, and those that are followed.
+    /// Returns the dependent and the independent points.
     pub(super) fn points(&self) -> (BTreeSet<Point>, BTreeSet<Point>) {
         let followers = self.holding().flat_map(Constraint::dependent).collect();
         (followers, self.holding().flat_map(Constraint::independent).collect())
     }
 
-    /// Returns the rows that follow others, by the names of the constraints.
+    /// Returns the dependent rows, by the names of the constraints.
     pub(super) fn followers(&self) -> Vec<(String, Vec<DofLabel>)> {
         let of =
             |own: &Constraint| (own.name.clone(), own.dependent().into_iter().map(label).collect::<Vec<_>>());
         self.holding().map(of).collect()
     }
 
-    /// Returns the constraints that matrices do not contain: `has` tells whether the matrices have rows of a point,
-    /// and rows that follow are not in matrices after the constraints were applied.
+    /// Returns the constraints that the matrices do not contain yet. `has` returns true when the matrices have rows of
+    /// a point; matrices after the constraints have no dependent rows.
     ///
     /// # Errors
-    /// FB111 for constraints that are not read, and for sums of a set that is not selected: they may hold or not.
+    /// FB111 for unsupported constraints, and for sums of a set that is not selected, since they may be active or not.
     pub(super) fn open(&self, has: impl Fn(&Point) -> bool) -> Result<Vec<&Constraint>, Diagnostic> {
         let sets = self.sets();
         let mut open = Vec::new();
         for own in &self.all {
             match &own.relation {
+                // An unsupported card matters only if it connects grids with rows.
                 Relation::NotRead { numbers } => {
                     let moves = |grid: i64| (0..=6).any(|component| has(&(grid, component)));
                     if numbers.iter().filter(|number| moves(**number)).count() > 1 {
@@ -180,12 +181,12 @@ impl Constraints {
     }
 }
 
-/// Fields of a card that are not empty, from one on.
+/// Returns the indices of the fields of a card that are not empty, from `from` on.
 fn filled(card: &Card, from: usize) -> impl Iterator<Item = usize> {
     (from..card.len()).filter(|k| !card.field(*k).is_empty())
 }
 
-/// True if a field is a real number and no whole one: a weight, or a coefficient of expansion.
+/// Returns true when a field is a real number but no whole one: a weight, or a coefficient of expansion.
 fn is_real(field: &[u8]) -> bool {
     whole(field).is_none() && real(field).is_some()
 }
@@ -194,7 +195,7 @@ fn grid(card: &Card, k: usize) -> Option<i64> {
     card.integer(k).filter(|id| *id > 0)
 }
 
-/// Points of a grid. Components of scalar points are 0 or none.
+/// Returns the points of a grid. Components of scalar points are 0 or none.
 fn points(grid: i64, field: &[u8]) -> Option<Vec<Point>> {
     let own = components(field)?;
     Some(if own.is_empty() { vec![(grid, 0)] } else { own.into_iter().map(|c| (grid, c)).collect() })
@@ -204,7 +205,8 @@ fn all_of(grid: i64) -> impl Iterator<Item = Point> {
     (1..=6).map(move |component| (grid, component))
 }
 
-/// Grids, with ranges, from a field up to the first that is no whole number; and where that is.
+/// Returns the grids, including ranges, from a field up to the first that is no whole number, and the index of that
+/// field.
 fn grids(card: &Card, from: usize) -> Option<(Vec<i64>, usize)> {
     let (mut ids, mut k) = (Vec::new(), from);
     while k < card.len() {
@@ -230,7 +232,7 @@ fn not_read(card: &Card) -> Relation {
     Relation::NotRead { numbers: (1..card.len()).filter_map(|k| whole(card.field(k))).collect() }
 }
 
-/// EID, GN, CM, GM1, GM2, ..., ALPHA.
+/// Reads RBE2 with the fields EID, GN, CM, GM1, GM2, ..., ALPHA.
 fn rbe2(card: &Card) -> Option<Relation> {
     let own = components(card.field(2)).filter(|own| !own.is_empty() && !own.contains(&0))?;
     let (followers, end) = grids(card, 3)?;
@@ -239,7 +241,7 @@ fn rbe2(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
 }
 
-/// EID, GA, GB, CNA, CNB, CMA, CMB, ALPHA.
+/// Reads RBAR with the fields EID, GA, GB, CNA, CNB, CMA, CMB, ALPHA.
 fn rbar(card: &Card) -> Option<Relation> {
     let own = |k: usize| -> Option<Vec<Point>> {
         let id = grid(card, 1 + k % 2)?;
@@ -255,7 +257,7 @@ fn rbar(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent, dependent })
 }
 
-/// EID, GA, GB, CB, ALPHA.
+/// Reads RBAR1 with the fields EID, GA, GB, CB, ALPHA.
 fn rbar1(card: &Card) -> Option<Relation> {
     let own = components(card.field(3))?;
     let own = if own.is_empty() { vec![1, 2, 3, 4, 5, 6] } else { own };
@@ -264,7 +266,7 @@ fn rbar1(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent: all_of(grid(card, 1)?).collect(), dependent })
 }
 
-/// EID, pairs of grids and components, UM, pairs that follow, ALPHA.
+/// Reads RBE1 with the fields EID, pairs of independent grids and components, UM, dependent pairs, ALPHA.
 fn rbe1(card: &Card) -> Option<Relation> {
     let (mut independent, mut dependent, mut follows) = (Vec::new(), Vec::new(), false);
     let mut fields = filled(card, 1);
@@ -281,7 +283,7 @@ fn rbe1(card: &Card) -> Option<Relation> {
     Some(Relation::Rigid { independent, dependent })
 }
 
-/// EID, GA, GB, CMA, CMB, ALPHA.
+/// Reads RROD with the fields EID, GA, GB, CMA, CMB, ALPHA.
 fn rrod(card: &Card) -> Option<Relation> {
     let grids = [grid(card, 1)?, grid(card, 2)?];
     let own = [components(card.field(3))?, components(card.field(4))?];
@@ -293,7 +295,7 @@ fn rrod(card: &Card) -> Option<Relation> {
     Some(Relation::Rod { grids, dependent })
 }
 
-/// EID, blank, REFGRID, REFC, then weight, components and grids in turn, UM, ALPHA.
+/// Reads RBE3 with the fields EID, blank, REFGRID, REFC, then groups of weight, components and grids, UM, ALPHA.
 fn rbe3(card: &Card) -> Option<Relation> {
     let reference = grid(card, 2)?;
     let own = components(card.field(3)).filter(|own| !own.is_empty() && !own.contains(&0))?;
@@ -319,7 +321,7 @@ fn rbe3(card: &Card) -> Option<Relation> {
     Some(Relation::Average { reference, components: own, weighted })
 }
 
-/// SID, then grid, component and coefficient, two to a line of eight fields.
+/// Reads MPC with the fields SID, then groups of grid, component and coefficient, two per line of eight fields.
 fn sum(card: &Card) -> Option<Relation> {
     let set = grid(card, 0)?;
     let mut terms = Vec::new();

@@ -1,14 +1,14 @@
-//! How the elements of a deck are drawn.
+//! The shapes by which elements of a deck are drawn.
 
 use crate::bulk_cards::Card;
 use crate::upright_order::in_order_of_shape;
 use flexbody_model::{ElementShape, Elements};
 
-/// Elements that are points, or join points at one place: springs, masses, dampers, fasteners.
+/// Elements that are points or connect coincident points, and are not drawn: springs, masses, dampers, fasteners.
 const NOTHING_TO_DRAW: &[&str] =
     &["CELAS", "CBUSH", "CMASS", "CONM", "CDAMP", "CVISC", "CGAP", "CFAST", "CWELD", "CSEAM", "CHBDY"];
 
-/// Adds the element of a card to those that are drawn.
+/// Adds the element of a card to the elements for drawing.
 pub(super) fn add(card: &Card, elements: &mut Elements) {
     let name = card.name.as_str();
     let Some((shape, first, most)) = shape(name) else {
@@ -28,7 +28,7 @@ pub(super) fn add(card: &Card, elements: &mut Elements) {
     }
 }
 
-/// Shape of an element, the field of its first grid, and the number of grids it may have.
+/// Returns the shape of an element, the field of its first grid, and its largest number of grids.
 fn shape(name: &str) -> Option<(ElementShape, usize, usize)> {
     Some(match name {
         "CTETRA" => (ElementShape::Tetrahedron, 2, 10),

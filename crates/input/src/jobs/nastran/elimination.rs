@@ -1,5 +1,4 @@
-//! Rows that constraints make follow others, and what is left without them: u = T u_n, so that K and M become
-//! T' K T and T' M T.
+//! The elimination of rows that follow others by constraints: u = T u_n, so that K and M become T' K T and T' M T.
 
 use super::Axes;
 use super::constraints::{Constraint, Relation};
@@ -10,23 +9,23 @@ use flexbody_model::Nodes;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use std::collections::{BTreeMap, HashMap};
 
-/// Singular values of a rigid body or an average below this part of the largest are zero.
+/// Part of the largest singular value of a rigid body or an average below which singular values count as zero.
 const SINGULAR: f64 = 1e-10;
 
-/// Constraints that a message names.
+/// Number of constraints that a message names.
 const NAMED: usize = 8;
 
-/// A point as a sum of others.
+/// Point as a weighted sum of others.
 type Sum = Vec<(Point, f64)>;
 
-/// Points that follow others, each as a sum of points that follow none.
+/// Dependent points, each as a sum of independent points.
 pub(super) struct Followers {
     sums: BTreeMap<Point, Sum>,
-    /// Names of the constraints that make them.
+    /// Names of the constraints.
     names: Vec<String>,
 }
 
-/// Places of grids and the axes of their rows.
+/// Positions of grids and the axes of their rows.
 pub(super) struct GridPlaces<'b> {
     positions: HashMap<i64, Vector3<f64>>,
     axes: &'b HashMap<i64, Axes>,
@@ -38,7 +37,7 @@ impl<'b> GridPlaces<'b> {
         Self { positions: own.map(|(id, x)| (*id, Vector3::from(*x))).collect(), axes }
     }
 
-    /// True if rows of the grid stand along other axes than those of the model.
+    /// Returns true when rows of the grid are along other axes than those of the model.
     pub(super) fn are_turned(&self, grid: i64) -> bool {
         self.axes.contains_key(&grid)
     }
@@ -48,7 +47,7 @@ impl<'b> GridPlaces<'b> {
         known.ok_or_else(|| of.refused(format!("grid {grid} is not in the deck")))
     }
 
-    /// Unit vector along a component.
+    /// Returns the unit vector along a component.
     fn axis(&self, (grid, component): Point) -> Vector3<f64> {
         let k = usize::from(component.max(1) - 1) % 3;
         match self.axes.get(&grid) {
@@ -57,7 +56,7 @@ impl<'b> GridPlaces<'b> {
         }
     }
 
-    /// The motion of a point by three translations at `origin` and three rotations times `length`.
+    /// Returns the motion of a point by three translations at `origin` and three rotations times `length`.
     fn rigid(
         &self,
         point: Point,
@@ -79,10 +78,10 @@ impl<'b> GridPlaces<'b> {
 }
 
 impl Followers {
-    /// Finds what follows by `constraints`.
+    /// Finds the dependent points of `constraints`.
     ///
     /// # Errors
-    /// FB111 for constraints that are not read, make a point follow twice, or follow one another in a circle.
+    /// FB111 for constraints that are not supported, make a point dependent twice, or follow one another in a circle.
     pub(super) fn new(constraints: &[&Constraint], places: &GridPlaces<'_>) -> Result<Self, Diagnostic> {
         let mut direct: BTreeMap<Point, (Sum, &Constraint)> = BTreeMap::new();
         for constraint in constraints {
@@ -96,7 +95,7 @@ impl Followers {
         let mut names: Vec<String> = constraints.iter().map(|own| own.name.clone()).collect();
         names.dedup();
         let mut all = Self { sums: BTreeMap::new(), names };
-        // Every round takes those whose sums have no followers that are not solved.
+        // Every round solves the points whose sums have no unsolved dependent points.
         while !direct.is_empty() {
             let ready = |sum: &Sum| sum.iter().all(|(other, _)| !direct.contains_key(other));
             let solved: Vec<Point> =
@@ -115,7 +114,7 @@ impl Followers {
         Ok(all)
     }
 
-    /// The first names of constraints, and how many more there are.
+    /// Returns the first names of constraints, and the number of the others.
     pub(super) fn some_names(&self) -> String {
         let some = self.names[..self.names.len().min(NAMED)].join(", ");
         match self.names.len().saturating_sub(NAMED) {
@@ -124,7 +123,7 @@ impl Followers {
         }
     }
 
-    /// A sum by points that follow none.
+    /// Returns a sum in terms of independent points.
     fn free(&self, sum: &Sum) -> Sum {
         let mut free: BTreeMap<Point, f64> = BTreeMap::new();
         for (point, factor) in sum {
@@ -140,12 +139,12 @@ impl Followers {
         self.sums.contains_key(point)
     }
 
-    /// The points that others follow.
+    /// Returns the points that others follow.
     pub(super) fn leaders(&self) -> impl Iterator<Item = Point> + '_ {
         self.sums.values().flatten().map(|(point, _)| *point)
     }
 
-    /// The rows `points` (ascending) without those that follow.
+    /// Returns the elimination of the dependent points from the rows `points` (ascending).
     ///
     /// # Errors
     /// FB112 if a point that another one follows is not among them.
@@ -177,13 +176,13 @@ impl Followers {
     }
 }
 
-/// Rows without those that follow.
+/// Elimination of the dependent rows.
 pub(super) struct Elimination {
-    /// Column i has the rows that are left which row i follows.
+    /// Matrix whose column i holds the remaining rows that row i follows, with their factors.
     pub follows: CscMatrix,
-    /// Column i has the row that is left which is row i.
+    /// Matrix whose column i holds the remaining row that is row i, if there is one.
     pub picks: CscMatrix,
-    /// Points of the rows that are left.
+    /// Points of the remaining rows.
     pub points: Vec<Point>,
 }
 
@@ -194,7 +193,7 @@ fn named((grid, component): Point) -> String {
     }
 }
 
-/// Returns the points that follow by one constraint, each with its sum.
+/// Returns the dependent points of one constraint, each with its sum.
 fn sums(of: &Constraint, places: &GridPlaces<'_>) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     match &of.relation {
         Relation::Rigid { independent, dependent } => rigid(of, independent, dependent, places),
@@ -211,7 +210,7 @@ fn sums(of: &Constraint, places: &GridPlaces<'_>) -> Result<Vec<(Point, Sum)>, D
     }
 }
 
-/// u_d = G_d G_i^-1 u_i, where G has the rigid motions of the points.
+/// Returns the sums u_d = G_d G_i^-1 u_i, where G holds the rigid motions of the points.
 fn rigid(
     of: &Constraint,
     independent: &[Point],
@@ -241,13 +240,14 @@ fn rigid(
     dependent.iter().map(follow).collect()
 }
 
-/// The component that keeps the distance of two grids: e.(u_b - u_a) = 0.
+/// Returns the component that keeps the distance of two grids constant: e.(u_b - u_a) = 0.
 fn rod(
     of: &Constraint,
     [a, b]: [i64; 2],
     dependent: Point,
     places: &GridPlaces<'_>,
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
+    // Coefficients of the constraint in all displacements of both grids, solved for the dependent one.
     let line = places.position(b, of)? - places.position(a, of)?;
     let along = |grid: i64, sign: f64| {
         (1..=3).map(move |component| ((grid, component), sign * line.dot(&places.axis((grid, component)))))
@@ -261,7 +261,7 @@ fn rod(
     Ok(vec![(dependent, others.map(|(point, factor)| (point, -factor / own)).collect())])
 }
 
-/// The rigid motion q that fits the weighted motions best, q = (B' W B)^-1 B' W u; weights of rotations are
+/// Returns the rigid motion q that fits the weighted motions best, q = (B' W B)^-1 B' W u. Weights of rotations are
 /// multiplied by the square of the mean distance of the grids from the reference grid.
 fn average(
     of: &Constraint,
@@ -272,11 +272,13 @@ fn average(
 ) -> Result<Vec<(Point, Sum)>, Diagnostic> {
     let origin = places.position(reference, of)?;
     let grids: std::collections::BTreeSet<i64> = weighted.iter().map(|((grid, _), _)| *grid).collect();
+    // Mean distance of the grids, by which rotations become lengths.
     let mut distance = 0.0;
     for grid in &grids {
         distance += (places.position(*grid, of)? - origin).norm() / grids.len() as f64;
     }
     let length = if distance > 0.0 { distance } else { 1.0 };
+    // Normal matrix B' W B of the weighted fit.
     let mut normal = Matrix6::zeros();
     let mut rows = Vec::new();
     for &(point, weight) in weighted {
@@ -287,6 +289,7 @@ fn average(
     }
     let inverse =
         inverted(normal).ok_or_else(|| of.refused("the components that it averages leave it a motion"))?;
+    // Each component of the reference grid follows the fitted motion b (B' W B)^-1 B' W u.
     let follow = |component: &u8| {
         let point = (reference, *component);
         let own = places.rigid(point, origin, length, of)?.transpose() * inverse;
@@ -310,7 +313,7 @@ fn longest<'p>(
     Ok(if longest > 0.0 { longest } else { 1.0 })
 }
 
-/// The inverse; `None` of a singular matrix.
+/// Returns the inverse; `None` for a singular matrix.
 fn inverted(own: Matrix6<f64>) -> Option<Matrix6<f64>> {
     let values = own.singular_values();
     (values.min() > SINGULAR * values.max()).then(|| own.try_inverse()).flatten()

@@ -1,4 +1,4 @@
-//! K and M of a deck, and their way from the rows of the files to those of the model.
+//! K and M of a deck, and their transformation from the rows of the files to those of the model.
 
 use super::Axes;
 use super::bulk::Bulk;
@@ -19,24 +19,25 @@ pub(super) struct Matrices {
     pub stiffness: RawMatrix,
     pub mass: RawMatrix,
     pub labels: Vec<DofLabel>,
-    /// Files beside the deck that they were read from.
+    /// Files in the folder of the deck from which they were read.
     pub files: Vec<SeenFile>,
-    /// Number of rows of the files.
+    /// Number of rows in the files.
     n_given: usize,
-    /// Rows that follow others by constraints of the deck, where the files have them.
+    /// Elimination of dependent rows by constraints of the deck with the names of the constraints, if the files contain
+    /// these rows.
     followers: Option<(Elimination, String)>,
-    /// The axes of the rows, where they were turned.
+    /// Rotation of the rows to the axes of the model, if they had others.
     turn: Option<CscMatrix>,
-    /// Rows that were kept, where others were left out.
+    /// Rows that were kept, if others were left out.
     kept: Option<Vec<usize>>,
 }
 
 impl Matrices {
-    /// The matrices of the deck, else those of the files beside it: either of punch files or of OUTPUT4.
+    /// Reads the matrices of the deck, else those of the files in its folder: either punch files or OUTPUT4.
     pub(super) fn of(bulk: &Bulk, dmigs: Dmigs, job: &JobFile, places: &GridPlaces<'_>) -> Found<Self> {
         let (path, stated) = (&job.path, job.matrices.as_ref());
         let names = dmigs.names();
-        // Beside elements they are a part of the model that its own matrices contain.
+        // Beside elements, DMIG matrices are a part of the model, which its K and M contain.
         if !names.is_empty() && !bulk.has_elements {
             let pair = choose_pair(&names, &dmigs.candidates(), stated)
                 .map_err(|pairs| no_pair(&names, &pairs, stated, path))?;
@@ -45,6 +46,7 @@ impl Matrices {
         let (punches, outputs) = files_beside(bulk, job)?;
         let punched = Dmigs::of(&punches)?;
         let outputs = Outputs::of(outputs)?;
+        // Exactly one kind of file must have a pair; else all pairs are reported.
         let punch_pair = choose_pair(&punched.names(), &punched.candidates(), stated);
         match (punch_pair, choose_pair(&outputs.names, &outputs.fitting(bulk), stated)) {
             (Ok(pair), Err(_)) => Self::of_dmigs(bulk, punched, pair, places),
@@ -68,10 +70,10 @@ impl Matrices {
         places: &GridPlaces<'_>,
     ) -> Found<Self> {
         let mut points: BTreeSet<Point> = dmigs.points(&[k, m]).into_iter().collect();
-        // Rows that others follow have to be there, also where they are zero.
+        // Rows that others follow must exist, even if they are zero.
         let followers = followers(bulk, |point| points.contains(point), places)?;
         points.extend(followers.iter().flat_map(|own| own.leaders()));
-        // So have rows that are turned together.
+        // Rows that are rotated together must exist as well.
         let turned: Vec<Point> = points.iter().filter(|(id, _)| places.are_turned(*id)).copied().collect();
         for (id, component) in turned {
             let first = if component > 3 { 4 } else { 1 };
@@ -95,7 +97,7 @@ impl Matrices {
         Ok(Self { stiffness, mass, labels, files, n_given, followers, turn: None, kept: None })
     }
 
-    /// Returns the matrices without rows that follow others by constraints of the deck.
+    /// Returns the matrices without the rows that follow others by constraints of the deck.
     pub(super) fn without_followers(self, found: &mut Vec<Diagnostic>) -> Self {
         let Some((own, names)) = &self.followers else { return self };
         let followers = self.n_given - own.points.len();
@@ -128,15 +130,15 @@ impl Matrices {
         Ok(Self { stiffness, mass, turn: Some(turn.axes()), ..self })
     }
 
-    /// Without the rows that are empty in both matrices: rotations of solids, and all rows of points that
-    /// nothing is fixed to.
+    /// Returns the matrices without rows that are empty in both: rotations of solids, and all rows of points to which
+    /// nothing is attached.
     pub(super) fn without_empty_rows(self, found: &mut Vec<Diagnostic>) -> Self {
         let labels = &self.labels;
         let filled = filled_rows([&self.stiffness.matrix, &self.mass.matrix], labels.len());
         let rows = || labels.iter().zip(&filled);
         let moving: HashSet<i64> =
             rows().filter(|(_, filled)| **filled).map(|(label, _)| label.node).collect();
-        // A displacement without stiffness and mass is a mistake where the node has others.
+        // A displacement without stiffness and mass is an error if the node has other rows.
         let keeps = |(label, filled): (&DofLabel, &bool)| {
             *filled || label.direction <= 3 && moving.contains(&label.node)
         };
@@ -156,8 +158,8 @@ impl Matrices {
         Self { stiffness, mass, labels, kept: Some(kept), ..self }
     }
 
-    /// FB111 for modal coordinates: rows of scalar points with mass. What they move, and so how the inertia
-    /// changes with them, is not in K and M.
+    /// Returns FB111 for modal coordinates: rows of scalar points with mass. K and M do not contain their shapes, and
+    /// thus not the change of the inertia with them.
     pub(super) fn refuse_modal(&self, bulk: &Bulk) -> Found<()> {
         let is_modal = |(row, label): (usize, &DofLabel)| {
             !bulk.grids.contains_key(&label.node)
@@ -176,14 +178,14 @@ impl Matrices {
         Err(vec![diagnostic.with_help(help)])
     }
 
-    /// Number of the grids that have rows.
+    /// Returns the number of grids with rows.
     pub(super) fn grids(&self, bulk: &Bulk) -> usize {
         let named = self.labels.iter().map(|label| label.node);
         named.filter(|node| bulk.grids.contains_key(node)).collect::<HashSet<i64>>().len()
     }
 
-    /// Returns how what is given by the rows of the files, or by those that are left of them, becomes what is given
-    /// by the rows of K and M here; `axes` are those of the grids.
+    /// Returns the maps from data by rows of the files, or by the remaining rows, to data by rows of K and M in this
+    /// model. `axes` are the row axes of the grids.
     pub(super) fn given_rows(&self, axes: HashMap<i64, Axes>) -> GivenRows {
         let n = self.followers.as_ref().map_or(self.n_given, |(own, _)| own.points.len());
         let all = || (0..n).collect::<Vec<usize>>();
@@ -193,7 +195,7 @@ impl Matrices {
         }
         let turn = self.turn.clone().unwrap_or_else(|| columns_of_identity(n, &all()));
         let rows = || kept.iter().map(|&row| row as u32).collect::<Vec<u32>>();
-        // Rows of the files, rows without those that follow, and rows without empty ones as well.
+        // Maps for rows of the files, for rows without dependent ones, and for rows that are also not empty.
         let whole = match &self.followers {
             Some((own, _)) => RowMap::new(product(&turn, &own.follows), product(&turn, &own.picks), rows()),
             None => RowMap::new(turn.clone(), turn.clone(), rows()),
@@ -211,14 +213,14 @@ impl Matrices {
     }
 }
 
-/// Columns of the identity of n rows.
+/// Returns columns of the identity matrix with n rows.
 fn columns_of_identity(n: usize, columns: &[usize]) -> CscMatrix {
     let entries: Vec<(u32, u32, f64)> =
         (0u32..).zip(columns).map(|(at, &row)| (row as u32, at, 1.0)).collect();
     CscMatrix::from_triplets(n, columns.len(), &entries)
 }
 
-/// The product of two sparse matrices.
+/// Returns the product of two sparse matrices.
 fn product(a: &CscMatrix, b: &CscMatrix) -> CscMatrix {
     let mut entries = Vec::with_capacity(a.nnz().max(b.nnz()));
     for column in 0..b.n_cols() {
@@ -231,8 +233,8 @@ fn product(a: &CscMatrix, b: &CscMatrix) -> CscMatrix {
     CscMatrix::from_triplets(a.n_rows(), b.n_cols(), &entries)
 }
 
-/// The files of matrices beside a deck: punch files, and those of OUTPUT4. A file of the name of the deck goes
-/// before those whose names go on.
+/// Returns the matrix files in the folder of a deck: punch files, and files of OUTPUT4. A file with the name of the
+/// deck takes precedence over files whose names continue it.
 fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>)> {
     let path = &job.path;
     let with = |extension: &str| {
@@ -254,8 +256,8 @@ fn files_beside(bulk: &Bulk, job: &JobFile) -> Found<(Vec<PathBuf>, Vec<PathBuf>
     Ok((punches, outputs))
 }
 
-/// Returns the points that follow by constraints which matrices do not contain; `has` tells of which points they
-/// have rows.
+/// Returns the dependent points by constraints that the matrices do not contain yet; `has` returns true for points with
+/// rows.
 fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &GridPlaces<'_>) -> Found<Option<Followers>> {
     let one = |diagnostic| vec![diagnostic];
     let open = bulk.constraints.open(has).map_err(one)?;
@@ -265,7 +267,7 @@ fn followers(bulk: &Bulk, has: impl Fn(&Point) -> bool, places: &GridPlaces<'_>)
     Followers::new(&open, places).map(Some).map_err(one)
 }
 
-/// Some rows, ascending, and the same columns of a matrix that has no entries elsewhere.
+/// Returns the rows `kept` (ascending) and the same columns of a matrix that has no entries elsewhere.
 fn principal(raw: RawMatrix, kept: &[usize]) -> RawMatrix {
     let mut local = vec![u32::MAX; raw.matrix.n_rows()];
     kept.iter().enumerate().for_each(|(to, &row)| local[row] = to as u32);

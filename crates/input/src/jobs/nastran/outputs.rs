@@ -1,4 +1,4 @@
-//! Matrices of OUTPUT4 beside a deck, and which of several matrices are K and M.
+//! Matrices of OUTPUT4 in the folder of a deck, and the choice of K and M among several matrices.
 
 use super::bulk::Bulk;
 use super::rows;
@@ -13,21 +13,21 @@ use std::path::{Path, PathBuf};
 
 const HELP: &str = "write them with PARAM,EXTOUT,DMIGPCH, EXTSEOUT(DMIGPCH), or OUTPUT4 KGG,MGG";
 
-/// K and M as their files have them.
+/// K and M as in their files.
 pub(super) struct Read {
     pub stiffness: RawMatrix,
     pub mass: RawMatrix,
     /// Points of the rows, ascending.
     pub points: Vec<Point>,
-    /// Files beside the deck that they were read from.
+    /// Files in the folder of the deck from which they were read.
     pub files: Vec<SeenFile>,
 }
 
-/// The OUTPUT4 files beside a deck.
+/// OUTPUT4 files in the folder of a deck.
 pub(super) struct Outputs {
     files: Vec<(InputFile, output4::Contents)>,
     pub names: Vec<String>,
-    /// File of each name, and which of its matrices it is.
+    /// Index of the file of each name, and index of the matrix in the file.
     places: Vec<(usize, usize)>,
 }
 
@@ -46,7 +46,7 @@ impl Outputs {
         Ok(all)
     }
 
-    /// The matrices that have the rows of a set of the deck; all where none has.
+    /// Returns the indices of matrices with the rows of a set of the deck, or of all matrices if there is none.
     pub(super) fn fitting(&self, bulk: &Bulk) -> Vec<usize> {
         let fits = |name: &usize| {
             let (file, at) = self.places[*name];
@@ -79,7 +79,7 @@ impl Outputs {
     }
 }
 
-/// Which of the matrices `names` are K and M: those that the user names (`stated`), else the pair among
+/// Returns the indices of K and M among `names`: those that the user names (`stated`), else the pair among
 /// `candidates`.
 ///
 /// # Errors
@@ -97,7 +97,7 @@ pub(super) fn choose_pair(
     pair(&some).map(whole).map_err(|pairs| pairs.into_iter().map(whole).collect())
 }
 
-/// FB109 where there is no pair of matrices, FB111 where there are several.
+/// Returns FB109 if there is no pair of matrices, FB111 if there are several.
 pub(super) fn no_pair(
     names: &[String],
     pairs: &[(usize, usize)],
@@ -122,13 +122,13 @@ pub(super) fn no_pair(
     vec![Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help)]
 }
 
-/// FB109 of a deck without any file of matrices; `absent` are those that the deck assigns.
+/// Returns FB109 for a deck without any matrix file; `absent` are the missing files that the deck assigns.
 pub(super) fn no_files(path: &Path, absent: &[PathBuf]) -> Vec<Diagnostic> {
     let what = match absent.first() {
         Some(file) => format!("{}, which the deck assigns to OUTPUT4,", file.display()),
         None => "beside the deck a file of matrices (job.pch, job.op4)".to_owned(),
     };
-    // A file of another job may be the one that is meant.
+    // A file of another job may be the intended one.
     let is_like = |file: &Beside| !file.is_own && [".pch", ".op4"].iter().any(|end| file.rest.ends_with(end));
     let mut others: Vec<String> = beginning_alike(path)
         .iter()

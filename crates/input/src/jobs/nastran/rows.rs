@@ -1,5 +1,5 @@
-//! What the rows of matrices stand for that do not name them: those of OUTPUT4 follow the points in ascending
-//! order, six to a grid and one to a scalar point, less what the set of the matrix does not have.
+//! The labels of matrix rows without names: rows of OUTPUT4 follow the points in ascending order, six per grid and one
+//! per scalar point, without the points outside the set of the matrix.
 
 use super::bulk::Bulk;
 use crate::dmig::Point;
@@ -7,23 +7,24 @@ use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// True if matrices of `n` rows may be those of a set of the deck.
+/// Returns true when matrices of `n` rows may be those of a set of the deck.
 pub(super) fn is_set(bulk: &Bulk, n: usize) -> bool {
     bulk.resequenced || points(bulk, n, "", Path::new("")).is_ok()
 }
 
-/// Points of the rows of matrices with `n` rows: the g-set, the a-set of the deck, the g-set without what follows
-/// others by constraints, without what supports hold as well, or the displacements where all elements are solids;
-/// the first that has as many.
+/// Returns the points of the rows of matrices with `n` rows. The first set with this number of rows is chosen among:
+/// the g-set, the a-set of the deck, the g-set without dependent points, this one without supported points, and, if all
+/// elements are solids, the g-set with displacements and independent points of constraints only.
 ///
 /// # Errors
-/// FB112 when none has.
+/// FB112 if no set has this number.
 pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<Vec<Point>, Diagnostic> {
     if bulk.resequenced {
         let message = "SEQGP changes the order of the rows, which OUTPUT4 does not name";
         let help = "take the SEQGP cards out, or write the matrices as DMIG";
         return Err(Diagnostic::new(Code::DeckUnsupported, message).in_file(path).with_help(help));
     }
+    // The g-set.
     let all = || {
         let grids = bulk.grids.keys().flat_map(|&id| (1..=6).map(move |component| (id, component)));
         grids.chain(bulk.scalars.iter().map(|&id| (id, 0))).collect::<BTreeSet<Point>>()
@@ -33,6 +34,7 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
     if n == counted[0].1 {
         return Ok(all().into_iter().collect());
     }
+    // The a-set.
     let boundary = bulk.boundary();
     if !boundary.is_empty() {
         counted.push(("the a-set".to_owned(), boundary.len()));
@@ -40,6 +42,7 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
             return Ok(boundary.into_iter().collect());
         }
     }
+    // The g-set without dependent points.
     let (followers, followed) = bulk.constraints.points();
     let left: BTreeSet<Point> = all().difference(&followers).copied().collect();
     if !followers.is_empty() {
@@ -48,6 +51,7 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
             return Ok(left.into_iter().collect());
         }
     }
+    // The g-set without dependent and supported points.
     let supported = bulk.supported();
     if !supported.is_empty() {
         let free: Vec<Point> = left.difference(&supported).copied().collect();
@@ -56,6 +60,7 @@ pub(super) fn points(bulk: &Bulk, n: usize, name: &str, path: &Path) -> Result<V
             return Ok(free);
         }
     }
+    // Displacements and independent points of constraints.
     if bulk.has_elements && !bulk.has_rotations {
         let moves = |point: &Point| point.1 <= 3 || followed.contains(point);
         let displacements: Vec<Point> = left.into_iter().filter(moves).collect();

@@ -1,9 +1,9 @@
-//! SET of the case control: numbers, ranges and exceptions, which may go on in further lines.
+//! SET of the case control: numbers, ranges and exceptions, which may continue in further lines.
 
 use crate::node_file::NodeSets;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The lines of case control that are sets.
+/// Lines of case control with sets.
 #[derive(Default)]
 pub(super) struct SetLines {
     lines: Vec<String>,
@@ -11,7 +11,7 @@ pub(super) struct SetLines {
 }
 
 impl SetLines {
-    /// Takes a line of case control.
+    /// Reads a line of case control.
     pub(super) fn line(&mut self, line: &str) {
         let line = line.trim();
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -27,13 +27,13 @@ impl SetLines {
         self.goes_on = (self.goes_on || is_set) && line.ends_with(',');
     }
 
-    /// The sets with those of their members that are nodes, each by its number and as `SET5`.
+    /// Returns the sets with those members that are nodes, each by its number and as `SET5`.
     pub(super) fn of<T>(&self, nodes: &BTreeMap<i64, T>) -> NodeSets {
         let mut sets = Vec::new();
         for line in &self.lines {
             let Some((number, members)) = parsed(line, nodes) else { continue };
             for name in [format!("SET{number}"), number.to_string()] {
-                // A set that is given again, in another subcase, is another set: the last one counts.
+                // A set that is defined again in another subcase is another set: the last one is used.
                 sets.retain(|(own, _): &(String, Vec<i64>)| *own != name);
                 sets.push((name, members.clone()));
             }
@@ -46,7 +46,7 @@ fn parsed<T>(line: &str, nodes: &BTreeMap<i64, T>) -> Option<(i64, Vec<i64>)> {
     let (head, members) = line.split_once('=')?;
     let number: i64 = head.split_whitespace().nth(1)?.parse().ok()?;
     let mut own = BTreeSet::new();
-    // The range that exceptions are taken out of: numbers beyond it are members again.
+    // Exceptions are taken out of the last range; numbers beyond it are members again.
     let (mut range, mut except) = (None, false);
     let mut words = members.split([',', ' ', '\t']).filter(|word| !word.is_empty()).peekable();
     while let Some(word) = words.next() {
@@ -94,7 +94,7 @@ mod tests {
         let nodes: BTreeMap<i64, ()> = [1, 2, 3, 4, 6, 9, 11].map(|id| (id, ())).into();
         let sets = lines.of(&nodes);
         let of = |name: &str| sets.iter().find(|(own, _)| own == name).expect("a set").1.clone();
-        // Beyond the range numbers are members again.
+        // Numbers beyond the range are members again.
         assert_eq!(of("SET5"), [1, 3, 6, 9]);
         assert_eq!(of("7"), [1, 2, 3, 4, 6, 9, 11]);
         assert_eq!(of("8"), [3]);

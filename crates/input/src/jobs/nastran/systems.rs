@@ -1,45 +1,45 @@
-//! Coordinate systems: by three grids (CORD1x) or three points (CORD2x), each in another system, and what
-//! they make of coordinates and of the axes of rows.
+//! Coordinate systems by three grids (CORD1x) or three points (CORD2x), each in another system, and the transformation
+//! of coordinates and row axes.
 
 use flexbody_base::diagnostic::{Code, Diagnostic};
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
-/// Systems that refer to one another deeper than this.
+/// Largest depth of systems that refer to one another.
 const DEEPEST: usize = 200;
-/// Sine of the angle between the points of a system below which they lie on one line.
+/// Sine of the angle between the points of a system below which they count as collinear.
 const ON_A_LINE: f64 = 1e-12;
-/// Distance from the axis, relative to that from the origin, below which a grid lies on the axis.
+/// Distance from the axis, relative to that from the origin, below which a grid counts as on the axis.
 const ON_THE_AXIS: f64 = 1e-12;
 
-/// What the coordinates of a system are.
+/// Kind of the coordinates of a system.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum SystemKind {
-    /// x, y, z.
+    /// Coordinates x, y, z.
     Rectangular,
-    /// Radius, angle in degrees, z.
+    /// Coordinates radius, angle in degrees, z.
     Cylindrical,
-    /// Radius, angle from the z axis, angle about it, both in degrees.
+    /// Coordinates radius, angle from the z axis, angle about it, both in degrees.
     Spherical,
 }
 
-/// A grid: where it lies in which system, and the system of its rows.
+/// Grid with its position, the system of its coordinates and the system of its rows.
 #[derive(Debug, Clone)]
 pub(super) struct Grid {
     /// System of the coordinates (CP) and of the rows (CD); `None` only while the deck is read.
     pub system: Option<i64>,
     pub x: [f64; 3],
     pub axes: Option<i64>,
-    /// Whether it says itself what holds it.
+    /// True if the field PS (permanent constraints) of the card is not empty.
     pub has_support_field: bool,
-    /// Components that it says are held.
+    /// Components held by the card.
     pub held: Vec<u8>,
-    /// Where its card stands: index of the file, and line.
+    /// Position of the card: index of the file, and line.
     pub file: usize,
     pub line: usize,
 }
 
-/// The card of a system.
+/// Card of a system.
 #[derive(Debug, Clone)]
 pub(super) struct SystemCard {
     kind: SystemKind,
@@ -48,7 +48,7 @@ pub(super) struct SystemCard {
     line: usize,
 }
 
-/// Origin, a point of the z axis, and a point of the plane of x and z.
+/// Origin, a point of the z axis, and a point of the xz plane.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Definition {
     /// Three grids.
@@ -58,7 +58,7 @@ pub(super) enum Definition {
 }
 
 impl Grid {
-    /// True if both cards say the same.
+    /// Returns true when both cards define the same grid.
     pub(super) fn is_the_same(&self, other: &Self) -> bool {
         let said = |own: &Self| (own.system, own.x, own.axes, own.held.clone());
         said(self) == said(other)
@@ -66,7 +66,7 @@ impl Grid {
 }
 
 impl SystemCard {
-    /// True if both cards say the same.
+    /// Returns true when both cards define the same system.
     pub(super) fn is_the_same(&self, other: &Self) -> bool {
         self.kind == other.kind && self.definition == other.definition
     }
@@ -76,7 +76,7 @@ impl SystemCard {
     }
 }
 
-/// A system in the basic one.
+/// System in the basic system.
 #[derive(Debug, Clone, Copy)]
 struct System {
     kind: SystemKind,
@@ -91,16 +91,16 @@ const BASIC: System = System {
     axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
 };
 
-/// Finds systems and places, each once.
+/// Cache of systems, each computed once.
 pub(super) struct Systems<'b> {
     cards: &'b HashMap<i64, SystemCard>,
     grids: &'b BTreeMap<i64, Grid>,
     known: HashMap<i64, System>,
-    /// Systems that are being found.
+    /// Systems that are being computed.
     open: Vec<i64>,
 }
 
-/// What is wrong, and where where another card than that of the grid is.
+/// Result with a diagnostic, which has file and line if its card is not that of the grid.
 type Found<T> = Result<T, Diagnostic>;
 
 impl<'b> Systems<'b> {
@@ -108,19 +108,19 @@ impl<'b> Systems<'b> {
         Self { cards, grids, known: HashMap::from([(0, BASIC)]), open: Vec::new() }
     }
 
-    /// Where a grid lies in the basic system.
+    /// Returns the position of a grid in the basic system.
     ///
     /// # Errors
-    /// FB110 for systems that are not there, refer to themselves, or have their points on one line.
+    /// FB110 for systems that are missing, refer to themselves, or have collinear points.
     pub(super) fn position(&mut self, grid: &Grid) -> Found<[f64; 3]> {
         let system = self.system(grid.system.unwrap_or(0))?;
         Ok(system.point(grid.x))
     }
 
-    /// The unit vectors, in the basic system, along which the rows of a grid at `x` stand.
+    /// Returns the unit vectors, in the basic system, along the rows of a grid at `x`.
     ///
     /// # Errors
-    /// As [`position`](Self::position).
+    /// The errors of [`position`](Self::position).
     pub(super) fn axes(&mut self, grid: &Grid, x: [f64; 3]) -> Found<[[f64; 3]; 3]> {
         Ok(self.system(grid.axes.unwrap_or(0))?.axes_at(x))
     }
@@ -151,7 +151,7 @@ impl<'b> Systems<'b> {
         Ok(system)
     }
 
-    /// The three points of a card in the basic system.
+    /// Returns the three points of a card in the basic system.
     fn points(&mut self, card: &SystemCard) -> Found<[[f64; 3]; 3]> {
         match &card.definition {
             Definition::Points { reference, points } => {
@@ -175,7 +175,8 @@ impl<'b> Systems<'b> {
 }
 
 impl System {
-    /// Origin, a point of the z axis, a point of the plane of x and z; `None` where they lie on one line.
+    /// Creates the system from its origin, a point of the z axis and a point of the xz plane; returns `None` if they
+    /// are collinear.
     fn through(kind: SystemKind, [origin, on_z, in_plane]: [[f64; 3]; 3]) -> Option<Self> {
         let z = unit(minus(on_z, origin))?;
         let across = unit(minus(in_plane, origin))?;
@@ -184,7 +185,7 @@ impl System {
         Some(Self { kind, origin, axes: [cross(y, z), y, z] })
     }
 
-    /// A point in the basic system.
+    /// Returns a point in the basic system.
     fn point(&self, x: [f64; 3]) -> [f64; 3] {
         let [a, b, c] = x;
         let local = match self.kind {
@@ -201,8 +202,8 @@ impl System {
         [0, 1, 2].map(|k| self.origin[k] + (0..3).map(|j| local[j] * self.axes[j][k]).sum::<f64>())
     }
 
-    /// Unit vectors at a point of the basic system. On the axis of a cylindrical or spherical system they are
-    /// those of the rectangular system that defines it.
+    /// Returns the unit vectors at a point of the basic system. On the axis of a cylindrical or spherical system these
+    /// are the axes of the rectangular system that defines it.
     fn axes_at(&self, x: [f64; 3]) -> [[f64; 3]; 3] {
         let from = minus(x, self.origin);
         let [u, v, w] = self.axes.map(|axis| dot(axis, from));
@@ -224,7 +225,7 @@ impl System {
     }
 }
 
-/// Sine and cosine of an angle in degrees, exact at right angles.
+/// Returns sine and cosine of an angle in degrees, exact at right angles.
 fn sin_cos(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),
@@ -264,7 +265,7 @@ mod tests {
         SystemCard::new(kind, Definition::Points { reference, points }, Path::new("job.bdf"), 1)
     }
 
-    /// A cylinder about an axis along x, in it a sphere.
+    /// A cylinder about an axis along x, and a sphere in this system.
     #[test]
     fn systems_within_systems() {
         let upright = [[0.0; 3], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
@@ -287,7 +288,7 @@ mod tests {
         near(axes[2], [1.0, 0.0, 0.0]);
         near(cylinder.axes_at([9.0, 2.0, 3.0])[0], [0.0, 1.0, 0.0]);
         let sphere = systems.system(2).expect("a system");
-        // Its z axis lies along x, its x axis along z.
+        // The z axis of the sphere is along x, its x axis along z.
         near(sphere.point([2.0, 90.0, 0.0]), [6.0, 2.0, 7.0]);
         near(sphere.point([2.0, 0.0, 77.0]), [8.0, 2.0, 5.0]);
         let axes = sphere.axes_at([6.0, 2.0, 7.0]);

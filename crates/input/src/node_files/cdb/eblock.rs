@@ -1,47 +1,47 @@
-//! Elements of an archive of Ansys, to draw the part by: what cannot be read is left out and told.
+//! Elements of an archive of Ansys, for drawing the part. Unreadable elements are left out and reported.
 
 use super::{nth_field, widths};
 use flexbody_base::text::table::integer;
 use flexbody_model::{ElementShape, Elements};
 use std::collections::HashMap;
 
-/// Element types by their local numbers, as `ET,1,186` gives them.
+/// Element types by their local numbers, as defined by `ET,1,186`.
 #[derive(Debug, Default)]
 pub(super) struct Types(HashMap<i64, i64>);
 
-/// Element types by what they look like.
+/// Numbers of solid element types.
 const SOLIDS: &[i64] = &[
     5, 45, 46, 62, 64, 65, 72, 73, 92, 95, 96, 98, 147, 148, 164, 168, 185, 186, 187, 190, 191, 226, 227, 285,
 ];
-/// See [`SOLIDS`].
+/// Numbers of shell and plane element types.
 const SHELLS: &[i64] =
     &[2, 28, 41, 42, 43, 63, 82, 91, 93, 99, 143, 145, 146, 150, 162, 163, 181, 182, 183, 281];
-/// See [`SOLIDS`].
+/// Numbers of beam, pipe and link element types with two end nodes.
 const BEAMS: &[i64] = &[1, 3, 4, 8, 10, 16, 23, 24, 44, 54, 59, 161, 180, 188, 288];
-/// See [`SOLIDS`].
+/// Numbers of beam element types with a middle node.
 const LONG_BEAMS: &[i64] = &[189, 289];
-/// See [`SOLIDS`].
+/// Numbers of element types that are not drawn.
 const NOT_DRAWN: &[i64] = &[
     14, 21, 27, 39, 40, 50, 151, 152, 153, 154, 156, 169, 170, 171, 172, 173, 174, 175, 176, 177, 178, 179,
     184,
 ];
 
-/// What elements of a type look like.
+/// Shape class of the elements of a type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Look {
     Solid,
     Shell,
-    /// Ends; a third node says how the beam is turned.
+    /// Two end nodes; a third node defines the orientation of the beam.
     Beam,
-    /// Ends and a node in the middle.
+    /// Two end nodes and a node in the middle.
     LongBeam,
-    /// Masses, springs, contact and surface loads.
+    /// Masses, springs, contact and surface loads, which are not drawn.
     Nothing,
     Unknown,
 }
 
 impl Types {
-    /// Takes a type from a line in upper case, if it is `ET,number,type`.
+    /// Records a type from a line in upper case, if it is `ET,number,type`.
     pub(super) fn learn(&mut self, line: &str) {
         let mut words = line.split(',').map(str::trim);
         if words.next() != Some("ET") {
@@ -71,10 +71,10 @@ impl Types {
     }
 }
 
-/// Fields of a line of an element before its nodes.
+/// Number of fields of a line of an element before its nodes.
 const BEFORE_NODES: usize = 11;
 
-/// Reads the block whose head is a line, and gives the line behind it.
+/// Reads the block whose heading is the line `head`. Returns the index of the line after it.
 pub(super) fn elements(text: &[&[u8]], head: usize, types: &Types, read: &mut Elements) -> usize {
     let line = String::from_utf8_lossy(text[head]).to_uppercase();
     let solid = line.split(',').nth(2).is_some_and(|kind| kind.trim() == "SOLID");
@@ -106,7 +106,7 @@ struct Element {
     lines: usize,
 }
 
-/// The element that begins with the first of some lines.
+/// Reads the element that begins on the first of the lines; returns `None` if it cannot be read.
 fn element(text: &[&[u8]], width: usize) -> Option<Element> {
     let number = |line: &[u8], k: usize| integer(nth_field(line, k, width));
     let first = *text.first()?;
@@ -122,7 +122,7 @@ fn element(text: &[&[u8]], width: usize) -> Option<Element> {
                 nodes.push(node);
                 k += 1;
             }
-            // The nodes go on in the next line.
+            // The nodes continue in the next line.
             None if k > 0 && nth_field(line, k, width).is_empty() => {
                 lines += 1;
                 k = 0;
@@ -155,7 +155,7 @@ fn add(element: &Element, types: &Types, read: &mut Elements) {
     read.add(&name, shape, &nodes);
 }
 
-/// Middles of edges that are left out have the number 0: a corner of the edge stands for them.
+/// Replaces missing mid-edge nodes, which have the number 0, by a corner of their edge.
 fn with_all_middles(shape: ElementShape, nodes: &[i64]) -> Vec<i64> {
     let mut nodes = nodes.to_vec();
     for (k, &[corner, _]) in shape.edges().iter().enumerate() {
