@@ -14,7 +14,7 @@ pub struct BatchRow {
     pub output: String,
     /// State of the body: `done`, `unchanged` (made by an earlier run) or `failed`.
     pub state: &'static str,
-    /// Exit code of its conversion.
+    /// Exit code of the conversion.
     pub exit_code: i32,
     /// First error of the conversion; `None` without errors.
     pub error: Option<String>,

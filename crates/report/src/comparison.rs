@@ -278,7 +278,7 @@ impl BodyComparison {
         self.passed
     }
 
-    /// The compared quantities.
+    /// Returns the compared quantities.
     pub fn rows(&self) -> &[ComparisonRow] {
         &self.rows
     }

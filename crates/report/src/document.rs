@@ -81,7 +81,7 @@ pub(crate) enum State {
     Open,
 }
 
-/// A heading of a page.
+/// Returns the heading of a section of a page.
 pub(crate) fn heading<'a>(title: impl Into<Inline>) -> Block<'a> {
     Block::Heading(title.into())
 }

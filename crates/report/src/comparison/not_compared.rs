@@ -6,7 +6,7 @@ use flexbody_body::flex_body::FlexBody;
 struct Entries {
     /// Name of the entries.
     name: &'static str,
-    /// Their paths in the file.
+    /// Paths of the entries in the file.
     paths: &'static str,
     /// True if a body has such entries.
     has: fn(&FlexBody) -> bool,

@@ -1,22 +1,21 @@
-//! The invariants that MBDyn itself makes of lumped masses (record group 11), in Modal.cc: sums over the
-//! nodes.
+//! Invariants that MBDyn computes from lumped masses (record group 11) in Modal.cc, as sums over the nodes.
 
 use super::records::Records;
 use faer::Mat;
 use flexbody_body::invariants::{Numbered, TermGroups};
 use nalgebra::{Matrix3, Vector3};
 
-/// Masses and inertias of the nodes, and what follows from them.
+/// Invariants of the lumped masses of the nodes, and their negative masses.
 pub(crate) struct Lumped {
-    /// I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
+    /// Invariants I1 to I9 about the origin; I6 is the modal mass of the lumped masses.
     pub(crate) told: Numbered,
-    /// Nodes with a mass below zero.
+    /// Number of nodes with a negative mass.
     pub(crate) negative: usize,
-    /// Sum of the magnitudes of negative masses over that of all.
+    /// Sum of the magnitudes of negative masses divided by the sum of all magnitudes.
     pub(crate) negative_share: f64,
 }
 
-/// What a file of record groups 8 and 11 says.
+/// Returns the lumped masses of record groups 8 and 11; `None` without group 11.
 pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
     let diagonal = records.get(11)?;
     let (n, nf) = (records.n_nodes, records.n_modes);
