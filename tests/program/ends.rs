@@ -1,4 +1,4 @@
-//! Every end of a run leaves no unfinished file, and the exit code tells if the outputs are in place.
+//! Every end of a run leaves no unfinished file, and the exit code shows if the outputs are in place.
 //!
 //! `FLEXBODY` names another program to test; scripts/release.sh passes the released one.
 #![cfg(unix)]

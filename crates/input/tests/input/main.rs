@@ -1,4 +1,4 @@
-//! Files of models that are read: formats, manifest, names, damages.
+//! Reading of model files: formats, manifest, names, damage.
 
 #![allow(unreachable_pub)] // nothing outside reads a test
 

@@ -1,4 +1,4 @@
-//! Finite element models of own elements.
+//! Finite element models assembled from own elements.
 
 #![allow(unreachable_pub)] // nothing outside reads a test
 

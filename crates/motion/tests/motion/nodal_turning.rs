@@ -51,8 +51,9 @@ fn block_with_rigid_face() -> (Carriers, RawModel) {
     (carriers, model)
 }
 
-/// Masses on arms, and a mass between all rows that rigid motion does not feel: no part of it is what points and
-/// directors have, and rows of rotations carry linear momentum that does not turn with them.
+/// Returns masses on arms, plus a mass between all rows that is zero in rigid motion: it cannot be
+/// represented by points and directors, and rows of rotations carry linear momentum that does not rotate with
+/// them.
 fn any_mass() -> Unreduced {
     let (carriers, raw) = masses_on_beams(&star(BeamMass::Lumped), 3);
     let (n, positions) = (carriers.rows(), &carriers.positions);

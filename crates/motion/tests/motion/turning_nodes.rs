@@ -316,7 +316,7 @@ fn a_constant_velocity_changes_nothing() {
 /// are held, like for a body with prescribed motion of its frame.
 fn classical_whirl(raw: &RawModel, spin: f64) -> Vec<f64> {
     let (k, m) = (dense(&raw.stiffness.matrix), dense(&raw.mass.matrix));
-    // Of every node uy, uz, ry, rz.
+    // Rows uy, uz, ry, rz of every node.
     let lateral: Vec<usize> = (0..k.nrows()).filter(|row| [1, 2, 4, 5].contains(&(row % 6))).collect();
     let part =
         |a: &DMatrix<f64>| DMatrix::from_fn(lateral.len(), lateral.len(), |i, j| a[(lateral[i], lateral[j])]);

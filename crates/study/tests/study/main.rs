@@ -1,4 +1,4 @@
-//! What a scene needs of a body, against motions of all nodes.
+//! Selections and trade studies compared with motions of all nodes.
 
 #![allow(unreachable_pub)] // nothing outside reads a test
 
