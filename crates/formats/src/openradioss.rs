@@ -96,6 +96,7 @@ const WIDTH: usize = 16;
 fn rayleigh(body: &FlexBody) -> Option<[f64; 2]> {
     /// Rounding error of a projected matrix, relative.
     const ROUNDING: f64 = 1e-9;
+    // alpha and beta from the first and the last diagonal entry; all entries must then agree.
     let (d, lambda) = (body.damping(), &body.modes().eigenvalue);
     let last = lambda.len() - 1;
     let slope = (d[(last, last)] - d[(0, 0)]) / (lambda[last] - lambda[0]);
@@ -120,6 +121,7 @@ impl Deck {
         let turning = frames.iter().any(|frame| frame.rotation.is_some());
         let damping = losses::is_damped(body).then(|| rayleigh(body)).flatten();
         let mut deck = Self { text: String::new(), finite: true };
+        // Sizes, nodes and the positions where the deck needs them.
         deck.remark("flexible body of /FXBODY, written by flexbody");
         deck.remark("  NMOD    NMST    NBNO    IROT   IDAMP    IBLO   IFILE");
         deck.integers(&[nf, 0, frames.len(), turning.into(), damping.is_some().into(), 0, 0], 7);
@@ -133,6 +135,7 @@ impl Deck {
         }
         let ids: Vec<i64> = frames.iter().map(|frame| frame.id).collect();
         deck.integers(&ids, 10);
+        // Orientation of the body axes, and the highest natural frequency sqrt(lambda) / (2 pi).
         deck.remark("rotation matrix, row by row, and the highest frequency");
         let highest = body.modes().eigenvalue.iter().copied().fold(0.0, f64::max).sqrt();
         let mut rotation: Vec<f64> = body.frame().axes.transpose().iter().copied().collect();
@@ -142,6 +145,7 @@ impl Deck {
             deck.remark("damping alpha M + beta K");
             deck.numbers(damping);
         }
+        // Rigid modes: the four points with their weights s, then the rotations.
         let sets = if turning { 5 } else { 4 };
         for (set, axis) in (0..sets).flat_map(|set| [0, 1, 2].map(|axis| (set, axis))) {
             deck.remark(&format!("rigid mode {}", 3 * set + axis + 1));
@@ -155,6 +159,7 @@ impl Deck {
                 deck.numbers(moved);
             }
         }
+        // Local modes, node by node: displacement and rotation.
         for j in 0..nf {
             deck.remark(&format!("local mode {}", j + 1));
             for frame in frames {
@@ -163,6 +168,7 @@ impl Deck {
                 deck.numbers((0..6).map(moved));
             }
         }
+        // Diagonal mass and stiffness of the local modes, then the coupling products.
         let diagonal = |a: &faer::Mat<f64>| (0..nf).map(|j| a[(j, j)]).collect::<Vec<f64>>();
         deck.remark("mass of the local modes");
         deck.numbers(diagonal(&invariants.modal_mass()));

@@ -59,11 +59,13 @@ pub fn export(
     allow_loss: bool,
 ) -> Result<(Exported, Vec<Diagnostic>)> {
     check_options(body, format, options)?;
+    // A picture of a motion shows the body in the frame of the motion.
     let body = match &options.motion {
         Some(motion) => Cow::Owned(motion.staged(body)?),
         None => Cow::Borrowed(body),
     };
     let body = body.as_ref();
+    // Losses are warnings if they are allowed, otherwise errors.
     let code = if allow_loss { Code::ExportLost } else { Code::ExportLoses };
     let losses: Vec<Diagnostic> = format
         .checklist(body, options)

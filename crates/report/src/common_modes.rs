@@ -28,6 +28,7 @@ impl CommonModes {
         let (of_a, of_b) = (&a.modes().eigenvalue, &b.modes().eigenvalue);
         let (fewer, more) = if of_a.len() <= of_b.len() { (of_a, of_b) } else { (of_b, of_a) };
         let partners = partners(fewer, more);
+        // Modes whose cluster in the larger body is complete among the partners.
         let (kept, split): (Vec<usize>, Vec<usize>) =
             (0..fewer.len()).partition(|&i| is_whole(more, &partners, partners[i]));
         if kept.is_empty() {
@@ -38,6 +39,7 @@ impl CommonModes {
         }
         let of_more: Vec<usize> = kept.iter().map(|&i| partners[i]).collect();
         let (a_modes, b_modes) = if of_a.len() <= of_b.len() { (kept, of_more) } else { (of_more, kept) };
+        // Notes on compared, omitted and undetermined modes.
         let mut notes = vec![format!(
             "{} in common {} compared: {} of the first body with {} of the second",
             counted(a_modes.len(), "mode"),
@@ -70,6 +72,7 @@ fn partners(fewer: &[f64], more: &[f64]) -> Vec<usize> {
             sums[i][j] = sums[i][j - 1].min(sums[i - 1][j - 1] + distance(i - 1, j - 1));
         }
     }
+    // Trace the choice back from the last eigenvalue.
     let (mut found, mut j) = (vec![0; n], m);
     for i in (1..=n).rev() {
         while j > i && sums[i][j] == sums[i][j - 1] {

@@ -101,6 +101,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     comparable(a, b)?;
     let placed = is_placed(a) && is_placed(b);
     let (in_own_a, in_own_b);
+    // A body without a known place in the model is compared in its own frame.
     let (a, b) = if placed {
         (a, b)
     } else {
@@ -116,11 +117,14 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
         notes: Vec::new(),
         not_compared: Vec::new(),
     };
+    // Quantities that need no common basis or node.
     comparison.rigid(a, b, tolerances);
+    // Invariants of b in the frame of a.
     let change = FrameChange::new(a, b);
     let in_a = b.invariants().shifted(change.shift).rotated(&change.axes);
     let groups = clusters(&a.modes().eigenvalue, &b.modes().eigenvalue);
     let pair = Pair { a, b, change, in_a, groups };
+    // Mode by mode with common nodes, otherwise by norms over clusters of modes.
     let order = common_nodes(&a.nodes().ids, &b.nodes().ids);
     comparison.not_compared = not_compared::entries(a, b, order.is_some());
     let basis = match order {
@@ -132,6 +136,7 @@ pub fn compare(a: &FlexBody, b: &FlexBody, tolerances: &Tolerances) -> Result<Bo
     };
     comparison.modal_matrices(&pair, basis.as_ref(), tolerances.invariants);
     comparison.interfaces(&pair, tolerances.centre_of_mass);
+    // Notes on the limits of the comparison.
     if !placed {
         let note = "a body comes from a file of another program, which does not tell where its frame is in the model: the body frames are taken as the same";
         comparison.notes.push(note.to_owned());

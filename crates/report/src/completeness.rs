@@ -112,6 +112,7 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         return (false, format!("{verdict}: {why}"));
     };
     let shift = significant(shift_hz.unwrap_or(f64::NAN), 5);
+    // The count must agree with the claim, and the body must hold the claimed modes.
     let below = body.modes().eigenvalue.iter().filter(|&&l| l < c.shift).count();
     let count = c.negative_pivots.map_or("missing".to_owned(), |n| n.to_string());
     if c.negative_pivots != flexible.checked_add(c.rigid_modes) {
@@ -126,6 +127,7 @@ fn judge(body: &FlexBody, shift_hz: Option<f64>) -> (bool, String) {
         "{flexible} flexible + {} below {shift} Hz (inertia count {count})",
         counted(c.rigid_modes, "rigid mode")
     );
+    // Modes above the count must be static shapes for a complete proof.
     let statics = static_shapes(body);
     match flexible.cmp(&nf) {
         std::cmp::Ordering::Less if nf - flexible == statics => (

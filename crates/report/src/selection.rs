@@ -59,7 +59,7 @@ struct TermFacts<'a> {
     tier: u8,
     bound: f64,
     limit: f64,
-    /// Ratio of `limit` to the tolerance; 1 without a tolerance.
+    /// Ratio of `limit` to the tolerance; 1 if no error was compared with a tolerance.
     budget: f64,
     /// Ratio limit / bound.
     slack: f64,

@@ -167,8 +167,7 @@ fn a_thin_plate_defeats_single_precision_and_auto_falls_back_with_a_note() {
     assert_eq!(auto.work.factor_bytes, double.work.factor_bytes);
     assert!(auto.work.factorizations > double.work.factorizations);
 
-    // A thicker plate does not fail, and with accuracy settings other than speed single precision is not
-    // tried.
+    // A thicker plate does not fail; with the default `single_pays` single precision is not tried.
     let model = plate(3e-2);
     let tried = run(&model, 10, FactorChoice::Auto, 0.0).expect("modes");
     assert_eq!(tried.plan.as_ref().expect("a sparse factor").precision(), Precision::Single);

@@ -45,9 +45,9 @@ impl Array {
 
 /// Sizes, terms and arrays of a body in the form of the file.
 pub(crate) struct Content {
-    /// Number of translation directions T.
+    /// Number T of axes along which the body translates: 3, or 2 in the plane.
     pub translations: usize,
-    /// Number of rotation axes A.
+    /// Number A of axes about which the body rotates: 3, or 1 in the plane.
     pub axes: usize,
     /// Bits of the header entry `terms`.
     pub terms: u32,
@@ -126,9 +126,12 @@ impl EmbeddedFrames {
         };
         let row = |rows: &Mat<f64>, k: usize| (0..nf).map(|j| rows[(k, j)]).collect::<Vec<f64>>();
         for frame in frames {
+            // Indices of the first rotation row and of the first stiffness matrix of the frame.
             let turned = places.rotation.len() / (nf * axes);
             let first = places.second.len() / (nf * nf);
             let mut components = 0;
+            // Symmetric parts of the geometric stiffness of loads at the frame, with a bit for each
+            // component.
             for (bit, one) in loads(body, frames, frame) {
                 components |= 1 << bit;
                 let matrix = &one.matrix;
@@ -141,6 +144,7 @@ impl EmbeddedFrames {
                 first as i32,
                 components,
             ]);
+            // Position, displacement and rotation along the axes in which the body moves.
             places.position.extend(&frame.position[..translations]);
             (0..translations).for_each(|k| places.translation.extend(row(&frame.translation, k)));
             if let Some(rotation) = &frame.rotation {

@@ -83,6 +83,7 @@ fn bytes(
     precision: usize,
 ) -> Result<(Vec<u8>, Vec<Option<ArrayPosition>>)> {
     let mut file = vec![0; header_bytes()];
+    // Arrays, each at a multiple of the alignment, with its position for the table.
     let mut places = Vec::new();
     for (described, array) in ARRAYS.iter().zip(&content.arrays) {
         let Some(array) = array else {
@@ -105,6 +106,7 @@ fn bytes(
         refused(format!("embedded cannot hold {} bytes, 4 GiB at most", file.len()), "fewer --points")
     })?;
 
+    // Header entries, whose space was left free.
     let mut put =
         |name: &str, bytes: &[u8]| file[header_offset(name)..][..bytes.len()].copy_from_slice(bytes);
     put("magic", &MAGIC);
@@ -116,12 +118,14 @@ fn bytes(
     for (name, unit) in [("length", &units.length), ("mass", &units.mass), ("time", &units.time)] {
         put(name, &unit.to_si().to_le_bytes());
     }
+    // Table of the positions of the arrays.
     let table: Vec<u8> = places
         .iter()
         .flat_map(|place| ArrayPosition::entry(place.as_ref()))
         .flat_map(u32::to_le_bytes)
         .collect();
     file[fixed_header()..][..table.len()].copy_from_slice(&table);
+    // The checksum covers everything after itself.
     let mut checksum = Crc::new();
     checksum.update(&file[CHECKED_FROM..]);
     file[header_offset("checksum")..][..4].copy_from_slice(&checksum.sum().to_le_bytes());

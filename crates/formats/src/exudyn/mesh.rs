@@ -11,8 +11,8 @@ use faer::Mat;
 use flexbody_body::flex_body::{FlexBody, Interface};
 use nalgebra::Vector3;
 
-/// Length of the arms of a cross, relative to the extent of the body, if all nodes of the interface are at
-/// its reference point.
+/// Smallest length of the arms of a cross, relative to the largest distance of a node of the body from the
+/// reference point.
 const ARM: f64 = 0.01;
 
 /// Nodes with their motion, and the interfaces on them.
@@ -131,8 +131,8 @@ fn reference(body: &FlexBody, interface: &Interface) -> Vector3<f64> {
     interface.reference.map_or(sum / nodes.len() as f64, Vector3::from)
 }
 
-/// Returns the root mean square distance of the nodes from the reference point, or a part of the extent if
-/// that is zero.
+/// Returns the length of the arms of a cross: the root mean square distance of the nodes from the reference
+/// point, but at least a fixed part of the largest distance in the body.
 fn arm_of(body: &FlexBody, interface: &Interface) -> f64 {
     let centre = reference(body, interface);
     let square = |position: &[f64; 3]| (Vector3::from(*position) - centre).norm_squared();

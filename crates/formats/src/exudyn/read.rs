@@ -53,6 +53,7 @@ impl ImportFormat for Exudyn {
     fn read(&self, file: &InputFile) -> Result<ImportedFile> {
         let mut arrays = Hdf5Arrays::open(file)?;
         arrays.require(&REQUIRED)?;
+        // Sizes, shapes and positions, which must agree with each other.
         let (rows, nf) = arrays.extents("modeBasis")?;
         let n = rows / 3;
         if !rows.is_multiple_of(3) {
@@ -65,6 +66,7 @@ impl ImportFormat for Exudyn {
             let what = format!("expected {nf} modes, {n} nodes and dimension 3 first, found {info:?}");
             return Err(arrays.refuse("infoList", &what));
         }
+        // Inertia arrays and their identities.
         let given = Given::read(&mut arrays, nf)?;
         let told = given.numbered();
         let general = arrays.attribute("massMatrixReduced", "mass_structure").as_deref() == Some("general");
@@ -82,6 +84,7 @@ impl ImportFormat for Exudyn {
         if general {
             notes.push("the mass does not commute with rotations, says the file: modal mass and mPsiTildePsiTilde need not agree".to_owned());
         }
+        // Parts that a body cannot hold, or that the file lacks.
         let mut lacks = Vec::new();
         let mesh = mesh(&mut arrays, n, &mut lacks)?;
         if arrays.has_members(STRESSES) {

@@ -187,14 +187,17 @@ impl<'b> DrawnScene<'b> {
             let one = |point: &u32| single(Vector3::from(of_points[*point as usize]));
             vertices.points.iter().map(one).collect::<Result<Vec<_>>>()
         };
+        // Undeformed positions relative to the frame origin, in metres.
         let told: Vec<[f64; 3]> =
             positions.iter().map(|x| ((Vector3::from(*x) - self.origin) * self.metres).into()).collect();
         let position = binary.vertices(&at_vertices(&told)?);
+        // One morph target per mode: displacements at weight one.
         let mut targets = Vec::new();
         for j in 0..self.names.len() {
             let target = if moves { self.largest_motion(j) } else { self.scaled_shape(j) };
             targets.push(json!({ "POSITION": binary.vertices(&at_vertices(&target)?) }));
         }
+        // Triangles (mode 4), lines (mode 1) or, without both, points (mode 0).
         let mut primitives = Vec::new();
         if !vertices.triangles.is_empty() {
             let normal = binary.directions(&vertices.normals);

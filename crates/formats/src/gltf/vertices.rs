@@ -31,6 +31,7 @@ impl Vertices {
         // First vertex of each point.
         let mut first = vec![None; drawn.len()];
         let mut of_group = vec![None; 3 * triangles.len()];
+        // One vertex for each smooth group of corners at a point.
         for (t, triangle) in triangles.iter().enumerate() {
             let corner = |k: usize| {
                 let group = groups.root(3 * t + k);
@@ -41,6 +42,7 @@ impl Vertices {
             let corners = [0, 1, 2].map(corner);
             own.triangles.push(corners);
         }
+        // Lines use the first vertex of a point.
         for edge in edges {
             let ends = edge.map(|point| *first[point as usize].get_or_insert_with(|| own.add(point)));
             own.edges.push(ends);
@@ -64,6 +66,7 @@ impl Vertices {
         let size = if size > 0.0 { size } else { 1.0 };
         let place = |vertex: u32| Vector3::from(positions[self.points[vertex as usize] as usize]) / size;
         let mut sums = vec![Vector3::zeros(); self.points.len()];
+        // The cross product of two sides is the normal times twice the area.
         for &[a, b, c] in &self.triangles {
             let area = (place(b) - place(a)).cross(&(place(c) - place(a)));
             for vertex in [a, b, c] {
@@ -94,6 +97,7 @@ fn join_smooth(triangles: &[[u32; 3]], edges: &[[u32; 2]], groups: &mut CornerGr
         }
     }
     sides.sort_unstable();
+    // Two sides in opposite directions belong to triangles of the same orientation.
     for shared in sides.chunk_by(|a, b| a.0 == b.0) {
         if let [(edge, false, one), (_, true, other)] = shared
             && !features.contains(edge)

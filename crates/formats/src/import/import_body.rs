@@ -57,11 +57,13 @@ pub fn import_body(
     let given = &file.body;
     let lacking = |lack: &String| Diagnostic::new(Code::ForeignDropped, lack.clone());
     let mut diagnostics: Vec<Diagnostic> = given.lacks.iter().map(lacking).collect();
+    // Mass-normalise the modes and remove rigid motions, unless the modes are kept.
     let mut coordinates = ModalCoordinates::new(given)?;
     if let Some((change, note)) = normalising(&coordinates.invariants)? {
         diagnostics.push(note);
         coordinates = coordinates.changed(&change, &given.frames);
     }
+    // Free-surface modes imply mean axes; other modes do not state their reference conditions.
     let conditions = match beside_free_surface(&coordinates.invariants) {
         None => ReferenceConditions::MeanAxes,
         Some(_) => ReferenceConditions::Unstated,
@@ -69,6 +71,7 @@ pub fn import_body(
     let body = FlexBody::new(parts(file, coordinates, conditions, source, units))?;
     let (body, warning) = with_own_rounding(body)?;
     diagnostics.extend(warning);
+    // Move the body to the requested frame.
     let body = match frame {
         None => body,
         Some(FrameChoice::Mean(at)) => body.in_mean_axes_at(*at)?,

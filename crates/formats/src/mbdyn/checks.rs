@@ -108,6 +108,7 @@ fn masses(records: &Records, read: &Read) -> Vec<AuditCheck> {
         code: Code::AuditLumped,
         meaning: format!("{} of {n} lumped masses are negative", lumped.negative),
     };
+    // Differences between the sums over the masses and groups 9 and 12.
     let (own, sums) = (&read.body.inertia.i6, &lumped.told.i6);
     let size = |j: usize, k: usize| (own[(j, j)] * own[(k, k)]).abs().sqrt();
     let modal = (0..nf)
@@ -142,6 +143,7 @@ fn identities(records: &Records, read: &Read) -> Vec<AuditCheck> {
         code: Code::AuditIdentity,
         meaning: meaning.to_owned(),
     };
+    // Identities between invariants that follow from each other.
     let mut all = vec![
         identity(
             "i4_of_i8",

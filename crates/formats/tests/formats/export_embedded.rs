@@ -135,8 +135,7 @@ impl Compiled {
 /// Returns q, nu, applied forces, gravity, a force and a torque of suitable size for the body.
 fn state(random: &mut Random, body: &FlexBody) -> Vec<f64> {
     let own = lively_state(random, body);
-    // Geometric stiffness reduces the inertia to first order, so that large deformations would make it
-    // indefinite.
+    // Geometric stiffness corrects the inertia to first order only, so that its amplitude is reduced here.
     let amount = if body.geometric_stiffness().is_empty() { 1.0 } else { 0.1 };
     let (mass, size) = (body.invariants().mass(), body.invariants().inertia().norm().sqrt());
     let rate = body.modes().eigenvalue[0].sqrt();

@@ -204,7 +204,7 @@ fn unbalanced(
     let (drive, drive_torque) = evaluation.driving_force();
     let left = rows.clone() + times(&body.stiffness, &u) - carriers.onto_rows(&u, &weights, STEP);
 
-    // C' of mean axes is M R: the imbalance of the rows must be orthogonal to its complement.
+    // C' of mean axes is M R: the imbalance of the rows is their part orthogonal to it.
     let rigid = body.model.rigid_fields((*origin).into(), 1.0);
     let conditions = &body.mass * &rigid;
     let conditions = DMatrix::from_fn(n, 6, |i, j| conditions[(i, j)]);

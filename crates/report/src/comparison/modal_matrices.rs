@@ -137,11 +137,13 @@ impl Matrices<'_> {
     /// missing matrix counts as zero.
     fn of_loads(&self, a: &OfLoads, b: &OfLoads) -> Option<LoadDifference> {
         let nf = a.first().or(b.first())?.matrix.nrows();
+        // Loads of either body, each once.
         let mut loads: Vec<&UnitLoad> = a.iter().map(|one| &one.load).collect();
         loads.extend(b.iter().map(|one| &one.load).filter(|load| a.iter().all(|one| one.load != **load)));
         let of = |all: &OfLoads, load: &UnitLoad| {
             all.iter().find(|one| one.load == *load).map(|one| one.matrix.clone())
         };
+        // Largest entry of each kind of load, the scale of its differences.
         let mut found = LoadDifference { difference: 0.0, sizes: Vec::new(), missing: Vec::new() };
         for one in a.iter().chain(b) {
             let size = largest_entry(one.matrix.as_ref());
@@ -150,6 +152,7 @@ impl Matrices<'_> {
                 None => found.sizes.push((one.load.kind.clone(), size)),
             }
         }
+        // Differences load by load; a missing matrix counts as zero.
         for load in loads {
             let (own, other) = (of(a, load), of(b, load));
             let zero = || Mat::zeros(nf, nf);

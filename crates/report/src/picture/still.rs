@@ -75,6 +75,7 @@ impl Projection {
             shift: [0.0; 2],
             height: 0.0,
         };
+        // Box around the part and its principal axes, as seen by the viewer.
         let axes = placed.principal.map(|axis| placed.axis_end(&axis, AXIS * own.radius));
         let seen: Vec<Vector3<f64>> = drawing.places().iter().chain(&axes).map(|x| own.turned(x)).collect();
         let bound =
@@ -82,9 +83,11 @@ impl Projection {
         let low = [0, 1].map(|k| bound(k, f64::min, f64::INFINITY));
         let high = [0, 1].map(|k| bound(k, f64::max, f64::NEG_INFINITY));
         let [wide, tall] = [0, 1].map(|k| high[k] - low[k]);
+        // Largest scale at which the box fits the page within its margins.
         let room = [WIDTH - 2.0 * MARGIN, MOST_HEIGHT - 2.0 * MARGIN];
         own.scale = (room[0] / wide).min(room[1] / tall);
         own.height = (own.scale * tall + 2.0 * MARGIN).max(LEAST_HEIGHT);
+        // Centre the box on the page.
         own.shift = [
             0.5 * (WIDTH - own.scale * (low[0] + high[0])),
             0.5 * (own.height + own.scale * (low[1] + high[1])),

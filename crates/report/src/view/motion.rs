@@ -41,6 +41,7 @@ impl ShownMotion {
         let some = |of: &[f64], width: usize| -> Vec<f64> {
             chosen.iter().flat_map(|&i| &of[i * width..(i + 1) * width]).copied().collect()
         };
+        // Box around the path of the origin, and the largest distance of the path from its centre.
         let origins = some(&motion.origins, 3);
         let bound = |k: usize, pick: fn(f64, f64) -> f64, start: f64| {
             origins.iter().skip(k).step_by(3).copied().fold(start, pick)

@@ -33,6 +33,7 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
     };
     let (mut i5, mut i9) = (Mat::zeros(3 * nf, nf), Mat::zeros(3 * nf, 3 * nf));
     let (mut negative, mut below, mut all) = (0, 0.0, 0.0);
+    // Sums over the nodes with mass m, inertia J about the node, position x, shape psi and rotation theta.
     for node in 0..n {
         let [mass, _, _, jx, jy, jz] = *diagonal[6 * node..].first_chunk::<6>().expect("six per node");
         let x = Vector3::from(records.position(node));
@@ -41,10 +42,12 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
         negative += usize::from(mass < 0.0);
         below += (-mass).max(0.0);
         all += mass.abs();
+        // Rigid body: sum m, sum m x, sum J - m x~ x~.
         told.i1 += mass;
         told.i2 += x * mass;
         told.i7 += inertia - x.cross_matrix() * x.cross_matrix() * mass;
         for j in 0..nf {
+            // Linear in a mode: sum m psi, sum m x~ psi + J theta, -sum m x~ psi~.
             let (psi, turn) = (shape(0, j), shape(3, j));
             let coupled = x.cross(&psi) * mass + inertia * turn;
             for a in 0..3 {
@@ -53,6 +56,8 @@ pub(crate) fn lumped(records: &Records) -> Option<Lumped> {
             }
             told.i8[j] -= x.cross_matrix() * psi.cross_matrix() * mass;
             for k in 0..nf {
+                // Quadratic: sum m psi_j . psi_k + theta_j . J theta_k, sum m psi_j x psi_k, sum m psi_j~
+                // psi_k~.
                 let other = shape(0, k);
                 told.i6[(j, k)] += psi.dot(&other) * mass + turn.dot(&(inertia * shape(3, k)));
                 let (cross, double) = (psi.cross(&other), psi.cross_matrix() * other.cross_matrix());

@@ -71,6 +71,7 @@ pub(crate) fn body(
     spin_in_oe: bool,
 ) -> (ImportedBody, Vec<String>) {
     let mut terms = Terms { arrays, stiffness: Vec::new(), notes: Vec::new() };
+    // W3, W2 and geometric stiffness are separated from arrays that hold them as sums.
     let i5 = terms.coupling(declared.general && !declared.turned);
     let i9 = terms.centrifugal(i5.as_ref(), spin_in_oe);
     terms.accelerated();

@@ -25,10 +25,12 @@ const OBJECTS: [(&str, &[&str]); 11] = [
 /// Objects of a frame in the order of the format.
 const FRAME_OBJECTS: [&str; 5] = ["origin", "phi", "psi", "ap", "sigma"];
 
-/// Number of modes that is accepted without further checks, whatever the length of the file.
+/// Largest number of modes that a short file may state. A longer file may state up to sqrt(64 n) modes for n
+/// listed numbers; the limit prevents huge arrays from a single number.
 const MODES_OF_ANY_FILE: usize = 100;
 
-/// Number of frame values that is accepted without further checks, whatever the length of the file.
+/// Largest product of frames and modes that a short file may state. A longer file may state up to 64 times
+/// its listed numbers.
 const NUMBERS_OF_ANY_FILE: usize = 1_000_000;
 
 /// A frame of the file; its objects are in the order of [`FRAME_OBJECTS`].
