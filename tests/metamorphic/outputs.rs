@@ -17,16 +17,16 @@ pub enum Along {
 pub enum Values {
     /// Vectors; axial vectors change sign under reflection.
     Vectors {
-        /// Axes.
+        /// Axes of the components.
         along: Along,
         /// True for angular velocities and torques.
         axial: bool,
-        /// The vectors.
+        /// Vector at each output time.
         rates: Vec<Vector3<f64>>,
     },
     /// Rotations from model axes to world axes.
     Attitudes(Vec<Matrix3<f64>>),
-    /// Numbers.
+    /// Numbers without direction.
     Numbers(Vec<f64>),
     /// Decisions, counts and codes of findings, in words.
     Facts(String),
@@ -35,11 +35,11 @@ pub enum Values {
 /// An output of a command.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// Name.
+    /// Name of the output.
     pub name: String,
     /// Exponents of length, mass and time.
     pub unit: [i32; 3],
-    /// The values.
+    /// Values of the output.
     pub values: Values,
     /// Number of time derivatives of a world position; `None` for quantities that do not move with the world.
     pub derivative: Option<u8>,
@@ -56,7 +56,7 @@ pub struct Output {
 pub struct Outputs {
     /// Output times.
     pub times: Vec<f64>,
-    /// Outputs.
+    /// Outputs of the command.
     pub all: Vec<Output>,
 }
 

@@ -27,13 +27,13 @@ pub enum Basis {
 pub struct Subject {
     /// Name of the kind of body.
     pub kind: &'static str,
-    /// The model.
+    /// Model before its checks.
     pub raw: RawModel,
     /// Modes of the conversion.
     pub basis: Basis,
     /// Frame of the conversion.
     pub frame: BodyFrame,
-    /// The scene.
+    /// Scene of the first load case.
     pub scene: Scene,
     /// Number of load cases that repeat the scene.
     pub cases: usize,

@@ -61,7 +61,7 @@ impl BatchRow {
     }
 }
 
-/// A batch.
+/// Facts of a batch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BatchFacts {
     format: &'static str,

@@ -14,7 +14,7 @@ use std::collections::BTreeSet;
 
 /// A command with its name.
 pub struct Command {
-    /// Name.
+    /// Name of the command.
     pub name: &'static str,
     /// Computes the outputs of a subject.
     pub run: fn(&Subject) -> Result<Outputs>,

@@ -42,7 +42,7 @@ pub struct Driven {
 pub struct Conditions {
     /// Condition matrix G.
     pub rows: DMatrix<f64>,
-    /// Driven frame.
+    /// Frame that the displacements refer to.
     pub frame: Driven,
     /// True if the driven frame carries K; false if the best fit does.
     pub carries: bool,

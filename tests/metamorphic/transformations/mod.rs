@@ -52,7 +52,7 @@ pub enum Reach {
 
 /// A transformation with its name and reach.
 pub struct Transformation {
-    /// Name.
+    /// Name of the transformation.
     pub name: &'static str,
     /// Commands that it is crossed with.
     pub reach: Reach,

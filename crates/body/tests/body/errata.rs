@@ -21,7 +21,8 @@ fn soft_body() -> ReducedBody {
     reduced(&body.condensed(BodyFrame::Principal).invariants)
 }
 
-/// y = (Euler parameters, omega, q, qd); at the centre of mass the translation is uncoupled.
+/// Returns the state of y = (Euler parameters, omega, q, qd); at the centre of mass the translation is
+/// uncoupled.
 fn unpack(y: &DVector<f64>) -> State {
     let nf = (y.len() - 7) / 2;
     let turn = UnitQuaternion::from_quaternion(Quaternion::new(y[0], y[1], y[2], y[3]));

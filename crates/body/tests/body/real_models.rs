@@ -157,8 +157,8 @@ fn agrees_with_its_reference(case: &Case) {
     }
 }
 
-/// Acceptance test (theory section 10, last line): generalised inertia forces from the invariants of the
-/// modes equal the sums of the forces M of the file times the accelerations of all nodes.
+/// Asserts the last line of theory section 10: generalised inertia forces from the invariants of the modes
+/// equal the sums of the forces M of the file times the accelerations of all nodes.
 fn obeys_the_nodal_equations(case: &Case) {
     let body = proved(case.raw.clone(), case.eigenvalues.len(), Method::Auto);
     let mass = labelled(&case.raw, &body);

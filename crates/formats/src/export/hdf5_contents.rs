@@ -25,7 +25,7 @@ pub(crate) enum Hdf5Contents {
     Floats(Vec<usize>, Vec<f64>),
     /// 64-bit integers with these extents.
     Integers(Vec<usize>, Vec<i64>),
-    /// One text.
+    /// A single text.
     Text(String),
 }
 

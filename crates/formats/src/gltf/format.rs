@@ -50,7 +50,8 @@ impl ExportFormat for Gltf {
         true
     }
 
-    /// Mechanical properties are not applicable to a picture; [`leaves_out`](Self::leaves_out) names them.
+    /// Returns mechanical properties as not applicable to a picture; [`leaves_out`](Self::leaves_out) names
+    /// them.
     fn checklist(&self, _: &FlexBody, _: &ExportOptions) -> ExportChecklist {
         ExportChecklist {
             rigid_coupling: NotApplicable,

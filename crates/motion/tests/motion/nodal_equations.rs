@@ -225,8 +225,8 @@ fn velocities(equations: &EquationsOfMotion, state: &Configuration) -> Vec<f64> 
     rigid.into_iter().chain(state.qd.iter().copied()).collect()
 }
 
-/// [ZG19] eq. 67 to 72: with H = blkdiag(I, I, Psi), H'(M of all nodes) H and the velocity forces equal those
-/// of the reduced equations, for any modes.
+/// Asserts [ZG19] eq. 67 to 72: with H = blkdiag(I, I, Psi), H'(M of all nodes) H and the velocity forces
+/// equal those of the reduced equations, for any modes.
 fn assert_projection(name: &str, raw: RawModel) {
     let (model, free) = converted(raw, 10);
     let state = modal_state(3, &free);
@@ -393,9 +393,9 @@ fn accelerations_apart(
     }
 }
 
-/// Without rotary mass the equations of all modes are those of the nodes. With rotary mass the modal
-/// equations have the kinetic energy to second order of the displacements: accelerations of the nodes differ
-/// by their square, those of the frame by the third power.
+/// Asserts that accelerations of all modes agree with those of the nodes. Without rotary mass the equations
+/// are equal. With rotary mass the modal equations have the kinetic energy to second order of the
+/// displacements: accelerations of the nodes differ by their square, those of the frame by the third power.
 fn assert_same_accelerations(
     what: &str,
     whole: &(FeModel, FlexBody),

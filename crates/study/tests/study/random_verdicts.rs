@@ -204,7 +204,7 @@ fn carried(seed: u64, model: &FeModel, speed: f64, probe: &FlexBody) -> Option<C
     Some(Carried { by, spin, translation })
 }
 
-/// The frame is principal, so that loads along body axes are along principal axes.
+/// Returns settings with a principal frame, so that loads along body axes are along principal axes.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
         frame: BodyFrame::Principal.into(),

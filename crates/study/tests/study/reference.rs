@@ -57,7 +57,7 @@ fn raw_rooted_beam(element: ElementKind, rule: MassRule, cells: [i32; 3], coupli
     RawModel { interfaces, ..raw }
 }
 
-/// The frame is principal, so that loads and spins of the scenes are along principal axes.
+/// Returns settings with a principal frame, so that loads and spins of the scenes are along principal axes.
 fn settings(modes: usize) -> ConvertSettings {
     ConvertSettings {
         frame: BodyFrame::Principal.into(),

@@ -16,7 +16,7 @@ pub(crate) enum Blocks {
 }
 
 impl Blocks {
-    /// Both orders.
+    /// Both column orders.
     const ALL: [Self; 2] = [Self::Component, Self::Mode];
 
     /// Returns the order in words: `component-blocked` or `mode-blocked`.

@@ -50,7 +50,7 @@ impl ModeIndex {
 /// Text after `new modal`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum ModalName {
-    /// Neither a name nor a sign of equality.
+    /// Neither a name nor a sign of equality follows.
     Absent,
     /// Name of the body, after a sign of equality at which readers of these files split the line.
     OfBody,

@@ -127,7 +127,7 @@ fn flatten(value: &Value, shape: &[usize], flat: &mut Vec<Value>) {
     }
 }
 
-/// Strict reader of stored `.npy` members, version 1.0.
+/// Reads stored `.npy` members of version 1.0 strictly.
 fn of_npz(bytes: &[u8]) -> Contents {
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(bytes)).expect("an archive");
     let mut found = Contents::default();
