@@ -10,7 +10,8 @@ use super::numbers::{percent, significant};
 use super::text::KEEP;
 use flexbody_body::invariants::{ERROR_NORMS, LumpedScheme};
 
-/// Error at the left end of the bars; smaller errors are negligible.
+/// Error at the left end of the bars; smaller errors are negligible. A smaller value adds decades to the
+/// axis.
 const LOWEST_BAR: f64 = 1e-6;
 /// Longest name of a scheme that is aligned with the others in a text.
 const LONGEST_SCHEME: usize = 20;

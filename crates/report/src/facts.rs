@@ -166,7 +166,8 @@ impl InterfaceFacts {
     }
 }
 
-/// Largest relative deformation of an interface that counts as rounding of a rigid motion.
+/// Largest relative deformation of an interface that counts as rounding of a rigid motion. A smaller value
+/// reports rounding as deformation.
 const RIGID: f64 = 1e-8;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -237,7 +238,8 @@ impl DampingFacts {
     }
 }
 
-/// Largest coupling of modes by damping that counts as rounding.
+/// Largest coupling of modes by damping that counts as rounding. A smaller value reports rounding as
+/// coupling.
 const UNCOUPLED: f64 = 1e-6;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -5,7 +5,7 @@ use super::mass_properties::{centre_of_mass, inertia_about_com, principal_moment
 use super::numbers::significant;
 use flexbody_body::invariants::{Invariants, LumpedScheme};
 
-/// Largest error that counts as rounding.
+/// Largest error that counts as rounding and is not shown.
 pub(super) const NEGLIGIBLE: f64 = 1e-9;
 
 /// Changes caused by the lumped masses; NaN if unknown.

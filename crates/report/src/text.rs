@@ -6,7 +6,7 @@ use flexbody_base::diagnostic::{Diagnostic, Severity};
 
 /// Default width of a text: columns that every terminal has.
 const WIDTH: usize = 80;
-/// Width of the label column.
+/// Width of the label column in characters.
 const LABEL: usize = 12;
 /// Character that stands for a space at which a line must not break.
 pub(super) const KEEP: &str = "\u{a0}";

@@ -25,7 +25,8 @@ use serde::Serialize;
 const IN_TEXT: [&str; 7] =
     ["No.", "What", "Multiplications", "Evaluation", "Simulation", "File", "Error / tolerance"];
 
-/// Lower end of the error axis of the plot, as error over tolerance; smaller errors are drawn there.
+/// Smallest error over tolerance on the plot; smaller errors are drawn at this value. A smaller value adds
+/// decades to the axis.
 const NO_ERROR: f64 = 1e-6;
 
 /// Facts of a trade study.

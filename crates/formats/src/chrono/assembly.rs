@@ -30,7 +30,8 @@ use nalgebra::Matrix3;
 /// modes).
 const REST_FREQUENCY: f64 = 4.0;
 
-/// Frequency of the modes that fill the last node, relative to that of the rest mass.
+/// Frequency of the modes that fill the last node, relative to that of the rest mass. With [`REST_FREQUENCY`]
+/// it keeps these modes above all modes of the body, so that a reduction removes them.
 const FILL_FREQUENCY: f64 = 2.0;
 
 /// Share of the mass that is added to the rest mass, so that the basis is complete even if the modes move all

@@ -83,7 +83,7 @@ impl Hdf5Entry {
     }
 }
 
-/// Largest length of a text in bytes.
+/// Largest length of a text in bytes; a longer text is an error of the export.
 const LONGEST_TEXT: usize = 1 << 16;
 
 /// Writes a text of fixed length, in ASCII if possible: Octave cannot read texts of variable length or in

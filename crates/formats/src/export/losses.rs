@@ -7,10 +7,12 @@ use flexbody_body::flex_body::FlexBody;
 use flexbody_body::invariants::CauchySchwarz;
 use flexbody_model::UnitLoad;
 
-/// Largest difference, relative to a Cauchy-Schwarz bound, that counts as rounding and not as a loss.
+/// Largest difference, relative to a Cauchy-Schwarz bound, that counts as rounding and not as a loss. A
+/// larger value hides small losses; a smaller one reports rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Part of the stiffness of a motion from which the stiffness of inertia is reported.
+/// Part of the stiffness of a motion from which the stiffness of inertia is reported. A larger value reports
+/// it for faster motions only.
 const PART: f64 = 0.01;
 
 /// Returns the holding of the restriction to a plane, for a format in space.

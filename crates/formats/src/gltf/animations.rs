@@ -10,7 +10,8 @@ use std::f64::consts::TAU;
 const PERIOD: f64 = 2.0;
 pub(super) const MOTION: f64 = 8.0;
 
-/// Number of key frames of a period; viewers interpolate weights linearly between them.
+/// Number of key frames of a period; viewers interpolate weights linearly between them. A larger value is
+/// smoother and makes the file larger.
 const STEPS: usize = 32;
 
 /// Returns one animation for each mode: one period with sinusoidal weights from -1 to 1 on the mesh of

@@ -23,7 +23,8 @@ use std::f64::consts::FRAC_1_SQRT_2;
 /// Export format of glTF.
 pub(crate) struct Gltf;
 
-/// Default number of modes: as many morph targets as every viewer should play.
+/// Default number of modes: as many morph targets as every viewer should play. More targets may be ignored by
+/// a viewer.
 const MODES: usize = 8;
 
 /// Largest displacement of a mode, relative to the largest extent of the body.

@@ -294,7 +294,8 @@ fn kind_of_modes(invariants: &Invariants, frames: &[ImportedFrame]) -> String {
     format!("modes are no mass-normalised free-surface modes (by {by:.1e}){places}")
 }
 
-/// Largest displacement of a node at rest, relative to the largest displacement of the mode.
+/// Largest displacement of a node at rest, relative to the largest displacement of the mode. A smaller value
+/// misses nodes held with rounding.
 const AT_REST: f64 = 1e-9;
 
 /// Returns the labels of the nodes that move in no mode. They may rotate, like the ends of a body whose frame

@@ -13,8 +13,8 @@ pub(crate) struct Digits {
     count: usize,
 }
 
-/// Smallest count of numbers from which a number format is inferred: a small body written by hand has short
-/// exact numbers.
+/// Smallest count of numbers from which a number format is inferred. A smaller value would take the short
+/// exact numbers of a small body written by hand for lost digits.
 const FEW: usize = 20;
 
 impl Digits {

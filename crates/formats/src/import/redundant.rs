@@ -9,7 +9,8 @@ use flexbody_base::diagnostic::Code;
 use flexbody_body::invariants::Numbered;
 use flexbody_linalg::{larger, symmetric_eigen};
 
-/// Rounding error of sums over the nodes of a large model, relative.
+/// Relative rounding error of sums over the nodes of a large model, the limit of redundant numbers. A smaller
+/// value reports rounding as contradictions.
 pub(crate) const ROUNDING: f64 = 1e-10;
 
 /// The invariants with their bounds.

@@ -8,10 +8,12 @@ use crate::import::redundant::{ROUNDING, Redundant, asymmetry, in_other_order, r
 use flexbody_base::diagnostic::Code;
 use flexbody_linalg::larger;
 
-/// Largest relative rounding of a number that is not reported as lost digits.
+/// Largest relative rounding of a number that is not reported as lost digits. A larger value accepts files
+/// with fewer digits.
 const LOST: f64 = 1e-8;
 
-/// Number of last-digit roundings that an identity may accumulate.
+/// Number of last-digit roundings that an identity may accumulate. A smaller value reports rounding as
+/// contradictions.
 const TERMS: f64 = 10.0;
 
 pub(crate) fn checks(records: &Records, read: &Read) -> Vec<AuditCheck> {

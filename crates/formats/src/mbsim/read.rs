@@ -34,7 +34,7 @@ const INDICES: &str = "openmbv indices";
 const ROTATIONS: &str = "nodal shape matrix of rotation";
 
 /// Largest entry off the diagonal of the stiffness matrix, relative to the diagonal, for which the modes
-/// count as eigenmodes.
+/// count as eigenmodes. A larger value demands a diagonal modal mass of modes that are coupled by stiffness.
 const DIAGONAL: f64 = 1e-8;
 
 impl ImportFormat for Mbsim {

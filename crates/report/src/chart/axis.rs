@@ -2,7 +2,8 @@
 
 use crate::numbers::significant;
 
-/// Approximate number of intervals between the ticks of a linear axis.
+/// Approximate number of intervals between the ticks of a linear axis; the step is rounded to 1, 2 or 5 times
+/// a power of ten.
 const INTERVALS: f64 = 4.0;
 /// Largest number of labels of a logarithmic axis; more labels would overlap on the smallest panel.
 const MOST_LABELS: f64 = 7.0;

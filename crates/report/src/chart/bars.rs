@@ -20,7 +20,7 @@ pub(crate) struct Bars {
     pub groups: Vec<(String, Vec<Bar>)>,
 }
 
-/// A bar; a value that is not finite draws no bar.
+/// A bar. An infinite value fills the plot; an unknown value (NaN) has a label only.
 pub(crate) struct Bar {
     pub style: usize,
     pub value: f64,

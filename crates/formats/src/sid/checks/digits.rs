@@ -5,7 +5,8 @@ use crate::sid::read::arrays::{Array, Arrays, FrameArrays};
 use crate::sid::read::parse::Listed;
 use flexbody_base::diagnostic::Code;
 
-/// Largest relative rounding of an array that is not reported as lost digits.
+/// Largest relative rounding of an array that is not reported as lost digits. A larger value accepts files
+/// with fewer digits.
 const LOST: f64 = 1e-8;
 
 /// Constant (order 0) or linear (order 1) part of an array, with half a unit of its last digit and its

@@ -124,8 +124,7 @@ fn symmetry_missed(array: &Array, nq: usize) -> Option<Missed> {
     })
 }
 
-/// Checks the undeformed axes of every frame. Frames cannot have axes of the opposite handedness; a mirrored
-/// frame belongs to another body.
+/// Checks that the undeformed axes of every frame are a rotation. A mirrored frame belongs to another body.
 fn undeformed_axes(listed: &Listed<'_>, frames: &[FrameArrays]) -> AuditCheck {
     let (mut total, mut what) = (Missed { by: 0.0, scale: 1.0, rounding: 0.0 }, String::new());
     for (frame, listed) in frames.iter().zip(&listed.frames) {

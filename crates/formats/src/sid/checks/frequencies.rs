@@ -6,7 +6,8 @@ use crate::sid::read::parse::Listed;
 use flexbody_base::diagnostic::Code;
 use std::f64::consts::TAU;
 
-/// Tolerance of frequencies in texts, relative; they are often those of the model before its reduction.
+/// Relative tolerance of frequencies in texts, which are often those of the model before its reduction. A
+/// smaller value reports the error of the reduction.
 const FREQUENCY: f64 = 0.01;
 
 /// Largest entries of Ke off the diagonal, relative to the diagonal, for which the diagonal gives the

@@ -8,7 +8,8 @@ use flexbody_linalg::larger;
 /// their arrays: the rounding of sums over the nodes of a large model in double precision.
 const ROUNDING: f64 = 1e-10;
 
-/// Number of last-digit roundings that one identity may accumulate.
+/// Number of last-digit roundings that one identity may accumulate. A smaller value reports rounding as
+/// contradictions.
 const TERMS: f64 = 10.0;
 
 /// Violation of an identity, with the scale of its terms and half a unit of their last digits.

@@ -8,7 +8,8 @@ use crate::sid::read::layout::Layout;
 use flexbody_base::diagnostic::Code;
 use nalgebra::Matrix3;
 
-/// Largest part of its bound for which an array counts as zero.
+/// Largest part of its bound for which an array counts as zero. A larger value reports small arrays as
+/// missing.
 const NOTHING: f64 = 1e-9;
 
 /// Missing arrays, and the contradictions in words.

@@ -9,7 +9,8 @@ use flexbody_body::invariants::{Numbered, TermGroups};
 use flexbody_model::{GeometricStiffness, LoadKind, UnitLoad};
 use nalgebra::Vector3;
 
-/// Largest entries of Cr1 and Oe1 that count as rounding, relative to their largest entry.
+/// Largest entries of Cr1 and Oe1 that count as rounding, relative to their largest entry. A smaller value
+/// takes rounding for geometric stiffness.
 const ROUNDING: f64 = 1e-10;
 
 /// Facts of the body declared in the first line.

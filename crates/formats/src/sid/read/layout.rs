@@ -74,7 +74,8 @@ impl Blocks {
     }
 }
 
-/// Largest ratio of the misfits of two layouts for which the smaller one decides.
+/// Largest ratio of the misfits of two layouts for which the smaller one decides. A larger value decides on
+/// less evidence.
 const CLEAR: f64 = 0.1;
 
 /// Returns the layout with the clearly smaller misfit; `None` if both are similar.
