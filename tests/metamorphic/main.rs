@@ -1,7 +1,7 @@
 //! Metamorphic matrix: scene features crossed with transformations that must not change the physics, and with
 //! the commands that judge a motion.
 
-#![allow(unreachable_pub)] // nothing outside reads a test
+#![allow(unreachable_pub)] // tests export nothing
 
 mod bodies;
 mod commands;

@@ -1,6 +1,6 @@
 //! The program on the command line: exit codes, output on stdout and stderr, files left on disk.
 
-#[allow(dead_code)] // its `main`
+#[allow(dead_code)] // `main` of the example is unused
 #[path = "../../examples/from_memory.rs"]
 mod from_memory;
 

@@ -1,6 +1,6 @@
 //! Bodies and joints of `examples/joints`, integrated with error control.
 
-#[allow(dead_code, unused_imports)] // the steps of the examples
+#[allow(dead_code, unused_imports)] // some steps of the examples are unused
 #[path = "../../examples/joints/mod.rs"]
 mod joints;
 

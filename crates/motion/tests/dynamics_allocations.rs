@@ -22,7 +22,7 @@ thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
 }
 
-#[allow(unsafe_code)] // an allocator cannot be written without
+#[allow(unsafe_code)] // an allocator needs unsafe code
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         COUNT.with(|count| count.set(count.get() + 1));

@@ -1,9 +1,9 @@
 //! Examples that join bodies with Lagrange multipliers give the documented results.
 
-#[allow(dead_code, clippy::duplicate_mod)] // its `main`; each example has modules of its own
+#[allow(dead_code, clippy::duplicate_mod)] // `main` of the example is unused; each example has modules of its own
 #[path = "../../../examples/pendulum.rs"]
 mod pendulum;
-#[allow(dead_code, clippy::duplicate_mod)] // its `main`; each example has modules of its own
+#[allow(dead_code, clippy::duplicate_mod)] // `main` of the example is unused; each example has modules of its own
 #[path = "../../../examples/slider_crank.rs"]
 mod slider_crank;
 

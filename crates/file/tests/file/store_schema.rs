@@ -31,7 +31,7 @@ fn written_files_follow_the_schema() {
 #[test]
 fn every_required_entry_is_missed_when_it_is_not_there() {
     let validator = validator();
-    let whole = structure_of(&body(1, 3, 3, 1, 1)); // certified: every optional entry is there
+    let whole = structure_of(&body(1, 3, 3, 1, 1)); // certified bodies have every optional entry
     let mut removed = 0;
     for pointer in pointers(&whole) {
         let mut broken = whole.clone();

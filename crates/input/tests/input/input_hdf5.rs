@@ -67,7 +67,7 @@ fn put_index(group: &Group, name: &str, values: &[usize], index: Index, packed: 
 fn store(group: &Group, n: usize, entries: &Entries, layout: Layout, index: Index, packed: bool) {
     let mut entries = entries.clone();
     match layout {
-        Layout::Columns => entries.sort_by_key(|e| e.1), // stable
+        Layout::Columns => entries.sort_by_key(|e| e.1), // a stable sort keeps the order of duplicates
         Layout::Rows => entries.sort_by_key(|e| e.0),
         Layout::Coordinates => {}
     }
@@ -121,7 +121,7 @@ proptest! {
         if triangle {
             entries.iter_mut().for_each(|e| *e = (e.0.max(e.1), e.0.min(e.1), e.2));
         } else {
-            entries.extend([(1, 0, 3.0), (0, 1, 4.0)]); // both sides, and not symmetric
+            entries.extend([(1, 0, 3.0), (0, 1, 4.0)]); // entries in both triangles, not symmetric
         }
         let full: Entries = if triangle {
             entries.iter().flat_map(|&(i, j, v)| [Some((i, j, v)), (i != j).then_some((j, i, v))]).flatten().collect()

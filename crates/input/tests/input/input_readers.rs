@@ -338,7 +338,7 @@ fn write(n: usize, entries: &[(usize, usize, f64)], dialect: &Dialect) -> (Strin
         _ => (
             "K".into(),
             ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest),
-        ), // no extension at all
+        ), // no extension
     }
 }
 

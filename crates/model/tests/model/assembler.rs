@@ -189,8 +189,8 @@ fn one_trilinear_cube_has_its_closed_form_spectrum() {
     for (value, times) in [
         (1.5 * lambda + mu, 1),               // dilatation x
         (mu, 5),                              // constant deviatoric strain
-        ((2.0 * lambda + 3.0 * mu) / 6.0, 3), // bending (x y, 0, z y), its two curvatures alike
-        (mu / 2.0, 3),                        // the same, opposite
+        ((2.0 * lambda + 3.0 * mu) / 6.0, 3), // bending (x y, 0, z y), both curvatures in phase
+        (mu / 2.0, 3),                        // bending with both curvatures in opposite phase
         (2.0 * mu / 3.0, 1),                  // warping (y z, x z, x y)
         (mu / 6.0, 2),                        // twist
         ((lambda + 4.0 * mu) / 18.0, 3),      // x y z

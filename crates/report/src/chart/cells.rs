@@ -25,7 +25,7 @@ pub(crate) struct Cells {
 }
 
 /// Returns the colour step of a value, from 0; `None` below the scale.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 on, before
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the value is not negative
 pub(crate) fn step(value: f64) -> Option<usize> {
     let last = STEPS - 1;
     if value.is_nan() || value > 1.0 {

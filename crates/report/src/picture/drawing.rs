@@ -208,7 +208,7 @@ impl<'b> Drawing<'b> {
 }
 
 /// Rounds numbers from -1 to 1 to 16-bit integers.
-#[allow(clippy::cast_possible_truncation)] // they are in range
+#[allow(clippy::cast_possible_truncation)] // values are clamped to the range
 fn in_steps(x: Vector3<f64>) -> [i16; 3] {
     [x.x, x.y, x.z].map(|x| (x * STEPS).round().clamp(-STEPS, STEPS) as i16)
 }

@@ -174,7 +174,7 @@ fn path(view: &Projection, points: &[Vector3<f64>]) -> String {
 }
 
 /// Returns the brightness of a triangle from its angle to the light.
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // from 0 to 1 before
+#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)] // the value is from 0 to SHADES
 fn shade([a, b, c]: &[Vector3<f64>; 3]) -> u8 {
     let normal = (b - a).cross(&(c - a)).try_normalize(0.0).unwrap_or_default();
     let light = Vector3::new(0.25, 0.35, 1.0).normalize();

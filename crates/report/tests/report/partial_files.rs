@@ -92,7 +92,7 @@ fn bounds_and_limits_that_are_not_known_are_absent() {
     let body = soft_block(3);
     let mut terms = decisions(TermGroups::NONE);
     (terms[0].bound, terms[0].limit, terms[1].tier) = (f64::INFINITY, f64::INFINITY, 2);
-    terms.reverse(); // A body has them in the order of the groups.
+    terms.reverse(); // the body sorts them into the order of the groups
     let partial = body.reduced(&[0, 1, 2], TermGroups::NONE, terms).expect("a body");
     let (_folder, path) = written(&partial);
     let structure = flexbody_file::structure(&path).expect("a structure");
