@@ -269,7 +269,7 @@ fn an_output_keeps_the_owner_of_the_file_that_it_replaces() {
     assert_eq!((after.uid(), after.gid(), after.mode()), (before.uid(), before.gid(), before.mode()));
 }
 
-/// An unreasonable number of threads is reduced instead of exhausting the memory.
+/// A run with an unreasonable number of threads succeeds without exhausting the memory.
 #[test]
 fn so_many_threads_that_no_machine_has_them_are_no_fault() {
     let folder = folder();
